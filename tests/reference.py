@@ -122,7 +122,8 @@ def rules_page() -> str:
         solvers = " and ".join(_SOLVERS[solver] for solver in rule.solvers)
         lines += ["", f"## {rule.id}", ""]
         lines += [f"**{rule.severity}**, {solvers}: {rule.summary}.", ""]
-        lines += [" ".join(rule.explanation.split())]
+        paragraphs = re.split(r"\n\s*\n", rule.explanation.strip())
+        lines += ["\n\n".join(" ".join(text.split()) for text in paragraphs)]
     return "\n".join(lines) + "\n"
 
 

@@ -1,3 +1,3 @@
-"""What all other folders stand on: errors, the state of files, worker processes, and the version, written down once."""
+"""The base of all other folders: errors, files, settings, worker processes, and the version of d2rpick."""
 
 __version__ = "0.17.0"

@@ -1,4 +1,4 @@
-"""What can go wrong, in one line each: where, what was found, what was expected, what to do; and what to beware of."""
+"""Errors and cautions, each in one line: the place, what was found, what was expected, and what to do."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-# Control and format characters (escape codes, text direction), line and paragraph separators.
+# Unicode categories to be escaped: control and format characters (escape codes, text direction), line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
-_MOST_NAMED: Final = 20  # things in one line
+_MOST_NAMED: Final = 20  # names in one message
+
+# Code of the caution on an input that was skipped because of an error of the program.
+INTERNAL_ERROR: Final = "internal-error"
 
 
 class D2RPickError(Exception):
@@ -26,7 +29,7 @@ class FormatError(D2RPickError):
 
 
 class ChangedError(D2RPickError):
-    """A file was written anew while it was read: what it holds is of two of its states, and nothing of it counts."""
+    """A file was rewritten while it was read: its content mixes two states and cannot be used."""
 
 
 class HistoryError(D2RPickError):
@@ -34,7 +37,7 @@ class HistoryError(D2RPickError):
 
 
 class RangeError(D2RPickError):
-    """A time or a parameter lies outside what the history or the mechanics allow."""
+    """A time or a parameter is outside what the history or the mechanics allow."""
 
 
 class DeckError(D2RPickError):
@@ -42,7 +45,7 @@ class DeckError(D2RPickError):
 
 
 class ArgumentError(TypeError, ValueError):
-    """What is asked contradicts itself, said with the names of arguments in backticks."""
+    """The arguments contradict each other; the message names them in backticks."""
 
 
 class ConfigurationError(D2RPickError):
@@ -50,22 +53,18 @@ class ConfigurationError(D2RPickError):
 
 
 class Caution(NamedTuple):
-    """Something the user should know: a stable ``code`` for scripts, and a sentence."""
+    """A warning for the user: a stable ``code`` for scripts, and a sentence."""
 
     code: str
     message: str
 
 
-INTERNAL_ERROR: Final = "internal-error"  # what becomes of one of several inputs where it meets an error of the program
-FORESEEN: Final = (
-    D2RPickError,
-    OSError,
-    MemoryError,
-)  # what is no error of the program itself
+# Errors that are not errors of the program itself.
+FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Give what is read of a history, None where it is not written, or not in every state."""
+    """Return what ``read`` returns, or None if a history does not contain it in every state."""
     try:
         return read()
     except FormatError:
@@ -73,7 +72,7 @@ def if_written(read: Callable[[], _Read]) -> _Read | None:
 
 
 def one_line(error: BaseException) -> str:
-    """Say any error in one line; one that nobody foresaw as what to report.
+    """Return the message of any error in one line; an unforeseen error is to be reported.
 
     Examples
     --------
@@ -88,17 +87,15 @@ def one_line(error: BaseException) -> str:
         return "standard output is closed; open it, or name a file for the result"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'standard output'}: {error.strerror}"
-    return (
-        "there is not enough memory; give it more, or name fewer files"
-        if isinstance(error, MemoryError)
-        else str(error)
-    )
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; give it more, or name fewer files"
+    return str(error)
 
 
 def printable(text: str) -> str:
-    r"""Escape what would break a line or command a terminal, in a name that comes from a file or a user.
+    r"""Escape the characters of a name that would break a line or control a terminal.
 
-    Letters of any language and blanks stay, and so do the lone surrogates that stand for bytes of a file name.
+    Letters of any language and blanks stay, as do the lone surrogates that stand for bytes of a file name.
 
     Examples
     --------
@@ -118,7 +115,7 @@ def printable(text: str) -> str:
 
 
 def in_rows(ids: Iterable[int]) -> list[str]:
-    """Write numbers in order, three and more in a row as a range.
+    """Return numbers in ascending order, three or more consecutive ones as a range.
 
     Examples
     --------
@@ -131,15 +128,17 @@ def in_rows(ids: Iterable[int]) -> list[str]:
             rows[-1].append(number)
         else:
             rows.append([number])
-    return [
-        text
-        for row in rows
-        for text in ([f"{row[0]}-{row[-1]}"] if len(row) > 2 else map(str, row))
-    ]
+    texts: list[str] = []
+    for row in rows:
+        if len(row) > 2:
+            texts.append(f"{row[0]}-{row[-1]}")
+        else:
+            texts += map(str, row)
+    return texts
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:
-    """Name parts briefly, of many the first ones.
+    """Return a short list of part ids for a message; of many parts the first ones and the number of the others.
 
     Examples
     --------
@@ -148,30 +147,31 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
     >>> name_units([*range(1, 41, 2), *range(100, 150)])
     'parts 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31, 33, 35, 37, 39 and 50 more'
     """
-    every = sorted(set(ids))
-    named = in_rows(every)[:_MOST_NAMED]
-    left = (
-        len(every) - bisect_right(every, int(named[-1].rpartition("-")[2]))
-        if named
-        else 0
-    )
-    return f"{kind}{'s' * (len(every) > 1)} {', '.join(named)}{f' and {left} more' * (left > 0)}"
+    numbers = sorted(set(ids))
+    texts = in_rows(numbers)[:_MOST_NAMED]
+    unnamed = 0
+    if texts:
+        last_named = int(texts[-1].rpartition("-")[2])
+        unnamed = len(numbers) - bisect_right(numbers, last_named)
+    kinds = f"{kind}s" if len(numbers) > 1 else kind
+    remainder = f" and {unnamed} more" if unnamed else ""
+    return f"{kinds} {', '.join(texts)}{remainder}"
 
 
 def are(things: Collection[object]) -> str:
-    """Give the verb of one thing, or of several."""
+    """Return "is" for one thing, else "are"."""
     return "is" if len(things) == 1 else "are"
 
 
 def listing(
     names: Sequence[object], most: int = _MOST_NAMED, between: str = ", "
 ) -> str:
-    """Name things in one line, printable, cut where they would fill the screen.
+    """Return printable names in one line, cut after ``most`` of them.
 
     Examples
     --------
     >>> listing([3, 7, 8]), listing([3, 7, 8], most=2), listing([3, 7], between=",")
     ('3, 7, 8', '3, 7 and 1 more', '3,7')
     """
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return printable(between.join(map(str, names[:most]))) + more
+    remainder = f" and {len(names) - most} more" if len(names) > most else ""
+    return printable(between.join(map(str, names[:most]))) + remainder

@@ -1,6 +1,6 @@
-"""Files of anyone: how much one may hold, whether it changes while it is read, and a new one put in its place.
+"""Reading and writing files: bounds on their content, changes while they are read, and replacing them as a whole.
 
-Lines of JSON have a checksum where a program goes on from them, so that a damaged one is never taken for another.
+Lines of JSON that a program resumes from have a checksum, so that a damaged line is recognised.
 """
 
 from __future__ import annotations
@@ -20,30 +20,38 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
 
+STDIN: Final = "-"  # name of standard input
+# Bounds on a file, each with its default and its unit.
+_BOUNDS: Final = {
+    "RATIO": (100.0, "times as many bytes"),  # a history unpacks to 3 to 30 times
+    "UNPACKED": (4e9, "bytes"),  # unpacked data are held in memory
+    "LINE": (1e6, "bytes"),  # some 50,000 columns
+    "DEPTH": (100.0, "groups"),
+}
+# Unpacked bytes above which the ratio is checked: constant columns pack a thousandfold, and less is quickly unpacked.
+_ALLOWED: Final = 1 << 24
+_TRIES: Final = 5  # attempts to read a file that keeps changing
+_TICK: Final = 50_000_000  # [ns] above the resolution of most file times: later changes are visible
+# [ns] the same for file systems that store whole seconds
+_COARSE: Final = 2_000_000_000
+# [ns] needed to write a byte: the times of a file are set when its last write begins
+_SLOWEST: Final = 5
+# [s] waited for a write in progress: until it ends, the file has only part of its content
+_PAUSE: Final = 0.05
+_CHECKSUM: Final = ', "checksum": "'
+
 
 class Searched(Protocol):
-    """Bytes in which something can be looked for."""
+    """Bytes that can be searched."""
 
     def __len__(self) -> int: ...
 
     def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
-        """Place of the last ``wanted`` there, -1 where there is none."""
-
-
-STDIN: Final = "-"  # name of what was read from standard input
-# The largest value of each, and what it counts.
-_BOUNDS: Final = {
-    "RATIO": (100.0, "times as many bytes"),  # histories become 3 to 30 times as many
-    "UNPACKED": (4e9, "bytes"),  # they are held in memory
-    "LINE": (1e6, "bytes"),  # some 50,000 columns
-    "DEPTH": (100.0, "groups"),
-}
-# Constant columns pack a thousandfold: the ratio counts only above so many bytes, which take no time and little memory.
-_ALLOWED: Final = 1 << 24
+        """Return the address of the last ``wanted`` between two addresses, -1 if there is none."""
 
 
 def bound(name: str) -> float:
-    """Largest value that is allowed; D2RPickError where the environment sets one that is no number above 0."""
+    """Return a bound; raise D2RPickError if the environment sets it to something other than a number above 0."""
     variable = f"D2RPICK_MAX_{name}"
     text = os.environ.get(variable)
     try:
@@ -58,58 +66,48 @@ def bound(name: str) -> float:
 
 
 def beyond(name: str, value: float = float("inf")) -> str:
-    """Say by what a value is above its bound, and what to do; nothing where it is not.
+    """Return a message that a value exceeds its bound, and what to do; empty if it does not.
 
     Examples
     --------
     >>> beyond("DEPTH", 101), beyond("DEPTH", 100)
     ('more than 100 groups; is the file damaged? Copy it again, or set D2RPICK_MAX_DEPTH higher', '')
     """
-    most = bound(name)
-    if value <= most:
+    limit = bound(name)
+    if value <= limit:
         return ""
-    what = f"more than {most:,.10g} {_BOUNDS[name][1]}"
-    return (
-        f"{what}; is the file damaged? Copy it again, or set D2RPICK_MAX_{name} higher"
-    )
+    excess = f"more than {limit:,.10g} {_BOUNDS[name][1]}"
+    return f"{excess}; is the file damaged? Copy it again, or set D2RPICK_MAX_{name} higher"
 
 
 def unpacked_beyond(packed: int, unpacked: int) -> str:
-    """Say the same of data of so many bytes that become so many."""
+    """Return a message if ``packed`` bytes unpack to more bytes than the bounds allow; empty otherwise."""
     ratio = unpacked / max(packed, 1) if unpacked > _ALLOWED else 0.0
     return beyond("UNPACKED", unpacked) or beyond("RATIO", ratio)
 
 
 def long_line(data: bytes | Searched, most: float | None = None) -> int:
-    r"""Where a line beyond the bound begins, -1 where there is none; of the others little is looked at.
+    r"""Return the address of a line that exceeds the bound, -1 if there is none; only part of the data is searched.
 
-    ``most`` is the bound, where it is known already.
+    ``most`` is the bound, if it is known already.
 
     Examples
     --------
     >>> long_line(b"ab\n" * 9), long_line(b"ab\n" + bytes(1_000_001))
     (-1, 3)
     """
-    begin, most = 0, int(min(bound("LINE") if most is None else most, len(data)))
-    while begin + most < len(data):
-        end = data.rfind(b"\n", begin, begin + most + 1) + 1
+    limit = int(min(bound("LINE") if most is None else most, len(data)))
+    begin = 0
+    while begin + limit < len(data):
+        end = data.rfind(b"\n", begin, begin + limit + 1) + 1
         if not end:
             return begin
         begin = end
     return -1
 
 
-_TRIES: Final = 5  # looks at a file that changes all the time
-_TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
-_COARSE: Final = (
-    2_000_000_000  # [ns] the resolution of the others, which give whole seconds
-)
-_SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
-_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
-
-
 class FileState(NamedTuple):
-    """What tells whether a file has changed; ``settled`` when no write is under way and one after it would show."""
+    """Identity, size and times of a file; ``settled`` if no write is in progress and a later one would change them."""
 
     device: int
     inode: int
@@ -120,103 +118,102 @@ class FileState(NamedTuple):
 
     @classmethod
     def of(cls, file: FileIO) -> FileState:
-        """Look at a file as it is now."""
+        """Return the present state of an open file."""
         return cls.of_stat(os.fstat(file.fileno()))
 
     @classmethod
-    def of_stat(cls, found: os.stat_result, *, may_grow: bool = False) -> FileState:
-        """Take from what the system tells just now.
+    def of_stat(cls, status: os.stat_result, *, may_grow: bool = False) -> FileState:
+        """Return the present state of a file from its status.
 
-        Of a file that ``may_grow`` a write that is under way goes on behind the size that it has.
+        A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
         now = time.time_ns()
-        # Of the two times the modification can be set, to one in the future too, which would never be past.
+        # The modification time can be set, even to the future; such a time is ignored.
         latest = max(
-            found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0
+            status.st_ctime_ns, status.st_mtime_ns if status.st_mtime_ns <= now else 0
         )
         settled = now - latest > _TICK + _slowness(
-            latest, 0 if may_grow else found.st_size
+            latest, 0 if may_grow else status.st_size
         )
         return cls(
-            found.st_dev,
-            found.st_ino,
-            found.st_size,
-            found.st_mtime_ns,
-            found.st_ctime_ns,
+            status.st_dev,
+            status.st_ino,
+            status.st_size,
+            status.st_mtime_ns,
+            status.st_ctime_ns,
             settled,
         )
 
-    def is_as(self, other: FileState) -> bool:
-        """Whether this is the same file, and nothing that shows has changed."""
-        return self[:-1] == other[:-1]
+    def is_as(self, earlier: FileState) -> bool:
+        """Return True if this is the same file without a visible change."""
+        return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Whether this is the earlier one, or has grown since; a new file may take an old one's number."""
+        """Return True if this is the earlier file, perhaps grown; a new file may have the inode of an old one."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
 
 
 def _slowness(changed: int, size: int) -> int:
-    """How much longer than usual a write may last, or a change not show in the times [ns]."""
+    """Return how much longer than usual a write may take, or a change stay invisible in the times [ns]."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
 def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
-    """State of a file when no write is under way and a later one will show; None where it changes all the time.
+    """Return the state of a file once no write is in progress and a later one will show; None if it keeps changing.
 
-    Of one that ``may_grow`` the bytes up to the size of this state are at rest: what is appended does not touch them.
+    If the file ``may_grow``, the bytes up to the size of this state do not change: further bytes are appended.
     """
     for _ in range(_TRIES):
-        found = FileState.of(file)
-        if found.settled:
-            return found
+        state = FileState.of(file)
+        if state.settled:
+            return state
         time.sleep(
-            _PAUSE + _slowness(found.changed, 0 if may_grow else found.size) * 1e-9
+            _PAUSE + _slowness(state.changed, 0 if may_grow else state.size) * 1e-9
         )
         now = FileState.of(file)
-        if now.is_as(found) or (may_grow and now.continues(found)):
-            return found
+        if now.is_as(state) or (may_grow and now.continues(state)):
+            return state
     return None
 
 
 def settled_states(names: Sequence[str], error: type[D2RPickError]) -> list[FileState]:
-    """States of many files that may grow, as `settled_state`, with one pause for all; ``error`` where one changes."""
+    """Return the settled states of files that may grow, with one pause for all; ``error`` if one keeps changing."""
     states = [_state_of(name) for name in names]
     for _ in range(_TRIES):
-        moving = [found for found in states if not found.settled]
+        moving = [state for state in states if not state.settled]
         if not moving:
             return states
-        time.sleep(_PAUSE + max(_slowness(found.changed, 0) for found in moving) * 1e-9)
-        looks = [
-            (found, found if found.settled else _state_of(name))
-            for name, found in zip(names, states, strict=True)
-        ]
+        time.sleep(_PAUSE + max(_slowness(state.changed, 0) for state in moving) * 1e-9)
         states = [
-            found._replace(settled=True) if now.continues(found) else now
-            for found, now in looks
+            _settle(name, state) for name, state in zip(names, states, strict=True)
         ]
-    name = next(
-        (name for name, found in zip(names, states, strict=True) if not found.settled),
-        None,
-    )
-    if name is not None:
-        raise error(
-            f"{name}: the file keeps changing while it is read; read it again when it is complete"
-        )
+    for name, state in zip(names, states, strict=True):
+        if not state.settled:
+            raise error(
+                f"{name}: the file keeps changing while it is read; read it again when it is complete"
+            )
     return states
 
 
+def _settle(name: str, state: FileState) -> FileState:
+    """Return the state of a file, settled if the file has not changed since ``state`` but for growing."""
+    now = state if state.settled else _state_of(name)
+    return state._replace(settled=True) if now.continues(state) else now
+
+
 def _state_of(name: str) -> FileState:
+    """Return the present state of a file that may grow."""
     return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
 
 
 def at_rest(
     name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False
 ) -> FileState | bytes:
-    """Give the `settled_state` of a file, or all bytes of a pipe or a terminal, which are read once.
+    """Return the `settled_state` of a file, or all bytes of a pipe or a terminal, which can be read only once.
 
-    An ``error`` is raised where it changes all the time, or is another device: /dev/zero and /dev/full never end.
+    Raise ``error`` if the file keeps changing, or is another device: /dev/zero and /dev/full never end.
     """
     mode = os.fstat(file.fileno()).st_mode
     if stat.S_ISCHR(mode) and not file.isatty():
@@ -234,10 +231,10 @@ def at_rest(
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
+    """Write a file as a whole or not at all: to a temporary file in the same folder, which then replaces it.
 
-    A file that is replaced keeps its mode, and its owner and group as far as the user may set them.  A link stays, and
-    the file it points to is replaced; a device or a named pipe is written to.
+    A replaced file keeps its mode, and its owner and group as far as the user may set them. A link stays, and the
+    file to which it points is replaced; a device or a named pipe is written to.
     """
     import tempfile
 
@@ -248,9 +245,9 @@ def write_whole(path: Path, content: bytes) -> None:
         path = path.resolve()
     except RuntimeError:  # a loop of links, before Python 3.13
         path = path.absolute()
-    if path.is_symlink():  # what is left of it
+    if path.is_symlink():  # the rest of a loop
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
-    # The name of the file may be as long as the file system allows: a longer one cannot be made of it.
+    # The name of the file may have the largest possible length, so that no longer name can be made from it.
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
     scratch = path.parent / temporary
     try:
@@ -264,24 +261,23 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def _copy_access(replaced: Path, scratch: Path) -> None:
-    """Give a new file the owner, group and mode of the one that it will replace; else the mode of any new file."""
+    """Copy owner, group and mode of the file that will be replaced; without one, use the mode of any new file."""
     try:
         status = replaced.stat()
     except FileNotFoundError:
         mask = os.umask(0)
         os.umask(mask)
-        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        scratch.chmod(0o666 & ~mask)  # mkstemp gives access to the owner only
         return
     if hasattr(os, "chown"):
         with suppress(PermissionError):
             os.chown(scratch, status.st_uid, status.st_gid)
-    scratch.chmod(
-        stat.S_IMODE(status.st_mode)
-    )  # after the owner, whose change takes away the bits of set-user-id
+    # after the owner, since changing the owner clears the set-user-id bits
+    scratch.chmod(stat.S_IMODE(status.st_mode))
 
 
 def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
-    """Append to a file whole or not at all, when ``durable`` onto the disk; an OSError leaves it as it was."""
+    """Append to a file as a whole or not at all; ``durable`` waits for the disk; an OSError leaves it as it was."""
     size = None
     try:
         with path.open("ab") as file:
@@ -299,11 +295,8 @@ def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
         raise
 
 
-_CHECKSUM: Final = ', "checksum": "'
-
-
 def signed(text: str) -> str:
-    """Add a checksum to a JSON object, its last key.
+    """Add a checksum to a JSON object as its last key.
 
     Examples
     --------
@@ -314,17 +307,18 @@ def signed(text: str) -> str:
 
 
 def record_of(line: bytes) -> dict[str, Any] | None:
-    """Record of a line as it was written; None for a damaged one."""
+    """Return the record of a signed line; None if the line is damaged."""
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
     if checksum != f'{_checksum(body)}"}}'.encode():
         return None
-    import json  # not above: start-up
+    import json  # imported here for start-up
 
     record: dict[str, Any] = json.loads(line)
     return record
 
 
 def _checksum(text: bytes) -> str:
+    """Return a short checksum of a text."""
     import hashlib
 
     return hashlib.sha256(text).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What hangs together: everything that can be reached from where one starts."""
+"""Search in a graph: everything that can be reached from some nodes."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ def reached(
     *,
     wide: bool = False,
 ) -> list[Node]:
-    """Give the starts and all that ``further`` leads to, directly or not, each once.
+    """Return the starts and all nodes to which ``further`` leads, directly or indirectly, each once.
 
-    The latest found is followed first; if ``wide`` the earliest, so that the nearest come first.
+    The search is depth first; if ``wide`` it is breadth first, so that the nearest nodes come first.
 
     Examples
     --------
     >>> below = {1: [2, 3], 2: [4], 3: [1]}
-    >>> reached([1], lambda one: below.get(one, ())), reached([1], lambda one: below.get(one, ()), wide=True)
+    >>> reached([1], lambda node: below.get(node, ())), reached([1], lambda node: below.get(node, ()), wide=True)
     ([1, 3, 2, 4], [1, 2, 3, 4])
     """
-    found: dict[Node, None] = {}
+    nodes: dict[Node, None] = {}
     waiting = list(starts)
     while waiting:
-        one = waiting.pop(0 if wide else -1)
-        if one not in found:
-            found[one] = None
-            waiting += further(one)
-    return list(found)
+        node = waiting.pop(0 if wide else -1)
+        if node not in nodes:
+            nodes[node] = None
+            waiting += further(node)
+    return list(nodes)

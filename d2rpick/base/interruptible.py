@@ -1,7 +1,7 @@
-"""Imported first in the process from which workers are forked: there an interrupt ends it at once, without a word.
+"""Imported first in the process from which workers are forked: an interrupt then ends it at once, without a message.
 
-The process is started with SIGINT blocked, so that its start cannot print a traceback either.  A parent that ignores
-SIGINT, as a job in the background does, passes that on.
+The process starts with SIGINT blocked, so that its start cannot print a traceback either. A parent that ignores
+SIGINT, as a background job does, passes that on.
 """
 
 import signal

@@ -3,7 +3,7 @@
 The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
 """
 # ruff: noqa: PTH100, PTH110, PTH111, PTH113, PTH116, PTH118, PTH120, PTH121, PTH123
-# Every command looks for settings, and pathlib takes longer to import than that.
+# Every command looks for settings, and importing pathlib takes longer than the search.
 
 from __future__ import annotations
 
@@ -18,18 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
-_OF_REPOSITORIES: Final = (
-    ".git",
-    ".hg",
-)  # the root of a repository contains one of these
-RULE_KEYS: Final = (
-    "select",
-    "ignore",
-    "severity",
-)  # of the deck check, which takes them from beside each deck
-_UNIMPORTANT: Final = dict.fromkeys(
-    map(ord, " \t\"'")
-)  # signs around the pieces of a dotted key
+_OF_REPOSITORIES: Final = (".git", ".hg")  # in the root of a repository
+# Settings of the deck check, which are searched from the folder of each deck.
+RULE_KEYS: Final = ("select", "ignore", "severity")
+# Characters that may stand around the pieces of a dotted key.
+_UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
 _LONGEST_VALUE: Final = 60  # characters of a value in a message
 
 
@@ -46,7 +39,7 @@ class NearestSettings(NamedTuple):
 
 
 def nearest_settings(folder: str) -> NearestSettings:
-    """Find the settings for a folder there or above; in a folder, d2rpick.toml counts before pyproject.toml.
+    """Find the settings in a folder or the folders above it; in each folder, d2rpick.toml precedes pyproject.toml.
 
     Raises
     ------
@@ -54,9 +47,9 @@ def nearest_settings(folder: str) -> NearestSettings:
         If the file is not TOML, or contains no table of settings.
     """
     notes: list[str] = []
-    for place in _searched_folders(os.path.abspath(folder)):
+    for directory in _searched_folders(os.path.abspath(folder)):
         for name in (_OWN, _SHARED):
-            source = os.path.join(place, name)
+            source = os.path.join(directory, name)
             if not os.path.isfile(source):
                 continue
             if not _is_owned_by_user(source):
@@ -76,9 +69,9 @@ def nearest_settings(folder: str) -> NearestSettings:
 
 
 def _searched_folders(folder: str) -> Iterator[str]:
-    """Give a folder and those above it, up to the root of its repository or the user's home.
+    """Yield a folder and those above it, up to the root of its repository or the user's home.
 
-    Outside of both, the search ends below the first folder that another user owns, and below the root of the system.
+    Outside both, the search ends below the first folder that another user owns, and below the root of the system.
     """
     home = os.path.expanduser("~")
     while True:
@@ -90,19 +83,14 @@ def _searched_folders(folder: str) -> Iterator[str]:
             and os.path.exists(folder)
             and os.path.samefile(folder, home)
         )
-        if (
-            is_top
-            or is_home
-            or any(
-                os.path.exists(os.path.join(folder, name)) for name in _OF_REPOSITORIES
-            )
-        ):
+        marks = (os.path.join(folder, name) for name in _OF_REPOSITORIES)
+        if is_top or is_home or any(map(os.path.exists, marks)):
             return
         folder = above
 
 
 def _is_owned_by_user(path: str) -> bool:
-    """Return whether the user owns a file or folder, and the link that leads to it; True on Windows."""
+    """Return True if the user owns a file or folder, and the link that leads to it; True on Windows."""
     if not hasattr(os, "geteuid"):
         return True
     user = os.geteuid()
@@ -113,7 +101,7 @@ def _is_owned_by_user(path: str) -> bool:
 
 
 def toml_text(value: object) -> str:
-    """Write a value from a TOML file for a message, cut if it is long.
+    """Format a value from a TOML file for a message, cut if it is long.
 
     Examples
     --------
@@ -131,10 +119,10 @@ def toml_text(value: object) -> str:
 
 
 def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) -> None:
-    """Raise ConfigurationError for the first key that is not ``known``; the nearest one is named."""
+    """Raise ConfigurationError, with the most similar key, for the first key that is not ``known``."""
     for name in names:
         if name not in known:
-            import difflib  # mostly nothing is unknown
+            import difflib  # imported here: it is rarely needed
 
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -144,7 +132,7 @@ def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) ->
 
 
 def _has_settings(path: str) -> bool:
-    """Return whether a pyproject.toml that is not used has settings of ours; False if it cannot be read."""
+    """Return True if a pyproject.toml that is not used has settings for d2rpick; False if it cannot be read."""
     try:
         return _read_table(path, shared=True) is not None
     except ConfigurationError:
@@ -158,20 +146,18 @@ def _may_have_settings(text: str) -> bool:
 
 
 def _read_table(path: str, *, shared: bool) -> object:
-    """Read the settings of a TOML file; None if one that is ``shared`` with other tools has none."""
+    """Read the settings of a TOML file; None if a file that is ``shared`` with other tools has none."""
     try:
-        with open(
-            path, encoding="utf-8-sig"
-        ) as file:  # editors on Windows begin a text with a byte order mark
+        # utf-8-sig: editors on Windows begin a text with a byte order mark
+        with open(path, encoding="utf-8-sig") as file:
             text = file.read()
         if shared and not _may_have_settings(text):
             return None
         import tomllib
 
         table = tomllib.loads(text)
-        repr(
-            table
-        )  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
+        # Python refuses to print numbers of thousands of digits, which a message might have to
+        repr(table)
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
     if not shared:

@@ -1,7 +1,7 @@
-"""Named tuples that leave their annotations alone: typing compiles each, which is most of what such a class costs.
+"""Named tuples whose annotations are not evaluated: typing compiles each, which is most of the cost of such a class.
 
-A command imports some forty of them, and start-up is part of the product.  A `Record` may have the fields of others,
-all with defaults, between its own that must be given and its own that need not be.
+A command imports some forty of them, and start-up is part of the product. A `Record` may inherit fields of other
+records (all with defaults), which come between its own fields without and with defaults.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections import namedtuple
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from typing import Any, ClassVar, NamedTuple as NamedTuple, dataclass_transform  # noqa: PLC0414  given on
+    from typing import Any, ClassVar, NamedTuple as NamedTuple, dataclass_transform  # noqa: PLC0414
 
     @dataclass_transform(frozen_default=True, kw_only_default=True)
     class Record:
-        """Its fields are given by name, and nothing changes them."""
+        """A named tuple whose fields are given by keyword."""
 
         _fields: ClassVar[tuple[str, ...]]
 
@@ -23,25 +23,21 @@ else:
 
     class _Made(type):
         def __new__(cls, name, bases, body):
-            own = body.pop("__annotations__")
-            given = {field: body.pop(field) for field in own if field in body}
-            of_bases = [
-                (field, one) for one in bases for field in getattr(one, "_fields", ())
-            ]
-            fields = [
-                *(field for field in own if field not in given),
-                *(field for field, _ in of_bases),
-                *given,
-            ]
-            defaults = [
-                *(one._field_defaults[field] for field, one in of_bases),
-                *given.values(),
-            ]
-            made = namedtuple(
+            annotated = body.pop("__annotations__")
+            own_defaults = {key: body.pop(key) for key in annotated if key in body}
+            inherited, inherited_defaults = [], []
+            for base in bases:
+                for field in getattr(base, "_fields", ()):
+                    inherited.append(field)
+                    inherited_defaults.append(base._field_defaults[field])
+            required = [field for field in annotated if field not in own_defaults]
+            fields = [*required, *inherited, *own_defaults]
+            defaults = [*inherited_defaults, *own_defaults.values()]
+            record = namedtuple(
                 name, fields, defaults=defaults, module=body.pop("__module__")
             )
             for key in body:
-                setattr(made, key, body[key])
-            return made
+                setattr(record, key, body[key])
+            return record
 
     NamedTuple = Record = type.__new__(_Made, "NamedTuple", (), {})

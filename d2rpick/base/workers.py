@@ -1,4 +1,4 @@
-"""Where many calls are computed: in this process, by a pool of processes, or on a Dask cluster."""
+"""Computing many calls: in this process, in a pool of processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -32,31 +32,31 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# Plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick.
+# A fork copies the locks of all threads; forking from one clean process avoids this and is nearly as quick.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Calls that wait for each process beside the one it works on: enough to keep it busy, too few to fill memory.
+# Calls that wait for each process in addition to the running one: they keep it busy and need little memory.
 _WAITING = 2
-# On a cluster, whose workers may come and go.
+# Least number of calls given to a cluster, whose workers may come and go.
 _LEAST_ON_CLUSTER = 64
-# Tries to make a pool: after the first the process is started anew that others are forked from, if that was killed.
+# Attempts to start a pool: after the first one, the process from which others are forked is restarted if it was killed.
 _STARTS = 3
-_DYING = 0.1  # [s] between two tries: a process that was killed counts as alive until the system has ended it
-# What the start of a process raises if the one that it is forked from was killed.
+_DYING = 0.1  # [s] between attempts, in which the system ends a killed process
+# Errors of starting a process if the process from which it is forked was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
-# [s] until a scheduler has to answer.
+# Time-out for the answer of a scheduler [s].
 _PATIENCE = 10
 
 
 def cores() -> int:
-    """Count the cores that this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not available on every system
         return os.cpu_count() or 1
 
 
 class Finished(NamedTuple):
-    """Result of the call for the item of this number, or the error that it ended with."""
+    """The result of the call for the item of this number, or the error that ended it."""
 
     number: int
     result: Any
@@ -64,37 +64,37 @@ class Finished(NamedTuple):
 
 
 class Farm:
-    """What computes calls: this one in the calling process, one after the other."""
+    """Computes calls in the calling process, one after the other; derived classes compute them elsewhere."""
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give up what has not begun."""
+        """Cancel the calls that have not begun."""
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Compute ``function`` for all items, taken as there is room; answers come as they are finished."""
+        """Yield the result of ``function`` for all items, in the order in which they finish."""
         return (_computed(number, function, item) for number, item in enumerate(items))
 
 
 def _computed(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
+    """Compute one call; an error becomes part of the answer."""
     try:
         return Finished(number, function(item), None)
-    except Exception as error:  # noqa: BLE001  told by the answer, as a pool does
+    except Exception as error:  # noqa: BLE001  handled by the caller, as for a pool
         return Finished(number, None, error)
 
 
 class Cores(Farm):
-    """A pool of processes on this machine, which have imported ``module`` before they begin."""
+    """A pool of processes on this machine that have imported ``module`` before they begin."""
 
     def __init__(self, processes: int, module: str) -> None:
         begin(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        self._held, self._leash = Pipe(
-            duplex=False
-        )  # the processes see when this end of it is closed
+        # the processes end when this end of the pipe is closed
+        self._held, self._leash = Pipe(duplex=False)
         self._pool = self._new(processes)
 
     def __exit__(self, *_: object) -> None:
@@ -104,10 +104,10 @@ class Cores(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Compute up to ``room`` calls at a time.
+        """Yield the results of all calls, of which up to ``room`` are computed or wait at a time.
 
-        A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are
-        to blame.  The process that the others are forked from may die as well: it is started anew.
+        If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
+        and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
         """
         queue = iter(enumerate(items))
         running: dict[Future[Result], tuple[int, Item]] = {}
@@ -127,7 +127,7 @@ class Cores(Farm):
                 yield self._answer_alone(number, function, item)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Hand the call to the pool; to a new one if the last is broken."""
+        """Submit a call to the pool, or to a new pool if the pool is broken."""
         try:
             return self._pool.submit(function, item)
         except _NOT_STARTED:
@@ -143,12 +143,12 @@ class Cores(Farm):
         try:
             return _answer(number, future)
         finally:
-            pool.shutdown(wait=False)  # an interrupt does not wait for the call
+            pool.shutdown(wait=False)  # so that an interrupt does not wait for the call
 
     def _begin_pool(
         self, processes: int, function: Callable[[Item], Result], item: Item
     ) -> tuple[ProcessPoolExecutor, Future[Result]]:
-        """Make a pool that begins with a call; D2RPickError if none of its processes can be started."""
+        """Start a pool with one call; raise D2RPickError if none of its processes can be started."""
         for _ in range(_STARTS):
             pool = self._new(processes)
             try:
@@ -162,12 +162,14 @@ class Cores(Farm):
         )
 
     def _new(self, processes: int) -> ProcessPoolExecutor:
+        """Return a new pool."""
         return ProcessPoolExecutor(
             processes, get_context(_METHOD), _begin_work, (self._held,)
         )
 
 
 def _answer(number: int, future: Future[Any]) -> Finished:
+    """Return the result or the error of a finished call."""
     error = future.exception()
     if isinstance(error, BrokenProcessPool):
         error = D2RPickError(
@@ -177,10 +179,9 @@ def _answer(number: int, future: Future[Any]) -> Finished:
 
 
 def _begin_work(held: Connection) -> None:
-    """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
-    if (
-        signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    ):  # a spawned process; a forked one has no such
+    """End this process when the other end of ``held`` is closed; on interrupts without a message."""
+    # true in a spawned process; in a forked one `interruptible` has changed it
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
@@ -191,37 +192,37 @@ def _begin_work(held: Connection) -> None:
 
 
 def begin(processes: int, module: str) -> None:
-    """Let one process import ``module``, from which others are forked later, while this one goes on.
+    """Let one process import ``module`` in the background; later ones are forked from it.
 
-    Whoever will need several of them calls it first; for a single one nothing happens.
+    Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
     if processes > 1:
-        # read when a process imports numpy: with several of them, threads would only fight over the cores
+        # numpy reads this when it is imported: with several processes, threads would only compete for the cores
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
             _start_server(module)
 
 
 def _start_server(module: str) -> None:
-    """Start the process that others are forked from; an interrupt ends it without a word, even while it imports."""
+    """Start the process from which others are forked; an interrupt ends it without a message even while it imports."""
     from multiprocessing import forkserver, resource_tracker  # not on every system
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # its start would lift what is blocked here
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    resource_tracker.ensure_running()  # its start would unblock SIGINT
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def on_cores(processes: int, module: str) -> Farm:
-    """Choose where to compute on this machine; for a single process, in this one."""
+    """Return the farm for a number of processes on this machine; a single one is this process."""
     return Cores(processes, module) if processes > 1 else Farm()
 
 
 class Cluster(Farm):
-    """A Dask cluster that is running already, under the address of its scheduler, which has to answer in time [s].
+    """A running Dask cluster at the address of its scheduler, which must answer within ``patience`` [s].
 
     Raises
     ------
@@ -233,16 +234,15 @@ class Cluster(Farm):
         try:
             from distributed import Client
         except ImportError:
-            found = "a Dask cluster needs the extra 'dask' of d2rpick"
             raise D2RPickError(
-                f"{found}; install it with: pip install distributed"
+                "a Dask cluster needs the extra 'dask' of d2rpick; install it with: pip install distributed"
             ) from None
         try:
             self._client = Client(address, timeout=patience, set_as_default=False)
         except (OSError, ValueError) as error:
-            what = " ".join(str(error).split())
+            reason = " ".join(str(error).split())
             raise D2RPickError(
-                f"{address}: no answer from a Dask scheduler ({what}); check the address"
+                f"{address}: no answer from a Dask scheduler ({reason}); check the address"
             ) from None
         self.threads = sum(self._client.nthreads().values())
         self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)
@@ -253,27 +253,28 @@ class Cluster(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Hand up to ``room`` calls to the scheduler, which repeats them where a worker dies.
+        """Yield the results of all calls; up to ``room`` are at the scheduler, which repeats a call if its worker dies.
 
-        They go by the half of it, since each message costs as much as a call.
+        Calls are submitted in groups of at least half of ``room``, since each message costs as much as a call.
         """
         from distributed import as_completed
 
-        queue, numbers = enumerate(items), dict[str, int]()
+        queue = enumerate(items)
+        numbers = dict[str, int]()
         done = as_completed(
             loop=self._client.loop, with_results=True, raise_errors=False
         )
         while True:
             wanted = self.room - len(numbers)
-            if wanted >= self.room // 2 and (more := list(islice(queue, wanted))):
-                begun = self._client.map(
-                    function, [item for _, item in more], pure=False
-                )
-                numbers.update(
-                    (future.key, number)
-                    for future, (number, _) in zip(begun, more, strict=True)
-                )
-                done.update(begun)
+            if wanted >= self.room // 2:
+                batch = list(islice(queue, wanted))
+                if batch:
+                    futures = self._client.map(
+                        function, [item for _, item in batch], pure=False
+                    )
+                    for future, (number, _) in zip(futures, batch, strict=True):
+                        numbers[future.key] = number
+                    done.update(futures)
             if not numbers:
                 return
             for future, result in done.next_batch():
@@ -281,9 +282,9 @@ class Cluster(Farm):
 
 
 def _of_cluster(number: int, status: str, result: Any) -> Finished:
-    """Give what a task of a cluster ended with: of one that failed, ``result`` is the kind, the error and its trace.
+    """Return the answer of a task of a cluster; ``result`` of a failed task is the error type, the error and its trace.
 
-    The status of one that did not may be another by now: its worker may have died since it was asked for the result.
+    The status of a successful task may have changed meanwhile: its worker may have died after it returned the result.
     """
     if isinstance(result, CancelledError):
         return Finished(
@@ -291,8 +292,6 @@ def _of_cluster(number: int, status: str, result: Any) -> Finished:
             None,
             D2RPickError("cancelled by the cluster; is its scheduler still running?"),
         )
-    return (
-        Finished(number, None, result[1])
-        if status == "error"
-        else Finished(number, result, None)
-    )
+    if status == "error":
+        return Finished(number, None, result[1])
+    return Finished(number, result, None)

@@ -125,7 +125,7 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
 GRADES: Final = ("poor", "fair", "good")
 # Of the vibration [-].  A residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
 # the motion after td.  A good pair keeps what the tolerance on tr asks for by default.
-_MOST_FAIR, _MOST_GOOD = 0.5, 0.2
+_MOST_FAIR, MOST_GOOD = 0.5, 0.2
 # What a further mode may make of it at most in a good pair: a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
@@ -249,7 +249,7 @@ def _is_loose(best: Candidate) -> bool:
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
-        TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
+        TOLERATED_GROWTH * (best.tr_high - best.tr) > MOST_GOOD * best.timing_tolerance
     )
 
 
@@ -257,7 +257,7 @@ def _fair(best: Candidate) -> list[str]:
     found: list[str] = []
     if best.residual is None:
         return found
-    if best.residual > _MOST_GOOD:
+    if best.residual > MOST_GOOD:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
     elif _is_loose(best):
         found.append("tr is not known well enough for its timing tolerance")

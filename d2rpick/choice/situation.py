@@ -35,7 +35,14 @@ from d2rpick.vibration.model import (
     energy_at,
     model_at,
 )
-from d2rpick.vibration.span import Fits, Span, described_span, hidden_share, span_of
+from d2rpick.vibration.span import (
+    Fits,
+    Span,
+    described_span,
+    hidden_share,
+    most_described,
+    span_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,8 +61,6 @@ _SOLVER_ERROR: Final = 1e-5
 _FAINT: Final = 1e-4
 # An energy that is rounded to and fro between two numbers: their distance, and half of one to either side.
 _QUANTA: Final = 2
-# Share of where an oscillator is looked for: one that describes so much leaves no room for a longer one beside it.
-_MOST_OF_RECORD: Final = 0.5
 # Share of a flight before the contact that ends it: the margin that td keeps, in which the contact may have begun.
 _BEFORE_CONTACT: Final = 0.03
 
@@ -423,17 +428,20 @@ def _oscillator(
         given = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = described_span(history, td, bounds, given, whole=whole, memory=fits)
         return fit, span
-    known = fits.once(("described", bounds), list[tuple[Identification, Span]])
-    around = [one for one in known if one[1].start <= td <= one[1].end]
-    if quick and around:
-        return around[0]
-    one = fits.remembered("one", partial(identify, memory=fits))
-    fitter = partial(one, quick=True) if quick else one
-    span, fit = described_span(history, td, bounds, fitter, whole=whole, memory=fits)
-    fit = _with_hidden_share(history, fit, fits)
-    if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):
-        known.append((fit, span))
-    return fit, span
+    every = fits.remembered("one", partial(identify, memory=fits))
+    quickly = partial(every, quick=True)
+    most = fits.once(
+        ("most", bounds, whole),
+        lambda: most_described(history, bounds, quickly, whole=whole, memory=fits),
+    )
+    if most is not None and most[0].start <= td <= most[0].end:
+        span, fit = most
+    else:
+        fitter = quickly if quick else every
+        span, fit = described_span(
+            history, td, bounds, fitter, whole=whole, memory=fits
+        )
+    return _with_hidden_share(history, fit, fits), span
 
 
 def _described_by_modes(
@@ -459,14 +467,16 @@ def _described_by_modes(
 def _with_hidden_share(
     history: History, fit: Identification, fits: Fits
 ) -> Identification:
-    """Add to an accepted fit what a further mode may hold in what the oscillator leaves over."""
+    """Add to an accepted fit, once, what a further mode may hold in what the oscillator leaves over."""
     if not fit.describes_record or fit.mode is None:
         return fit
     window, mode = history.between(fit.start, fit.end), fit.mode
-    hidden = fits.once(
-        ("hidden", fit.start, fit.end, fit.rms), lambda: hidden_share(*window, mode)
-    )
-    return fit._replace(hidden_share=max(fit.hidden_share, hidden))
+
+    def widened() -> Identification:
+        share = hidden_share(*window, mode)
+        return fit._replace(hidden_share=max(fit.hidden_share, share))
+
+    return fits.once(("hidden", fit.start, fit.end, fit.rms), widened)
 
 
 def _settled(

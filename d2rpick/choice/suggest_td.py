@@ -10,7 +10,13 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, candidates_at, like_quality
+from d2rpick.choice.quality import (
+    LIKE_LEVELS,
+    MOST_GOOD,
+    ROUNDING,
+    candidates_at,
+    like_quality,
+)
 from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
@@ -88,7 +94,7 @@ def _reached(
 # and the last, since the later td the more is saved.
 _MOST_PEAKS: Final = 12
 # Of many modes, the least residual is sought among windows of at least this share of the longest one, at so many td.
-_LEAST_RIGID: Final = 0.5
+_LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
 # td in an even grid: on paper and on a screen a curve of so many points is smooth.
 STEPS: Final = 200
@@ -347,49 +353,75 @@ def _by_residual(
 def _by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there."""
-    start, compared = situation.earliest_tr, situation.vibration.compared
-    if start is None or compared is None or compared.profile is None:
+    """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there.
+
+    Where no long window is good, a shorter one that is good takes its place.
+    """
+    compared, start = situation.vibration.compared, situation.earliest_tr
+    if start is None or compared is None:
         return _by_residual(situation, window, look)
     first, last = max(start, compared.first), min(window[1], compared.last)
-    least_rigid = _LEAST_RIGID * (last - first)
-    times = compared.profile(np.nextafter(last, np.inf)).time
-    times = times[(times >= max(window[0], first + least_rigid)) & (times > first)]
-    if times.size < _FEWEST_TD:
+    every: list[list[Choice]] = []
+    for share in _LEAST_RIGID:
+        times = _offered_by_modes(situation, (window[0], first, last), share)
+        pairs = _acceptable(look(td) for td in times)
+        least = share * (last - first)
+        every.append([pair for pair in pairs if pair[1].rigid_time >= least] or pairs)
+        if not times or any(best.error <= MOST_GOOD for _, best in every[-1]):
+            break
+    if not every[0]:
         return _by_residual(situation, window, look)
+    is_good = any(best.error <= MOST_GOOD for _, best in every[-1])
+    long = every[-1] if is_good else every[0]
+    limit = min(best.error for _, best in long) + like_quality(situation)
+    alike = _longest(pair for pair in long if pair[1].error <= limit)
+    return _td(alike), _td(_longest(every[0]))
+
+
+def _offered_by_modes(
+    situation: Situation, bounds: tuple[float, float, float], share: float
+) -> list[float]:
+    """Give the td of the least residuals, rigid for a ``share`` of the longest time; none of few times.
+
+    ``bounds``: the first td, the first tr and the last td [time].
+    """
+    (earliest, first, last), modes = bounds, situation.vibration.modal
+    if modes is None:
+        return []
+    least_rigid = share * (last - first)
+    times = modes.time[(modes.time >= max(earliest, first + least_rigid))]
+    times = times[(times > first) & (times <= last)]
+    if times.size < _FEWEST_TD:
+        return []
     times = times[:: -(-times.size // _MOST_TD)]
-    shares = np.maximum(kinetic_share(compared.deformation, times), 0.0)
-    squares = np.array(
-        [
-            _least_error(compared.profile(td), first, td - least_rigid) ** 2
-            for td in times.tolist()
-        ]
-    )
-    squares += shares
+    rows = [
+        _least_error(modes.profile(td), first, td - least_rigid)
+        for td in times.tolist()
+    ]
+    errors, tr = np.array(rows).T
+    # the least of many is too good to be true: half of what its band adds counts too
+    squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
     inner = (
         np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:]))
         + 1
     )
     best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
-    candidates = [
+    offered = (
         *vertices(times, squares, best)[0].tolist(),
         *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
-    ]
-    pairs = _acceptable(
-        look(td)
-        for td in dict.fromkeys((*candidates, float(times[np.argmin(squares)])))
+        float(times[np.argmin(squares)]),
     )
-    long = [pair for pair in pairs if pair[1].rigid_time >= least_rigid] or pairs
-    limit = min((best.error for _, best in long), default=0.0) + like_quality(situation)
-    return _td(_longest(pair for pair in long if pair[1].error <= limit)), _td(
-        _longest(pairs)
-    )
+    return [*dict.fromkeys(offered)]
 
 
-def _least_error(profile: Profile, first: float, last: float) -> float:
-    """Least lock-in error of a tr between two times [-]; infinite without one."""
+def _least_error(profile: Profile, first: float, last: float) -> tuple[float, float]:
+    """Least lock-in error of a tr between two times [-], and that tr [time]; infinite without one."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
-    return float(profile.error[rows].min(initial=np.inf))
+    errors = profile.error[rows]
+    if not errors.size:
+        return np.inf, first
+    least = int(np.argmin(errors))
+    return float(errors[least]), float(profile.time[rows][least])
 
 
 def _by_level(

@@ -86,7 +86,9 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        found = f"the fastest strong vibration of the energy has {states:.2g} states per period"
+        found = (
+            f"the fastest vibration in the energy has {states:.2g} states per period"
+        )
         yield Caution(
             "coarse-record",
             f"{found}, and a still faster one is not seen; let the run write more states",

@@ -1,6 +1,6 @@
-"""Decks of LS-DYNA and runs of Radioss: cards with file, line and column, switching windows, parts and elements.
+"""Read LS-DYNA decks and Radioss runs: cards with file, line and column, switching windows, parts and elements.
 
-Here is what begins with a name: what a deck says about its parts, and which files of a folder are main decks.
+This page finds the main decks of a folder and reads the parts of a deck from its path.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.model import Inventory
+
+# Bytes at the beginning of a file that identify a deck: titles and comments may come before the keyword.
+_HEAD = 64 * 1024
 
 
 def read_inventory(path: str) -> Inventory:
@@ -29,38 +32,33 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
+    # Imported here because these modules load numpy.
     from d2rpick.deck import (
         ls_dyna_inventory,
         radioss_files,
         radioss_inventory,
-    )  # not above: they load numpy
+    )
     from d2rpick.deck.radioss_run import read_run
     from d2rpick.deck.reader import read_deck
 
     is_run = radioss_files.run_files(path)
-    found = (
-        radioss_inventory.read(read_run(path))
-        if is_run
-        else ls_dyna_inventory.read(read_deck(path))
-    )
-    if not found.parts:
-        why = f" ({found.notes[0]})" if found.notes else ""
+    if is_run:
+        inventory = radioss_inventory.read(read_run(path))
+    else:
+        inventory = ls_dyna_inventory.read(read_deck(path))
+    if not inventory.parts:
+        why = f" ({inventory.notes[0]})" if inventory.notes else ""
         raise DeckError(
-            f"{path}: no parts were found{why}; name the main deck of the run"
+            f"{path}: no parts were found{why}; give the main deck of the run"
         )
-    return found
-
-
-_HEAD = (
-    64 * 1024
-)  # bytes in which a deck shows what it is: titles and comments come before
+    return inventory
 
 
 def main_decks(folder: str) -> list[str]:
-    """Find the main decks in a folder and below it.
+    """Return the paths of the main decks in a folder and its subfolders.
 
-    A main deck holds ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
-    folder includes it.  Hidden files and folders are passed over.
+    A main deck contains ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
+    folder includes it. Hidden files and folders are ignored.
 
     Raises
     ------
@@ -69,23 +67,23 @@ def main_decks(folder: str) -> list[str]:
     """
     decks = [path for path in _files(folder) if _begins(path)]
     included = {os.path.realpath(path) for deck in decks for path in _includes(deck)}
-    found = [path for path in decks if os.path.realpath(path) not in included]
-    if not found:
-        what = (
-            "every one is included by another"
-            if decks
-            else "no file with *KEYWORD or /BEGIN"
-        )
+    main_paths = [path for path in decks if os.path.realpath(path) not in included]
+    if not main_paths:
+        if decks:
+            reason = "each deck is included by another one"
+        else:
+            reason = "no file with *KEYWORD or /BEGIN"
         raise DeckError(
-            f"{folder}: no main deck in this folder ({what}); give the deck itself"
+            f"{folder}: no main deck in this folder ({reason}); give the deck itself"
         )
-    return found
+    return main_paths
 
 
 def find_decks_of_run(folder: str) -> list[str]:
-    """Find the main decks that lie in the folder of a run and have parts.
+    """Return the paths of the main decks in the folder of a run that have parts.
 
-    Restart decks and files of switching cards alone have none.  A run of Radioss is named by its starter deck.
+    Restart decks and files that contain only switching cards have none. A Radioss run is represented by its starter
+    deck.
     """
     try:
         decks = main_decks(folder)
@@ -100,6 +98,7 @@ def find_decks_of_run(folder: str) -> list[str]:
 
 
 def _has_parts(path: str) -> bool:
+    """Return True if a deck has parts, or cannot be read."""
     from d2rpick.deck import radioss_files  # not above: start-up
 
     try:
@@ -113,11 +112,11 @@ def _has_parts(path: str) -> bool:
 
         return bool(read_parts(read_deck(path)).materials)
     except DeckError:
-        return True  # what is wrong is said by who reads it
+        return True  # whoever reads the deck reports the error
 
 
 def _includes(path: str) -> list[str]:
-    """Names of the files that a deck includes; none of a deck that cannot be read, which is said when it is checked."""
+    """Return the names of the files that a deck includes; none if it cannot be read, which the check reports."""
     from d2rpick.deck import radioss_files, reader  # not above: start-up
 
     try:
@@ -131,6 +130,7 @@ def _includes(path: str) -> list[str]:
 
 
 def _files(folder: str) -> Iterator[str]:
+    """Yield the paths of all visible files in a folder and its subfolders."""
     from pathlib import Path  # not above: start-up
 
     for root, folders, names in os.walk(folder):
@@ -141,7 +141,7 @@ def _files(folder: str) -> Iterator[str]:
 
 
 def _begins(path: str) -> bool:
-    """Whether a file says near its beginning that it is a main deck."""
+    """Return True if the beginning of a file identifies it as a main deck."""
     try:
         head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
     except OSError:
@@ -154,10 +154,10 @@ def _begins(path: str) -> bool:
 
 
 def _head(path: str) -> bytes:
-    """Read the beginning of a file.
+    """Return the first bytes of a file.
 
-    A small file may just be saved, and is waited for.  That of a large one is there, however long a solver goes on
-    writing to it.
+    A small file may just be saved, so its content is awaited. The beginning of a large file is complete, even if a
+    solver still writes to it.
     """
     from d2rpick.deck.source import SourceFile
 
@@ -166,4 +166,4 @@ def _head(path: str) -> bytes:
     try:
         return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
     except DeckError:
-        return head  # what is wrong is said when it is checked
+        return head  # the check reports the error

@@ -1,7 +1,7 @@
-"""Cards: a keyword with its data lines in fields, and the parameters (``&name``) that stand there.
+"""Represent cards (a keyword with data lines in fields) and the parameters (``&name``) that their fields use.
 
-Numbers are evaluated where they are asked for.  Each field knows its place, each parameter where it is visible, which
-definition counts, and its value.
+Numbers are evaluated on request. Each field knows its place in the file, and each parameter knows its definitions and
+where it is visible.
 """
 
 from __future__ import annotations
@@ -34,14 +34,17 @@ if TYPE_CHECKING:
 
 
 STANDARD, LONG = 10, 20  # columns of a field
-# A text between commas, compiled where it is needed: a comma inside <max(1,2)> belongs to the expression.
+# Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled on use.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
+_PAIRS = 4  # pairs of name and value in a line of *PARAMETER
+
 
 class Field(NamedTuple):
-    """The text of one field, without the blanks around it, and where it stands (counted from 1)."""
+    """The text of one field without surrounding blanks, and its place: the column is counted from 1."""
 
     text: str
     block: Block
@@ -50,29 +53,29 @@ class Field(NamedTuple):
 
     @property
     def file(self) -> str:
-        """Name of the file."""
+        """Return the name of the file."""
         return self.block.source.name
 
     @property
     def line(self) -> int:
-        """Number of the line in its file; counted when it is asked for."""
+        """Return the line number in the file; it is counted on request."""
         return self.block.line + self.distance
 
     @property
     def at(self) -> str:
-        """File and line, as messages show them."""
+        """Return file and line as messages show them."""
         return f"{self.file}:{self.line}"
 
 
 Problem = tuple[Field, str]
-"""A field that says nothing usable, and why."""
+"""A field that cannot be read, and the reason."""
 
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """What a field says: ``problem`` is empty, or tells why ``value`` is only the default.
+    """The value of a field; ``problem`` is empty, or the reason why ``value`` is only the default.
 
-    ``place`` is the field, or its row, where it has that ``position``: most are never pointed at.
+    ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
 
     value: T
@@ -83,12 +86,10 @@ class Value(Generic[T]):
 
     @property
     def field(self) -> Field:
-        """The field itself."""
-        return (
-            self.place.field(self.position)
-            if isinstance(self.place, Row)
-            else self.place
-        )
+        """Return the field itself."""
+        if isinstance(self.place, Row):
+            return self.place.field(self.position)
+        return self.place
 
 
 @dataclass(eq=False, repr=False, slots=True)
@@ -103,12 +104,16 @@ class Row:
 
     @property
     def blank(self) -> bool:
-        """Whether nothing stands on the line."""
+        """Return True if the line is blank."""
         return not self.text.strip()
 
     def field(self, position: int) -> Field:
-        """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
-        pieces, comma = self._pieces(), int("," in self.text)
+        """Return field ``position`` (from 0), separated by commas or in fixed columns.
+
+        It is empty beyond the end of the line.
+        """
+        pieces = self._pieces()
+        comma = int("," in self.text)
         text = "".join(pieces[position : position + 1])
         start = min(
             sum(len(piece) + comma for piece in pieces[:position]), len(self.text)
@@ -117,23 +122,25 @@ class Row:
         return Field(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
-        """Text of a field alone; all are kept, since they are asked for one after the other, and again."""
+        """Return the text of a field; all texts of the line are cached, as callers read them one after the other."""
         cells = self._cells
         if cells is None:
             cells = self._cells = [*map(str.strip, self._pieces())]
         return cells[position] if position < len(cells) else ""
 
     def _pieces(self) -> list[str]:
-        line, width = self.text, self.width
+        """Split the line into the texts of its fields."""
+        line = self.text
+        width = self.width
         if "," in line:
             return re.findall(_BETWEEN_COMMAS, line)
         return [line[at : at + width] for at in range(0, len(line), width)]
 
 
 class Transform(NamedTuple):
-    """What ``*INCLUDE_TRANSFORM`` does to a file: offsets of its ids, factor of its times.
+    """What ``*INCLUDE_TRANSFORM`` does to a file: the offsets of its ids and the factor of its times.
 
-    ``scaled``: any unit of the file is another one; ``moved``: its nodes are moved.
+    ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
     """
 
     node: int = 0
@@ -146,19 +153,21 @@ class Transform(NamedTuple):
     moved: bool = False
 
     def inside(self, outer: Transform) -> Transform:
-        """Return this transform of a file that is itself included by a transformed one."""
-        node, part, material, set_, rest = (
-            own + further for own, further in zip(self[:5], outer[:5], strict=True)
+        """Return this transform of a file that a transformed file includes."""
+        node, part, material, set_, other_id = (
+            offset + outer_offset
+            for offset, outer_offset in zip(self[:5], outer[:5], strict=True)
         )
-        scaled, moved = self.scaled or outer.scaled, self.moved or outer.moved
+        scaled = self.scaled or outer.scaled
+        moved = self.moved or outer.moved
         return Transform(
-            node, part, material, set_, rest, self.time * outer.time, scaled, moved
+            node, part, material, set_, other_id, self.time * outer.time, scaled, moved
         )
 
 
 @dataclass(eq=False, repr=False)
 class Card:
-    """A keyword block that matters: ``name`` in upper case without ``*`` and format suffix."""
+    """A keyword block that d2rpick uses; ``name`` is in upper case without ``*`` and format suffix."""
 
     name: str
     block: Block
@@ -168,22 +177,22 @@ class Card:
 
     @property
     def file(self) -> str:
-        """Name of the file."""
+        """Return the name of the file."""
         return self.block.source.name
 
     @property
     def line(self) -> int:
-        """Number of the keyword line, from 1."""
+        """Return the line number of the keyword line, from 1."""
         return self.block.line
 
     @property
     def at(self) -> str:
-        """File and line of the keyword, as messages show them."""
+        """Return file and line of the keyword as messages show them."""
         return f"{self.file}:{self.line}"
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """All data lines, blank ones too; comments are left out."""
+        """Return all data lines, including blank ones, without comments."""
         return tuple(
             [
                 Row(self.block, distance, text, self.width)
@@ -193,67 +202,65 @@ class Card:
 
     @cached_property
     def lines(self) -> tuple[Row, ...]:
-        """All data lines that are not blank."""
+        """Return all data lines that are not blank."""
         return tuple(row for row in self.rows if not row.blank)
 
     @cached_property
     def data(self) -> tuple[Row, ...]:
-        """Lines that are not blank, below that of the title where the keyword has one (``_TITLE``)."""
-        return (
-            tuple(row for row in self.rows[1:] if not row.blank)
-            if "TITLE" in self.name
-            else self.lines
-        )
+        """Return the data lines that are not blank, without the title line of a keyword with ``_TITLE``."""
+        if "TITLE" in self.name:
+            return tuple(row for row in self.rows[1:] if not row.blank)
+        return self.lines
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Words of the keyword of Radioss."""
+        """Return the words of a Radioss keyword."""
         return tuple(self.name.split("/"))
 
     def options(self, keyword: str) -> frozenset[str]:
-        """Words of the name behind a keyword."""
+        """Return the words of the card name after ``keyword``."""
         return frozenset(self.name.removeprefix(keyword).split("_")) - {""}
 
     @property
     def here(self) -> Field:
-        """The keyword itself, as a place to point at."""
+        """Return the keyword as a field, for messages."""
         return Field(f"*{self.name}", self.block, 0, 1)
 
     def real(self, row: Row, position: int, default: float = 0.0) -> Value[float]:
-        """Read a real number; parameters and expressions are evaluated, a blank field is the default."""
+        """Read a real number; parameters and expressions are evaluated, and a blank field gives the default."""
         return self._number(row, position, default, float)
 
     def integer(self, row: Row, position: int, default: int = 0) -> Value[int]:
-        """Read an integer; a real without fraction is accepted."""
+        """Read an integer; a real number without a fraction is accepted."""
         return self._number(row, position, default, int)
 
     def numbers(self, row: Row, kinds: Sequence[type[int] | type[float]]) -> list[Any]:
-        """Read the first fields of a line, each of its kind."""
+        """Read the first fields of a line, each as the type in ``kinds``."""
         return [self._number(row, at, kind(), kind) for at, kind in enumerate(kinds)]
 
     def _number(
         self, row: Row, position: int, default: T, kind: Callable[[float], T]
     ) -> Value[T]:
+        """Read a field as a number of one type, with the parameters that it uses."""
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
         parameters: tuple[str, ...] = ()
-        if len(text) > LONGEST or (found := plain(kind, text)) is None:
-            found, parameters = of_kind(kind, text, self.scope.value), names_in(text)
-        value, problem = found
+        if len(text) > LONGEST or (value_and_problem := plain(kind, text)) is None:
+            value_and_problem = of_kind(kind, text, self.scope.value)
+            parameters = names_in(text)
+        value, problem = value_and_problem
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, position: int) -> float | None:
-        """Read a positive number, or None; of an include in other units none is known."""
-        found = self.real(row, position)
-        return (
-            None
-            if self.transform.scaled or found.problem or found.value <= 0
-            else found.value
-        )
+        """Read a positive number; None for any other, and for all numbers of an include in other units."""
+        number = self.real(row, position)
+        if self.transform.scaled or number.problem or number.value <= 0:
+            return None
+        return number.value
 
     def word(self, row: Row, position: int, default: str = "") -> Value[str]:
-        """Read a word, in upper case."""
+        """Read a word in upper case."""
         text = row.cell(position)
         return Value(
             self.scope.text(text).upper() or default, row, "", names_in(text), position
@@ -262,12 +269,12 @@ class Card:
 
 # Parameters.
 
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled where it is needed
-_PAIRS = 4  # name and value, repeated in a line of *PARAMETER
-
 
 class Definition(NamedTuple):
-    """One line that gives a parameter a value; ``problem`` says why it has none, ``order`` counts all of a deck."""
+    """One definition of a parameter.
+
+    ``problem`` is the reason why it has no value, ``order`` counts all definitions of a deck.
+    """
 
     name: str
     value: Number | str
@@ -282,30 +289,26 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """Parameters visible in one file: its own local ones first, then those of the files that include it.
+    """The parameters that are visible in one file: its local ones, those of the including files, then the global ones.
 
-    The parameters that are not local come last.
-
-    Of several definitions the first counts (Vol I R17 as quoted by a converter: DFLAG 1 warns and keeps the
-    first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` let the later one win.
+    If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
+    warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
     """
 
     def __init__(self, outer: Scope | None = None) -> None:
         self._outer = outer
         self._local: _Table = {}
-        self._whole: Scope = (
-            outer._whole if outer else self
-        )  # that of the main file, which has what all files share
+        # The scope of the main file holds the global parameters.
+        self._whole: Scope = outer._whole if outer else self
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        self._known: float = (
-            math.inf
-        )  # how many definitions of the deck were read before
+        # Number of definitions read before a card: later ones do not apply to it.
+        self._known: float = math.inf
         self._seen = self
 
     def as_of_now(self) -> Scope:
-        """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
+        """Return this scope as a card at the current position sees it: later definitions do not affect its values."""
         if self._seen._known != self._whole._count:
             self._seen = Scope(self._outer)
             self._seen._local, self._seen._whole, self._seen._known = (
@@ -316,38 +319,47 @@ class Scope:
         return self._seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:
-        """All definitions of ``name`` (lower case), later ones too, in the innermost scope that has one by now."""
-        found = [table[name] for table in self._tables() if name in table]
+        """Return all definitions of ``name`` (lower case), including later ones.
+
+        They come from the innermost scope that has one before the current position.
+        """
+        by_scope = [table[name] for table in self._tables() if name in table]
         return tuple(
             next(
-                (each for each in found if each[0].order < self._known),
-                found[0] if found else (),
+                (
+                    scope_definitions
+                    for scope_definitions in by_scope
+                    if scope_definitions[0].order < self._known
+                ),
+                by_scope[0] if by_scope else (),
             )
         )
 
     def definition(self, name: str) -> Definition | None:
-        """Return the definition that counts."""
-        found = [
+        """Return the definition that is used; None if there is none yet."""
+        earlier = [
             definition
             for definition in self.definitions(name)
             if definition.order < self._known
         ]
-        if not found:
+        if not earlier:
             return None
-        return (
-            found[-1] if self._whole._latest_wins or found[-1].replaceable else found[0]
-        )
+        if self._whole._latest_wins or earlier[-1].replaceable:
+            return earlier[-1]
+        return earlier[0]
 
     def closure(self, names: tuple[str, ...]) -> list[str]:
-        """Return ``names`` and all parameters their definitions refer to, directly or not."""
+        """Return ``names`` and all parameters that their definitions use, directly or indirectly."""
         return reached(
             names,
-            lambda name: (use for one in self.definitions(name) for use in one.uses),
+            lambda name: (
+                use for definition in self.definitions(name) for use in definition.uses
+            ),
             wide=True,
         )
 
     def value(self, text: str) -> Number:
-        """Value of a field: a number, a reference, or an expression; ExpressionError if it is none."""
+        """Evaluate a field: a number, a reference or an expression; ExpressionError for other text."""
         text = text.strip()
         if text[:1] == "<" and text[-1:] == ">":
             return evaluate(text[1:-1], self._number)
@@ -356,18 +368,18 @@ class Scope:
         return number(text)
 
     def text(self, text: str) -> str:
-        """Return the text of a field, where ``&name`` of a character parameter stands for its text."""
+        """Return the text of a field with each reference ``&name`` to a character parameter replaced by its text."""
 
         def value(reference: re.Match[str]) -> str:
-            found = self.definition(reference[1].lower())
-            return (
-                found.value if found and isinstance(found.value, str) else reference[0]
-            )
+            definition = self.definition(reference[1].lower())
+            if definition and isinstance(definition.value, str):
+                return definition.value
+            return reference[0]
 
         return re.sub(REFERENCE, value, text) if "&" in text else text
 
     def define(self, keyword: str, rows: Sequence[Row]) -> None:
-        """Take over the definitions of a ``*PARAMETER`` card."""
+        """Store the definitions of a ``*PARAMETER`` card."""
         options = set(keyword.split("_")[1:])
         if "DUPLICATION" in options:
             flags = [row.cell(0) for row in rows[:1]]
@@ -381,13 +393,19 @@ class Scope:
                 self._whole._count += 1
 
     def _tables(self) -> Iterator[_Table]:
+        """Yield the tables of definitions from the innermost scope to the global one."""
         yield self._local
         yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
     def _definition(
-        self, row: Row, named: str, text: str, replaceable: bool
+        self, row: Row, name_field: str, text: str, replaceable: bool
     ) -> Definition | None:
-        kind, name = named[:1].upper(), named[1:].strip().lstrip("&").strip().lower()
+        """Evaluate one definition.
+
+        ``name_field`` is the type letter with the name. Return None for another type letter.
+        """
+        kind = name_field[:1].upper()
+        name = name_field[1:].strip().lstrip("&").strip().lower()
         if kind not in {"R", "I", "C"} or not name:
             return None
         value: Number | str
@@ -397,39 +415,40 @@ class Scope:
             value = text.strip().strip('"')
         else:
             try:
-                value = (
-                    evaluate(text, self._number)
-                    if uses or not is_number(text)
-                    else number(text)
-                )
+                if uses or not is_number(text):
+                    value = evaluate(text, self._number)
+                else:
+                    value = number(text)
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
-                value, problem = 0, str(error)
+                value = 0
+                problem = str(error)
         return Definition(
             name, value, row.field(0), self._whole._count, replaceable, uses, problem
         )
 
     def _number(self, name: str) -> Number:
+        """Return the value of a numeric parameter; ExpressionError if it has none."""
         definition = self.definition(name)
         if definition is None:
             if later := self.definitions(name):
-                place = later[0].place
+                field = later[0].place
                 raise ExpressionError(
-                    f"parameter &{name} is defined only below, at {place.at}"
+                    f"parameter &{name} is defined only below, at {field.at}"
                 )
             raise ExpressionError(f"parameter &{name} is not defined")
         if definition.problem:
-            place = definition.place
+            field = definition.place
             raise ExpressionError(
-                f"parameter &{name} has no value ({place.at}: {definition.problem})"
+                f"parameter &{name} has no value ({field.at}: {definition.problem})"
             )
         if isinstance(definition.value, str):
-            raise ExpressionError(f"parameter &{name} is a text, a number was expected")
+            raise ExpressionError(f"parameter &{name} is a text, expected a number")
         return definition.value
 
 
 def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, str]]:
-    """Name (with its type letter) and value text of every definition on the card."""
+    """Yield the row, the name with its type letter, and the value text of each definition on the card."""
     if "EXPRESSION" in options:
         yield from _expressions(rows)
         return
@@ -441,14 +460,16 @@ def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, s
 
 
 def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
-    """One definition per line; a line whose name field is blank goes on with the expression before."""
+    """Yield one definition per line; a line with a blank name field continues the previous expression."""
     pending: tuple[Row, str, str] | None = None
     for row in rows:
-        before, comma, after = row.text.partition(",")
-        if comma and re.fullmatch(_LISTED, before):
-            name, text = before.strip(), after
+        name_part, comma, value_part = row.text.partition(",")
+        if comma and re.fullmatch(_LISTED, name_part):
+            name = name_part.strip()
+            text = value_part
         else:
-            name, text = row.text[: row.width].strip(), row.text[row.width :]
+            name = row.text[: row.width].strip()
+            text = row.text[row.width :]
         if name or pending is None:
             if pending is not None:
                 yield pending

@@ -1,7 +1,8 @@
-"""Times of switches by force that give planned windows: TIME1, TIME2, TIME3 and OFFSET of a pair, Tdelay of a sensor.
+"""Find the times of force switches that give planned windows.
 
-A switch by force knows no plan: its times are chosen so that, in a run of which it is known when something pushes, its
-windows come as near to the planned ones as one wait for all of them allows.
+These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
+of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
+as close as possible to the planned ones.
 """
 
 from __future__ import annotations
@@ -22,21 +23,24 @@ if TYPE_CHECKING:
     Spans = tuple[Times, ...]
 
 
-_ROUNDING: Final = 1e-12  # of sums of times
+_ROUNDING: Final = 1e-12  # relative rounding error of sums of times
 
 
 class Pushes(NamedTuple):
-    """When something pushes the parts: ``spans`` (from, to) [time], and how fast they come to it [length/time]."""
+    """Spans in which a contact force acts on the parts [time].
+
+    ``speed`` is that at which the parts approach the contact [length/time].
+    """
 
     spans: Spans
     speed: float | None = None
 
 
 class Timing(NamedTuple):
-    """Times of a switch by force, and the windows that come of them.
+    """Times of a force switch, and the windows that result.
 
-    ``earliest`` and ``latest``: it acts between them; ``wait`` is TIME3 of the set that makes parts deformable, or
-    Tdelay; ``offset`` is a distance, 0 for none.
+    The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
+    Tdelay. ``offset`` is a distance, 0 for none.
     """
 
     earliest: float
@@ -47,9 +51,10 @@ class Timing(NamedTuple):
 
 
 def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
-    """Time a pair of LS-DYNA: it becomes rigid without force, after the wait, and deformable shortly before a force.
+    """Return the times of an LS-DYNA pair of sets.
 
-    The OFFSET is how far the parts fly from the td of the first window to the contact after it.
+    It makes parts rigid when no force has acted for the wait, and deformable shortly before the next force. OFFSET is
+    the distance that the parts fly from td of the first window to the contact after it.
 
     Raises
     ------
@@ -65,9 +70,10 @@ def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
     lead = min(leads, default=0.0) if pushes.speed else 0.0
     advanced = tuple((start - lead, end) for start, end in pushes.spans)
     landing = contacts_after[-1]
-    latest = (
-        windows[-1][1] if landing[0] == math.inf else (landing[0] + landing[1]) / 2
-    )  # in the contact behind them
+    if landing[0] == math.inf:
+        latest = windows[-1][1]
+    else:
+        latest = (landing[0] + landing[1]) / 2
     rigid = ForceSwitch(True, False, windows[0][0], latest)
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
@@ -81,9 +87,9 @@ def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
 
 
 def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
-    """Time a sensor of Radioss: parts are deformable while it is active, up to the wait after each force.
+    """Return the times of a Radioss force sensor: parts are deformable during each force, and for the wait after it.
 
-    Up to the first window, and from the last one on, they are deformable in any case.
+    Before the first window and after the last one they are deformable in any case.
 
     Raises
     ------
@@ -91,7 +97,8 @@ def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
         If no wait gives as many windows as are planned.
     """
     contacts_before = [_find_before(tr, pushes.spans) for tr, _ in windows]
-    first, last = windows[0][0], windows[-1][1]
+    first = windows[0][0]
+    last = windows[-1][1]
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
         pushed = tuple((start, end + wait) for start, end in pushes.spans)
@@ -115,7 +122,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Give the least wait whose windows are as many as those planned, none of which begins before it is planned."""
+    """Return the least wait that gives as many windows as planned, none of which begins before its planned time."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
@@ -130,17 +137,17 @@ def _find_least_wait(
     planned = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in windows)
     raise DeckError(
         f"no wait lets a {what} switch in the planned windows ({planned}): its windows would be {achieved}; plan one"
-        " for each flight, or switch by time"
+        " window for each flight, or switch by time"
     )
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Give the first span that begins after a time; infinite without one."""
+    """Return the first span that begins at or after a time; infinite times if there is none."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Give the last span that ends before a time; minus infinite without one."""
+    """Return the last span that ends at or before a time; times of minus infinity if there is none."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

@@ -1,4 +1,4 @@
-"""Engine files of a Radioss run as lines: a leg with its end, the bodies that are on and off in it, and its step."""
+"""Write Radioss engine files as lines: the end of the leg, the bodies that are on and off, and the time-step limit."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
-# further windows leave the run up to them as it was.
+# Least number of time steps in a rigid window: the release is at most one step late.  Each window has its own limit,
+# so that further windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-_MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
+_MOST_LEGS = 99  # the names of time histories have two digits for the engine run
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end, and its largest step where the bodies are rigid in it, else None."""
+    """An engine run: its number, its end [time], and its largest time step while bodies are rigid (None if none is)."""
 
     number: int
     stop: float
@@ -27,22 +27,28 @@ class EngineFile(NamedTuple):
 
 
 def choose_step_cap(tr: float, td: float) -> float:
-    """Largest step while rigid [time]."""
+    """Return the largest time step while the parts are rigid from tr to td [time]."""
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
 def legs(
     windows: Sequence[Times], end: float, step_cap: float | None
 ) -> list[EngineFile]:
-    """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
+    """Return the engine runs for some windows up to ``end``; a window that begins at 0 needs no run before it.
+
+    Raises
+    ------
+    DeckError
+        If more than 99 runs are needed.
+    """
     caps = [step_cap or choose_step_cap(tr, td) for tr, td in windows]
     switches = zip(windows, caps, strict=True)
-    stops = [
-        (time, cap)
-        for (tr, td), own in switches
-        for time, cap in ((tr, None), (td, own))
-        if time > 0
-    ]
+    stops: list[tuple[float, float | None]] = []
+    for (tr, td), rigid_cap in switches:
+        if tr > 0:
+            stops.append((tr, None))
+        if td > 0:
+            stops.append((td, rigid_cap))
     if len(stops) >= _MOST_LEGS:
         raise DeckError(
             f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected"
@@ -52,13 +58,16 @@ def legs(
 
 
 def off(nodes: Sequence[int]) -> Iterator[str]:
-    """Put rigid bodies off; the starter of OpenRadioss overlooks a second such block right behind the first."""
+    """Yield the lines that deactivate rigid bodies, all in one block.
+
+    The OpenRadioss starter ignores a second such block that follows the first one directly.
+    """
     if nodes:
         yield from ("/RBODY/OFF", *listed(nodes))
 
 
 def listed(ids: Sequence[int]) -> Iterator[str]:
-    """Write numbers in lines."""
+    """Yield lines that list numbers."""
     yield from (
         " ".join(map(str, ids[i : i + _NODES_PER_LINE]))
         for i in range(0, len(ids), _NODES_PER_LINE)
@@ -66,20 +75,20 @@ def listed(ids: Sequence[int]) -> Iterator[str]:
 
 
 def engine_lines(
-    leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]
+    leg: EngineFile, name: str, ids: Sequence[int], other_nodes: Sequence[int]
 ) -> Iterator[str]:
-    """Write what an engine file says of a leg: its run, and which main nodes are rigid; ``others`` stay off."""
+    """Yield the lines of an engine file: its run, and the main nodes that are rigid; ``other_nodes`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     if leg.cap is not None and ids:
         yield from ("/RBODY/ON", *listed(ids))
-    yield from off(others if leg.cap is not None else (*ids, *others))
+    yield from off(other_nodes if leg.cap is not None else (*ids, *other_nodes))
     if leg.cap is not None:
         yield from capped(leg.cap)
 
 
 def capped(cap: float) -> Iterator[str]:
-    """Hold the step of a leg with rigid bodies below a limit."""
+    """Yield the lines that limit the time step while bodies are rigid."""
     yield from (
         "# with nothing deformable left the step would grow without limit",
         "/DTIX",

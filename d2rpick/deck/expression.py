@@ -1,7 +1,7 @@
-"""Numbers and expressions as they stand in decks; an own small evaluator, nothing is handed to Python.
+"""Evaluate numbers and expressions in decks with a small parser; no text of a deck is executed as Python.
 
-Source: LS-DYNA Vol I R17, pages 36-7 to 36-9, as quoted by a converter (secondary): integers stay integers
-(``2/5`` is 0), the unary minus binds tighter than ``**`` (``-3**2`` is 9), functions are Fortran's.
+Source: LS-DYNA Vol I R17, pages 36-7 to 36-9, as quoted by a converter (secondary): integers stay integers (``2/5`` is
+0), the unary minus binds more tightly than ``**`` (``-3**2`` is 9), and the functions are those of Fortran.
 """
 
 from __future__ import annotations
@@ -20,25 +20,26 @@ Number = int | float
 _NUMBER = re.compile(
     r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII
 )
-_TOKEN: Final = (  # compiled where it is needed
+_TOKEN: Final = (  # compiled on use
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
-REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # this too
-_DEEPEST = (
-    50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
-)
-LONGEST = 40  # characters of a number: more are no number of a deck
+REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # compiled on use
+# Levels of nested parentheses: no deck needs more, and the recursion must not exhaust the stack of Python.
+_DEEPEST = 50
+LONGEST = 40  # characters: a longer text is not a number
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
+_CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
+
 
 class ExpressionError(Exception):
-    """What is wrong with a text that should be a number; only used inside the deck reader."""
+    """Raised inside the deck reader for a text that is not a number; the message says why."""
 
 
-@lru_cache(4096)  # of few texts, most fields are blank or 0
+@lru_cache(4096)  # most fields are blank or 0
 def number(text: str) -> Number:
-    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, and ``1.5-3`` with the letter left out.
+    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` without the exponent letter.
 
     Examples
     --------
@@ -46,17 +47,18 @@ def number(text: str) -> Number:
     (12, 0.012, 0.0015, 0.0015)
     """
     text = text.strip()
-    found = _NUMBER.fullmatch(text) if len(text) <= LONGEST else None
-    if found is None:
+    match = _NUMBER.fullmatch(text) if len(text) <= LONGEST else None
+    if match is None:
         raise ExpressionError(f"{text[:LONGEST]!r} is not a number")
-    mantissa, exponent = found[1], found[2] or found[3]
+    mantissa = match[1]
+    exponent = match[2] or match[3]
     if exponent is None and "." not in mantissa:
         return _checked(int(mantissa))
     return _checked(float(f"{mantissa}e{exponent or 0}"))
 
 
 def is_number(text: str) -> bool:
-    """Whether `number` reads a text."""
+    """Return True if `number` can read the text."""
     try:
         number(text)
     except ExpressionError:
@@ -66,14 +68,16 @@ def is_number(text: str) -> bool:
 
 @lru_cache(4096)
 def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Give what `of_kind` says of a short text that is a number by itself; None of one that is to be evaluated."""
+    """Return the result of `of_kind` for a text that is a plain number; None if it must be evaluated."""
     return None if "&" in text or text[0] == "<" else of_kind(kind, text, number)
 
 
 def of_kind(
     kind: Callable[[float], Any], text: str, value: Callable[[str], Number]
 ) -> tuple[Any, str]:
-    """Value of a text as a number of a kind, int or float; or why it has none.
+    """Convert a text to a number of a type (int or float).
+
+    Return the number and an empty text, or None and the reason.
 
     Examples
     --------
@@ -82,14 +86,16 @@ def of_kind(
     """
     try:
         exact = float(value(text))
-        found = kind(exact)
+        converted = kind(exact)
     except (ExpressionError, OverflowError) as error:
         return None, str(error)
-    return (found, "") if found == exact else (None, f"{text!r} is not an integer")
+    if converted == exact:
+        return (converted, "")
+    return (None, f"{text!r} is not an integer")
 
 
 def real(text: str) -> float:
-    """Read a number of a field; a blank is 0, and what is none is not known."""
+    """Parse a field as a number: a blank gives 0.0, other text NaN."""
     try:
         return float(number(text)) if text.strip() else 0.0
     except ExpressionError:
@@ -97,22 +103,20 @@ def real(text: str) -> float:
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """Return the parameters a text refers to, in lower case.
+    """Return the names of the parameters that a text uses, in lower case.
 
     Examples
     --------
     >>> names_in("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
-    return (
-        tuple(name.lower() for name in re.findall(REFERENCE, text))
-        if "&" in text
-        else ()
-    )
+    if "&" in text:
+        return tuple(name.lower() for name in re.findall(REFERENCE, text))
+    return ()
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
-    """Value of an expression; ``lookup`` gives the values of parameters by lower-case name.
+    """Evaluate an expression; ``lookup`` returns the value of a parameter by its lower-case name.
 
     Examples
     --------
@@ -132,6 +136,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
 
 
 def _nint(x: Number) -> int:
+    """Round to the nearest integer, halves away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
@@ -171,10 +176,10 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     "sign": (2, lambda x, y: abs(x) if y >= 0 else -abs(x)),
     "mod": (2, lambda x, y: int(math.fmod(_nint(x), _nint(y)))),
 }
-_CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
 
 
 def _quotient(x: Number, y: Number) -> Number:
+    """Divide as Fortran does: integers give an integer, rounded towards zero."""
     if isinstance(x, int) and isinstance(y, int):
         whole = abs(x) // abs(y)
         return whole if (x < 0) == (y < 0) else -whole
@@ -182,11 +187,12 @@ def _quotient(x: Number, y: Number) -> Number:
 
 
 def _power(x: Number, y: Number) -> Number:
+    """Raise to a power as Fortran does: integers give an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
 
-# How tightly an operation binds, and what it does.
+# Precedence of each operator, and its function.
 _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
     "+": (1, operator.add),
     "-": (1, operator.sub),
@@ -197,7 +203,7 @@ _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = 
 
 
 class _Parser:
-    """Precedence climbing: a value, and the operations behind it that bind at least so tightly."""
+    """Parser by precedence climbing: a value, then all operators after it with at least a given precedence."""
 
     def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
         self.text = text
@@ -206,35 +212,40 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
+        """Evaluate the whole text."""
         value = self.nested()
         if self.tokens[0]:
             raise self.unexpected()
         return value
 
-    def nested(self, least: int = 1) -> Number:
+    def nested(self, lowest_level: int = 1) -> Number:
+        """Evaluate one level of nesting: operators with a precedence of at least ``lowest_level``."""
         self.depth += 1
         if self.depth > _DEEPEST:
             raise ExpressionError(
                 f"an expression is nested deeper than {_DEEPEST} levels"
             )
-        value = self.value(least)
+        value = self.value(lowest_level)
         self.depth -= 1
         return value
 
-    def value(self, least: int) -> Number:
+    def value(self, lowest_level: int) -> Number:
+        """Evaluate a signed value and the operators after it with a precedence of at least ``lowest_level``."""
         value = self.signed()
-        while (operation := _OPERATIONS.get(self.tokens[0])) and operation[0] >= least:
-            tight, operate = operation
-            # those of one kind are taken from the left, powers from the right
-            behind = (
-                self.nested(tight)
-                if self.tokens.pop(0) == "**"
-                else self.value(tight + 1)
-            )
-            value = _checked(operate(value, behind))
+        while (operation := _OPERATIONS.get(self.tokens[0])) and operation[
+            0
+        ] >= lowest_level:
+            level, operate = operation
+            # operators of equal precedence apply from the left, powers from the right
+            if self.tokens.pop(0) == "**":
+                operand = self.nested(level)
+            else:
+                operand = self.value(level + 1)
+            value = _checked(operate(value, operand))
         return value
 
     def signed(self) -> Number:
+        """Evaluate a value with any number of signs before it."""
         negative = False
         while self.tokens[0] in ("+", "-"):
             negative ^= self.tokens.pop(0) == "-"
@@ -242,6 +253,7 @@ class _Parser:
         return -value if negative else value
 
     def atom(self) -> Number:
+        """Evaluate a number, a parameter, a constant, a function call or a text in parentheses."""
         token = self.tokens.pop(0)
         if token == "(":
             value = self.nested()
@@ -260,6 +272,7 @@ class _Parser:
         return _CONSTANTS[name] if name in _CONSTANTS else self.lookup(name)
 
     def call(self, name: str) -> Number:
+        """Evaluate a function call."""
         if name not in _FUNCTIONS:
             raise ExpressionError(
                 f"{name!r} is not a function of *PARAMETER_EXPRESSION"
@@ -278,30 +291,34 @@ class _Parser:
         return _checked(function(*arguments))
 
     def expect(self, sign: str) -> None:
+        """Remove the next token, which must be ``sign``."""
         if self.tokens[0] != sign:
             raise self.unexpected()
         self.tokens.pop(0)
 
     def unexpected(self) -> ExpressionError:
-        found = repr(self.tokens[0]) if self.tokens[0] else "the end"
+        """Return the error for the next token."""
+        token = repr(self.tokens[0]) if self.tokens[0] else "the end"
         return ExpressionError(
-            f"{self.text!r} is not an expression, found {found} where it should go on"
+            f"{self.text!r} is not an expression (found {token}, expected an operator, a value or its end)"
         )
 
 
 def _tokens(text: str) -> Iterator[str]:
+    """Yield the tokens of an expression."""
     position = 0
     text = text.rstrip()
     token = re.compile(_TOKEN, re.ASCII | re.IGNORECASE)
     while position < len(text):
-        found = token.match(text, position)
-        if found is None:
+        match = token.match(text, position)
+        if match is None:
             raise ExpressionError(f"{text!r} is not a number or an expression")
-        yield found[0].strip()
-        position = found.end()
+        yield match[0].strip()
+        position = match.end()
 
 
 def _checked(value: Number) -> Number:
+    """Return the value; ExpressionError if it is not finite or too large."""
     if isinstance(value, int) and abs(value) >= _INTEGER_LIMIT:
         raise ExpressionError("an integer leaves the 64-bit range")
     if not math.isfinite(value):

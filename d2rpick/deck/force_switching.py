@@ -1,8 +1,8 @@
-"""What switches by a force do in a run of which it is known when something pushes: pairs of LS-DYNA, by their CODEs.
+"""Evaluate force switches (CODE 1 to 4 of LS-DYNA) for known contact times.
 
-Source: the vendor's keyword data as published in its Python library: a set switches between TIME1 and TIME2 when the
-force of its contact or wall is zero (CODE 1, 2) or not (3, 4), sets of a pair act in turn, the one with PAIRED 1 first,
-and none acts again before TIME3 of the last switch is over.  Not tried with the solver.
+Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
+force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with
+the one that has PAIRED 1. No set acts within TIME3 after the last switch. Not tried with the solver.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 
 class ForceSwitch(NamedTuple):
-    """A switch set: what it makes of its parts, whether it waits for a force, and between which times [time].
+    """A switch set that waits for a force (``with_force``), or for the time without one.
 
-    ``delay`` is TIME3; ``paired``: its pair and it act in turn.
+    It acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
+    turn.
     """
 
     to_rigid: bool
@@ -33,29 +34,29 @@ class ForceSwitch(NamedTuple):
 
 def follow_pair(
     first: ForceSwitch,
-    other: ForceSwitch | None,
+    second: ForceSwitch | None,
     contacts: Spans,
     end: float,
-    other_contacts: Spans | None = None,
+    second_contacts: Spans | None = None,
 ) -> list[tuple[float, float | None]]:
-    """Give the windows in which a set and its pair make their parts rigid.
+    """Return the windows in which a set and its pair make their parts rigid.
 
     Parameters
     ----------
-    first, other : ForceSwitch
-        The set that acts first, and its pair; None for a set alone, which switches once.
+    first, second : ForceSwitch
+        The set that acts first, and its pair; None for a single set, which switches once.
     contacts : sequence of (float, float)
-        When something pushes, ascending [time].
+        Spans in which a contact force acts, ascending [time].
     end : float
-        Of the run [time].
-    other_contacts : sequence of (float, float), optional
-        When something pushes as the other set sees it: it may wait for the force of another contact, or be early by
-        its OFFSET.  As ``contacts`` by default.
+        End of the run [time].
+    second_contacts : sequence of (float, float), optional
+        Contacts as the second set sees them: it may wait for the force of another contact, or act before the contact
+        because of its OFFSET.  Default: ``contacts``.
 
     Returns
     -------
     list of (float, float or None)
-        From when to when the parts are rigid; None: to the end.
+        Begin and end of each rigid window; None if it lasts to the end of the run.
 
     Examples
     --------
@@ -64,8 +65,8 @@ def follow_pair(
     [(0.03, 0.05), (0.07, None)]
     """
     windows: list[tuple[float, float | None]] = []
-    others = contacts if other_contacts is None else other_contacts
-    for time, to_rigid in _switches((first, contacts), (other, others), end):
+    seen_by_second = contacts if second_contacts is None else second_contacts
+    for time, to_rigid in _switches((first, contacts), (second, seen_by_second), end):
         if to_rigid and not (windows and windows[-1][1] is None):
             windows.append((time, None))
         elif not to_rigid and windows and windows[-1][1] is None:
@@ -78,7 +79,7 @@ def _switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Give when the sets act, in turn, and whether they make their parts rigid; each by the contacts that it sees."""
+    """Yield the times at which the sets act in turn, and True if they make parts rigid; each sees its own contacts."""
     ready = 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
@@ -92,7 +93,7 @@ def _switches(
 
 
 def _next(with_force: bool, since: float, contacts: Spans) -> float:
-    """Give the first time from ``since`` on at which there is a force, or none; infinite for never."""
+    """Return the first time from ``since`` on with a force (or without one); infinity if there is none."""
     for start, end in contacts:
         if since < end:
             if with_force:
@@ -106,19 +107,23 @@ def _next(with_force: bool, since: float, contacts: Spans) -> float:
 def find_delay_without_chatter(
     windows: Sequence[tuple[float, float]], contacts: Spans
 ) -> float | None:
-    """Give the least TIME3 of the set that makes parts deformable for it to switch in these windows alone.
+    """Return the least TIME3 of the set that makes parts deformable with which the pair switches only in these windows.
 
-    Each contact after which a window begins has to be over before; None where no contact comes before any.
+    Each contact before a window must be over within this time; None if no contact precedes any window.
     """
-    before = [[span for span in contacts if span[1] <= tr] for tr, _ in windows]
-    clusters = [_cluster(spans, windows) for spans in before if spans]
+    contacts_before = [
+        [span for span in contacts if span[1] <= tr] for tr, _ in windows
+    ]
+    clusters = [_cluster(spans, windows) for spans in contacts_before if spans]
     return max((end - start for start, end in clusters), default=None)
 
 
 def _cluster(
     contacts: Spans, windows: Sequence[tuple[float, float]]
 ) -> tuple[float, float]:
-    """Give the time from the first to the last of some contacts, of those that follow the last window before them."""
-    last = contacts[-1][1]
-    after = max((td for _, td in windows if td <= last), default=-math.inf)
-    return min(start for start, end in contacts if end > after), last
+    """Return the span from the first to the last contact after the previous window."""
+    last_end = contacts[-1][1]
+    last_window_end = max(
+        (td for _, td in windows if td <= last_end), default=-math.inf
+    )
+    return min(start for start, end in contacts if end > last_window_end), last_end

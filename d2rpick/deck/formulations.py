@@ -1,7 +1,7 @@
-"""Formulations of elements by their numbers, and the class by which their cost is known.
+"""Map the formulation numbers of elements to names and to the class that defines their cost.
 
-Measured classes: QBAT, QEPH and BT shells, beams, solids, springs (weights in `d2rpick.choice.cost`).  A formulation
-that was not measured has the class of the one that does the same work; ``measured`` is False then.
+Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.cost`). A formulation
+that was not measured has the class of a similar one, with ``measured`` False.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ _ISH3N: Final = {
     **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
-# Solids were measured together: 24, 17 and 1 could not be told apart.
+# Solids form one class: the measured costs of Isolid 24, 17 and 1 do not differ.
 _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
     24: "HEPH",
-    **{one: f"SOLID{one}" for one in (1, 2, 12, 17, 18)},
+    **{number: f"SOLID{number}" for number in (1, 2, 12, 17, 18)},
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
-# LS-DYNA, ELFORM of *SECTION_SHELL: one point, one point with physical stabilisation or warping, four points.
+# LS-DYNA, ELFORM of *SECTION_SHELL.  BT: one point; QEPH: one point, physically stabilised; QBAT: four points.
 _ELFORM_SHELL: Final = {
     1: ("Hughes-Liu", BT), 2: ("Belytschko-Tsay", BT), 3: ("BCIZ triangle", BT), 4: ("C0 triangle", BT),
     5: ("membrane", BT), 6: ("S/R Hughes-Liu", QBAT), 7: ("S/R co-rotational Hughes-Liu", QBAT),
@@ -45,7 +45,7 @@ _ELFORM_SHELL: Final = {
 
 
 def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | None:
-    """How Radioss computes elements of a kind with these flags of their property; None for what is not known."""
+    """Return the formulation of a kind of element in Radioss by the flags of its property; None if it is unknown."""
     if kind == "shell":
         return _layered(
             _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
@@ -64,7 +64,7 @@ def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | N
 
 
 def ls_dyna(kind: str, elform: int) -> Formulation | None:
-    """How LS-DYNA computes elements of a kind with this ELFORM; None for what is not known."""
+    """Return the formulation of a kind of element in LS-DYNA by its ELFORM; None if it is unknown."""
     if kind == "shell":
         name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
         return _layered(Formulation(f"{name} (ELFORM {elform})", cost, measured=False))
@@ -74,18 +74,16 @@ def ls_dyna(kind: str, elform: int) -> Formulation | None:
 
 
 def _layered(shell: Formulation) -> Formulation:
+    """Add the number of integration points per layer to the formulation of a shell."""
     return shell._replace(in_plane=_IN_PLANE.get(shell.cost or "", 0))
 
 
 def _plain(kind: str, *, measured: bool) -> Formulation | None:
+    """Return the formulation of a kind of element that has no variants; None if it is unknown."""
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
-    cost = (
-        SOLID
-        if kind in ("tetrahedron", "pentahedron", "thick shell")
-        else alike.get(kind)
-    )
-    return (
-        Formulation(kind, cost, measured and kind in ("beam", "spring"))
-        if cost
-        else None
-    )
+    cost = alike.get(kind)
+    if kind in ("tetrahedron", "pentahedron", "thick shell"):
+        cost = SOLID
+    if cost:
+        return Formulation(kind, cost, measured and kind in ("beam", "spring"))
+    return None

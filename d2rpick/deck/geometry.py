@@ -1,12 +1,13 @@
-"""Sizes of elements, and what follows for parts: mass, smallest stable time step, where they lie.
+"""Compute element sizes, and from them the mass, the smallest stable time step and the position of each part.
 
-The step is that in which a wave crosses an element, before any factor of the solver: L/c with c^2 = E/rho for beams,
-E/(rho (1 - nu^2)) for shells and E (1 - nu)/(rho (1 + nu)(1 - 2 nu)) for solids.  L is the length of a beam, the area
-of a shell over its longest side (twice that for a triangle), the volume of a solid over its largest face (three times
-that for a tetrahedron).  Solvers add mass, scale the step or take that of the nodes, so the real one may differ by
-some ten percent.
+The time step is the time in which a wave crosses an element, before any factor of the solver: L/c with c^2 = E/rho for
+beams, E/(rho (1 - nu^2)) for shells and E (1 - nu)/(rho (1 + nu)(1 - 2 nu)) for solids. L is the length of a beam, the
+area of a shell over its longest side (twice that for a triangle), or the volume of a solid over its largest face (three
+times that for a tetrahedron). Solvers add mass, scale the time step or use a nodal time step, so the real one may
+differ by some 10 %.
 
-The mass of a part is spread evenly over its elements, each of which counts as a point at the mean of its nodes.
+The mass of a part is distributed evenly over the volume of its elements. Each element is a point mass at the mean of
+its nodes.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-_PIECE: Final = 1 << 14
-# Corners of a brick, seen from outside.
+_PIECE: Final = (
+    1 << 14
+)  # elements processed together: their arrays fit the processor's cache
+# Nodes of each face of a brick, in the order seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),
@@ -41,7 +44,7 @@ _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})
 
 
 class _Measured(NamedTuple):
-    """Elements of one kind in one part: how many, their size together, and the smallest length a wave crosses."""
+    """Number, total size and smallest wave length of the elements of one kind in one part."""
 
     kind: str
     number: int
@@ -52,9 +55,9 @@ class _Measured(NamedTuple):
 def masses_and_steps(
     inventory: Inventory,
 ) -> dict[int, tuple[float | None, float | None]]:
-    """Mass by density and size [mass] and smallest stable step [time] of every part that has elements.
+    """Return the mass [mass] and the smallest stable time step [time] of every part that has elements.
 
-    None where the deck does not give the density, modulus, thickness or place of every element of the part.
+    None if the deck does not define the density, modulus, thickness or position of every element of the part.
     """
     measured: dict[int, list[_Measured]] = {}
     for elements in inventory.elements:
@@ -65,60 +68,65 @@ def masses_and_steps(
         parts, starts, counts = np.unique(
             elements.part[order], return_index=True, return_counts=True
         )
-        sums, lows = (
-            np.add.reduceat(sizes[order], starts),
-            np.minimum.reduceat(lengths[order], starts),
-        )
+        sums = np.add.reduceat(sizes[order], starts)
+        lows = np.minimum.reduceat(lengths[order], starts)
         for part, *values in zip(
             *(a.tolist() for a in (parts, counts, sums, lows)), strict=True
         ):
             measured.setdefault(part, []).append(_Measured(elements.kind, *values))
     return {
-        part: (_mass(inventory.parts[part], found), _step(inventory.parts[part], found))
-        for part, found in measured.items()
+        part: (
+            _mass(inventory.parts[part], part_elements),
+            _step(inventory.parts[part], part_elements),
+        )
+        for part, part_elements in measured.items()
         if part in inventory.parts
     }
 
 
 def _mass(data: PartData, measured: Sequence[_Measured]) -> float | None:
+    """Return the mass of a part; None if it is unknown."""
     mass = 0.0
-    for one in measured:
-        if one.kind == "spring" and data.section.mass is not None:
-            mass += one.number * data.section.mass
+    for elements in measured:
+        if elements.kind == "spring" and data.section.mass is not None:
+            mass += elements.number * data.section.mass
             continue
-        density, depth = (
-            data.material.density if data.material else None,
-            _depth(one.kind, data),
-        )
+        density = data.material.density if data.material else None
+        depth = _depth(elements.kind, data)
         if density is None or depth is None:
             return None
-        mass += density * depth * one.size
+        mass += density * depth * elements.size
     return mass if math.isfinite(mass) and mass > 0 else None
 
 
 def _step(data: PartData, measured: Sequence[_Measured]) -> float | None:
+    """Return the smallest stable time step of a part; None if it is unknown."""
     steps: list[float] = []
-    for one in measured:
-        speed = _wave_speed(one.kind, data.material)
+    for elements in measured:
+        speed = _wave_speed(elements.kind, data.material)
         if speed is None:
             return None
-        steps.append(one.length / speed)
-    return (
-        min(steps) if all(math.isfinite(step) and step > 0 for step in steps) else None
-    )
+        steps.append(elements.length / speed)
+    if all(math.isfinite(step) and step > 0 for step in steps):
+        return min(steps)
+    return None
 
 
 def _depth(kind: str, data: PartData) -> float | None:
-    """What a size is multiplied by to be a volume [length, area or 1]; None where it is not known."""
+    """Return the factor that turns a size into a volume [length, area or 1]; None if it is unknown."""
     if kind in _SURFACES:
         return data.section.thickness
-    return data.section.area if kind in _LINES else 1.0 if kind in _VOLUMES else None
+    if kind in _LINES:
+        return data.section.area
+    return 1.0 if kind in _VOLUMES else None
 
 
 def _wave_speed(kind: str, material: Material | None) -> float | None:
+    """Return the wave speed in elements of a kind; None if it is unknown."""
     if material is None or material.density is None or material.modulus is None:
         return None
-    plain, nu = material.modulus / material.density, material.poisson or 0.0
+    plain = material.modulus / material.density
+    nu = material.poisson or 0.0
     if kind in _LINES:
         return math.sqrt(plain)
     if kind in _SURFACES:
@@ -131,8 +139,7 @@ def _wave_speed(kind: str, material: Material | None) -> float | None:
 def sizes_and_lengths(
     kind: str, nodes: Places, coordinates: Reals
 ) -> tuple[Reals, Reals]:
-    """Size of each element [length, area or volume], and the length that a wave has to cross; NaN where unknown."""
-    # so many at once that they stay in the processor's cache
+    """Return the size of each element [length, area or volume] and the length that a wave crosses; NaN if unknown."""
     pieces = [
         _sizes(kind, nodes[at : at + _PIECE], coordinates)
         for at in range(0, len(nodes), _PIECE)
@@ -143,7 +150,7 @@ def sizes_and_lengths(
 
 
 def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Length, area or volume of elements, and the length that a wave has to cross; both (n,), NaN where unknown."""
+    """Return the size of each element and the length that a wave crosses, both (n,); NaN if unknown."""
     if kind in _LINES:
         length = np.linalg.norm(
             coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1
@@ -152,16 +159,15 @@ def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     if kind in _SURFACES:
         return _surfaces(nodes, coordinates)
     if kind in _VOLUMES:
-        return (
-            _tetrahedra(nodes, coordinates)
-            if kind == "tetrahedron"
-            else _bricks(nodes, coordinates)
-        )
+        if kind == "tetrahedron":
+            return _tetrahedra(nodes, coordinates)
+        return _bricks(nodes, coordinates)
     unknown = np.full(len(nodes), np.nan)
     return unknown, unknown
 
 
 def _surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+    """Return the areas of shells, and the lengths that a wave crosses."""
     third = nodes[:, 2]
     last = nodes[:, 3] if nodes.shape[1] > 3 else third
     last = np.where(last == NO_NODE, third, last)
@@ -173,18 +179,22 @@ def _surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _area(corners: Reals) -> Reals:
-    """Areas of quadrilaterals, (n, 4, 3), half the product of their diagonals."""
+    """Return the areas of quadrilaterals (n, 4, 3): half the cross product of their diagonals."""
     cross = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", cross, cross)) / 2)
 
 
 def _cross(a: Reals, b: Reals) -> Reals:
-    """Vector products, (n, 3); numpy's own is slower by a factor."""
-    turned, again = [1, 2, 0], [2, 0, 1]
-    return np.asarray(a[:, turned] * b[:, again] - a[:, again] * b[:, turned])
+    """Return the cross products of vectors (n, 3); several times faster than numpy.cross."""
+    next_axis = [1, 2, 0]
+    second_axis = [2, 0, 1]
+    return np.asarray(
+        a[:, next_axis] * b[:, second_axis] - a[:, second_axis] * b[:, next_axis]
+    )
 
 
 def _tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+    """Return the volumes of tetrahedra, and the lengths that a wave crosses."""
     corners = coordinates[nodes[:, :4]]
     volume = np.abs(_sixth(corners, (0, 1, 2, 3)))
     faces = np.stack(
@@ -197,7 +207,7 @@ def _tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Bricks, wedges and tetrahedra that repeat a node, or leave the last ones out."""
+    """Return the volumes of solids, and the lengths that a wave crosses; wedges and tetrahedra repeat or omit nodes."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
         eight[:, column] = np.where(
@@ -212,21 +222,22 @@ def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
-    """Volumes between the first corner and a face, with sign: together those of the brick, also where nodes repeat."""
+    """Return the signed volumes between the first corner and a face; their sum is the volume, even if nodes repeat."""
     a, b, c, d = face
     return _sixth(corners, (0, a, b, c)) + _sixth(corners, (0, a, c, d))
 
 
 def _sixth(corners: Reals, four: tuple[int, int, int, int]) -> Reals:
-    """Volumes of tetrahedra with these corners, with sign."""
+    """Return the signed volumes of tetrahedra with these four corners."""
     a, b, c, d = (corners[:, at] for at in four)
     return np.asarray(np.einsum("ij,ij->i", _cross(b - a, c - a), d - a) / 6)
 
 
 class Placed(NamedTuple):
-    """Where a part lies: ``centre`` (3,) of its mass [length], ``spread`` (3, 3) second moments over it [length^2].
+    """Position of a part in the deck.
 
-    ``watched`` has the coordinates of its nodes whose motion the run writes, by their places in the table of nodes.
+    ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
+    [length^2]. ``watched`` maps the places of its nodes with written motion (in the node table) to their coordinates.
     """
 
     centre: Reals
@@ -235,7 +246,7 @@ class Placed(NamedTuple):
 
 
 class _Share(NamedTuple):
-    """Elements of a part together: their size, its first moments and its second, (), (3,) and (3, 3)."""
+    """Elements of a part together: their size (), its first moments (3,) and its second moments (3, 3)."""
 
     size: float
     first: Reals
@@ -243,66 +254,77 @@ class _Share(NamedTuple):
 
 
 class Placement:
-    """Where the parts of a deck lie, found when it is asked for."""
+    """Positions of the parts of a deck, computed on request."""
 
     def __init__(self, inventory: Inventory) -> None:
         self._inventory = inventory
 
     @cached_property
     def parts(self) -> Mapping[int, Placed]:
-        """Parts whose elements are all placed; none where some may be missing, or the deck moves its nodes."""
+        """Return the position of each part with known coordinates.
+
+        Empty if elements may be missing or the deck moves nodes.
+        """
         if self._inventory.moved or not self._inventory.complete:
             return {}
-        found: dict[int, list[_Share]] = {}
+        shares_by_part: dict[int, list[_Share]] = {}
         for elements in self._inventory.elements:
             for part, share in _shares(elements, self._inventory.coordinates):
-                found.setdefault(part, []).append(share)
+                shares_by_part.setdefault(part, []).append(share)
         placed = (
             (part, _placed(self._inventory, part, shares))
-            for part, shares in found.items()
+            for part, shares in shares_by_part.items()
         )
-        return {part: one for part, one in placed if np.isfinite(one.spread).all()}
+        return {
+            part: placed_part
+            for part, placed_part in placed
+            if np.isfinite(placed_part.spread).all()
+        }
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
-        """Mean of the watched nodes of some parts (3,) [length], each node once; None without any."""
-        places = {
-            place: where
+        """Return the mean position (3,) of the watched nodes of some parts [length], each node once.
+
+        None without any.
+        """
+        coordinates = {
+            node: position
             for part in parts
-            for place, where in self.parts[part].watched.items()
+            for node, position in self.parts[part].watched.items()
         }
-        return np.mean(list(places.values()), axis=0) if places else None
+        return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
     def hanging_together(self, parts: Collection[int]) -> frozenset[int]:
-        """Those of some parts that share nodes, directly or not, in the largest group of them."""
+        """Return the largest group of these parts that share nodes, directly or indirectly."""
         groups = self._inventory.groups(parts)
         return frozenset(max(groups, key=self._inventory.rigid_nodes, default=()))
 
 
 def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Share]]:
-    """What the elements of one kind add to each part."""
+    """Return the contribution of the elements of one kind to each part."""
     if elements.nodes.shape[1] == 0:
         return []
-    sizes = np.ones(len(elements.nodes)) if elements.kind in DISCRETE else (
-        sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
-    )  # fmt: skip
+    if elements.kind in DISCRETE:
+        sizes = np.ones(len(elements.nodes))
+    else:
+        sizes = sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
     middles = _middles(elements.nodes, coordinates)
-    parts, at = np.unique(elements.part, return_inverse=True)
-    total = np.bincount(at, sizes)
-    total[total == 0] = (
-        np.nan
-    )  # elements without any size do not tell where their part is
-    first = np.stack([np.bincount(at, sizes * axis) for axis in middles.T], axis=1)
-    x, y, z = (
-        middles - (first / total[:, np.newaxis])[at]
-    ).T  # from there: far from the origin digits would be lost
+    parts, part_index = np.unique(elements.part, return_inverse=True)
+    total = np.bincount(part_index, sizes)
+    # Elements without size do not define the position of their part.
+    total[total == 0] = np.nan
+    first = np.stack(
+        [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
+    )
+    # Relative to the centre of the part: far from the origin digits would be lost.
+    x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
-        np.bincount(at, sizes * a * b)
+        np.bincount(part_index, sizes * a * b)
         for a, b in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
     )
     second = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
     return [
-        (part, _Share(size, one, other))
-        for part, size, one, other in zip(
+        (part, _Share(size, first_moment, second_moment))
+        for part, size, first_moment, second_moment in zip(
             parts.tolist(),
             total.tolist(),
             first,
@@ -313,30 +335,34 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
 
 
 def _middles(nodes: Places, coordinates: Reals) -> Reals:
-    """Mean of the nodes of each element (n, 3)."""
+    """Return the mean of the nodes of each element (n, 3)."""
     if (nodes != NO_NODE).all():
         return np.asarray(
             sum(coordinates[column] for column in nodes.T) / nodes.shape[1]
         )
-    real = nodes != NO_NODE
+    is_real = nodes != NO_NODE
     summed = sum(
-        np.where(there[:, np.newaxis], coordinates[column], 0.0)
-        for column, there in zip(nodes.T, real.T, strict=True)
+        np.where(is_node[:, np.newaxis], coordinates[column], 0.0)
+        for column, is_node in zip(nodes.T, is_real.T, strict=True)
     )
-    return np.asarray(summed / real.sum(axis=1)[:, np.newaxis])
+    return np.asarray(summed / is_real.sum(axis=1)[:, np.newaxis])
 
 
 def _placed(inventory: Inventory, part: int, shares: Sequence[_Share]) -> Placed:
-    size = sum(one.size for one in shares)
-    centre = np.asarray(sum(one.first for one in shares) / size)
-    apart = [(one, one.first / one.size - centre) for one in shares]
+    """Combine the contributions of all kinds of elements to the position of a part."""
+    size = sum(share.size for share in shares)
+    centre = np.asarray(sum(share.first for share in shares) / size)
+    offsets = [(share, share.first / share.size - centre) for share in shares]
     spread = (
-        sum(one.second + one.size * np.outer(way, way) for one, way in apart) / size
+        sum(
+            share.second + share.size * np.outer(offset, offset)
+            for share, offset in offsets
+        )
+        / size
     )
-    nodes = inventory.nodes_by_part[
-        part
-    ]  # ascending, and many more than those that are watched
-    at = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
-    own = inventory.watched[nodes[at] == inventory.watched]
-    watched = {place: inventory.coordinates[place] for place in own.tolist()}
+    # Ascending; there are many more nodes than watched ones, so these are searched in it.
+    nodes = inventory.nodes_by_part[part]
+    positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
+    watched_nodes = inventory.watched[nodes[positions] == inventory.watched]
+    watched = {node: inventory.coordinates[node] for node in watched_nodes.tolist()}
     return Placed(centre, np.asarray(spread), watched)

@@ -1,4 +1,4 @@
-"""Parts and elements of an LS-DYNA deck.
+"""Read the parts and elements of an LS-DYNA deck.
 
 Columns: the vendor's keyword data as published in its Python library.
 """
@@ -37,25 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-
-class _Kind(NamedTuple):
-    """Kind of elements: what to call it, nodes in its line at most, and nodes that each element has at least."""
-
-    name: str
-    most: int
-    fewest: int
-
-
-_KINDS: Final = {
-    "SHELL": _Kind("shell", 8, 3),
-    "SOLID": _Kind("solid", 8, 4),
-    "TSHELL": _Kind("thick shell", 8, 6),
-    "BEAM": _Kind("beam", 2, 2),
-    "DISCRETE": _Kind("spring", 2, 2),
-    "SEATBELT": _Kind("seatbelt", 2, 2),
-    "SPH": _Kind("particle", 0, 0),
-}
-# Options whose lines hold reals or words, or ids in other columns than those of an element and its part.
+# Options of element keywords that can be read: their lines have no integers in the columns of element and part id.
 _OPTIONS: Final = {
     *(
         "THICKNESS",
@@ -85,9 +67,9 @@ _OPTIONS: Final = {
     ),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# They make no part heavier or dearer.
+# Keywords without elements: they change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
-_TEN: Final = 10  # nodes in the second line of a solid
+_TEN: Final = 10  # nodes in the second line of a solid element
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = (
     "MAT_DAMPER",
@@ -164,13 +146,32 @@ _ELASTIC: Final = {
 }
 
 
+class _Kind(NamedTuple):
+    """A kind of element: its name, and the largest and the least number of nodes of an element."""
+
+    name: str
+    most: int
+    fewest: int
+
+
+_KINDS: Final = {
+    "SHELL": _Kind("shell", 8, 3),
+    "SOLID": _Kind("solid", 8, 4),
+    "TSHELL": _Kind("thick shell", 8, 6),
+    "BEAM": _Kind("beam", 2, 2),
+    "DISCRETE": _Kind("spring", 2, 2),
+    "SEATBELT": _Kind("seatbelt", 2, 2),
+    "SPH": _Kind("particle", 0, 0),
+}
+
+
 def read(deck: Deck) -> Inventory:
-    """Collect the parts and elements of a deck that was read."""
+    """Return the parts and elements of a deck."""
     parts = read_parts(deck)
     cards = list(_element_cards(deck))
     ids, coordinates, codes = _nodes(deck)
     mesh = Mesh.of(
-        [one for card in cards if _followed(card) for one in _elements(card)],
+        [block for card in cards if _followed(card) for block in _elements(card)],
         ids,
         coordinates,
     )
@@ -204,52 +205,54 @@ def first_shared_nodes(
     owner: dict[int, int] = {}
     shared: dict[tuple[int, int], int] = {}
     for part, node in _nodes_of(cards, bodies):
-        other = owner.setdefault(node, part)
-        if other != part and bodies[other] != bodies[part]:
-            shared.setdefault((min(part, other), max(part, other)), node)
+        first_part = owner.setdefault(node, part)
+        if first_part != part and bodies[first_part] != bodies[part]:
+            shared.setdefault((min(part, first_part), max(part, first_part)), node)
     return shared
 
 
 def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
-    """Nodes of some parts, each with the first of these parts that has it."""
-    found: dict[int, int] = {}
+    """Return the first of ``parts`` that contains each node, by node id."""
+    part_by_node: dict[int, int] = {}
     for part, node in _nodes_of(cards, parts):
-        found.setdefault(node, part)
-    return found
+        part_by_node.setdefault(node, part)
+    return part_by_node
 
 
 def find_parts_of_nodes(
     cards: Sequence[Card], nodes: Collection[int]
 ) -> dict[int, set[int]]:
-    """Find the parts whose elements have some nodes, by node; a node of no element has none."""
-    found: dict[int, set[int]] = {}
+    """Return the parts whose elements contain each of some nodes, by node id."""
+    parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:
         for _, owners, members in _elements(card, _TEN):
             rows = np.isin(members, [*wanted]).any(axis=1)
-            for part, own in zip(
+            for part, element_nodes in zip(
                 owners[rows].tolist(), members[rows].tolist(), strict=True
             ):
-                for node in wanted.intersection(own):
-                    found.setdefault(node, set()).add(part)
-    return found
+                for node in wanted.intersection(element_nodes):
+                    parts_by_node.setdefault(node, set()).add(part)
+    return parts_by_node
 
 
 def _nodes_of(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Part and node, for the nodes of each element of some parts, in the order of the deck."""
+    """Yield part and node id for each node of the elements of some parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _elements(card, _TEN):
             rows = np.isin(owners, [*parts])
-            for part, own in zip(
+            for part, element_nodes in zip(
                 owners[rows].tolist(), nodes[rows].tolist(), strict=True
             ):
-                yield from ((part, node) for node in {node for node in own if node})
+                yield from (
+                    (part, node) for node in {node for node in element_nodes if node}
+                )
 
 
 def _watched(deck: Deck) -> Integers:
-    """Ids of the nodes of *DATABASE_HISTORY_NODE, eight in a line or, with a title each, one."""
+    """Return the node ids of *DATABASE_HISTORY_NODE: eight per line, or one with a title."""
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
@@ -257,40 +260,41 @@ def _watched(deck: Deck) -> Integers:
             fields: Layout = layout(
                 *[20 if card.width == LONG else 10] * (1 if options else 8)
             )
-            found = [
+            node_ids = [
                 lines.integers(fields).ravel() for lines in lines_of(card) if len(lines)
             ]
-            ids += [one[one > 0] + card.transform.node for one in found]
+            ids += [numbers[numbers > 0] + card.transform.node for numbers in node_ids]
     return np.unique(np.concatenate(ids))
 
 
 def _moves_nodes(deck: Deck) -> bool:
-    """Whether the deck moves nodes away from their coordinates."""
+    """Return True if the deck moves nodes away from their coordinates."""
     moving = (*deck.named("NODE_TRANSFORM"), *deck.named("PART_MOVE"))
     return bool(moving) or any(card.transform.moved for card in deck.named("NODE"))
 
 
 def _notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
-    """Say what may be missing."""
+    """Yield notes on elements that may be missing."""
     yield from (
-        f"{card.at}: elements of *{card.name} are not followed"
+        f"{card.at}: elements of *{card.name} are not read"
         for card in cards
         if not _followed(card)
     )
     yield from (
-        f"{one.name.at}: {one.name.text} was not read: {one.reason}"
-        for one in deck.unread
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        for include in deck.unread
     )
     for block in deck.encrypted:
-        yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
+        yield f"{block.source.name}:{block.line}: elements in an encrypted block are not read"
     yield from (
-        f"{block.source.name}: {told}"
-        for block, told in cuts(deck)
+        f"{block.source.name}: {sign}"
+        for block, sign in cuts(deck)
         if holds_mesh(block)
     )
 
 
 def _element_cards(deck: Deck) -> Iterator[Card]:
+    """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
         fitting = card.name.startswith(
@@ -306,32 +310,30 @@ def _element_cards(deck: Deck) -> Iterator[Card]:
 
 
 def _followed(card: Card) -> bool:
+    """Return True if the elements of a card can be read."""
     _, kind, *options = card.name.split("_")
     return kind in _KINDS and set(options) <= _OPTIONS
 
 
 def _width(card: Card) -> int:
-    """Columns of an id."""
+    """Return the number of columns of an id."""
     words = card.block.head.split()
-    return (
-        LONG
-        if card.width == LONG
-        else 10
-        if "%" in words[0] or words[1:2] == ["%"]
-        else 8
-    )
+    if card.width == LONG:
+        return LONG
+    has_percent_suffix = "%" in words[0] or words[1:2] == ["%"]
+    return 10 if has_percent_suffix else 8
 
 
 def _elements(
-    card: Card, most: int | None = None
+    card: Card, node_count: int | None = None
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Kind, parts and node ids of the elements of a card, piece by piece; ids with their offsets.
+    """Yield kind, part ids and node ids of the elements of a card, block by block, with the id offsets of the include.
 
-    ``most`` nodes of each, by default those that give it its size.
+    ``node_count`` is the number of nodes of each element; default: those that define its size.
     """
     kind = _KINDS[card.name.split("_")[1]]
     width = _width(card)
-    left: Integers | None = None
+    waiting_line: Integers | None = None
     for lines in lines_of(card):
         if not len(lines):
             continue
@@ -348,12 +350,14 @@ def _elements(
             layout(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most)))
         )
         if kind.name == "solid":
-            values, left = _of_two_lines(
-                values if left is None else np.concatenate([left, values])
+            values, waiting_line = _of_two_lines(
+                values
+                if waiting_line is None
+                else np.concatenate([waiting_line, values])
             )
-        # rows that name an element, its part and enough nodes: not those of further options
+        # Rows with an element, a part and enough nodes; others belong to options.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
-        nodes = np.maximum(mesh[:, 2 : 2 + (most or kind.most)], 0)
+        nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
             kind.name,
             mesh[:, 1] + card.transform.part,
@@ -362,7 +366,10 @@ def _elements(
 
 
 def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
-    """Join lines of an element and its part with the first of its nodes below; give back one that waits for them."""
+    """Join each line of element and part id with the line of nodes below it.
+
+    Also return a last line that lacks its nodes.
+    """
     heads = (values[:, :2] > 0).all(axis=1) & (values[:, 2:] == 0).all(axis=1)
     if not heads.any():
         return values, None
@@ -375,12 +382,10 @@ def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
 
 
 def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
-    """Ids and coordinates of all nodes, and the codes of their translations that are fixed."""
-    ids, places, codes = (
-        [np.empty(0, np.int64)],
-        [np.empty((0, 3))],
-        [np.empty(0, np.int64)],
-    )
+    """Return ids (n,) and coordinates (n, 3) of all nodes, and the codes of their fixed translations (n,)."""
+    ids = [np.empty(0, np.int64)]
+    coordinates = [np.empty((0, 3))]
+    codes = [np.empty(0, np.int64)]
     for card in deck.named("NODE"):
         if card.name != "NODE":
             continue
@@ -389,18 +394,20 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
         for lines in lines_of(card):
             if len(lines):
                 numbers = lines.integers(fields[:1])[:, 0]
-                good = numbers > 0
-                ids.append(numbers[good] + card.transform.node)
-                found = lines.reals(fields, slice(1, 4))[good]
-                places.append(
-                    np.full_like(found, np.nan) if card.transform.scaled else found
+                has_id = numbers > 0
+                ids.append(numbers[has_id] + card.transform.node)
+                line_coordinates = lines.reals(fields, slice(1, 4))[has_id]
+                coordinates.append(
+                    np.full_like(line_coordinates, np.nan)
+                    if card.transform.scaled
+                    else line_coordinates
                 )
-                codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[good])
-    return np.concatenate(ids), np.concatenate(places), np.concatenate(codes)
+                codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[has_id])
+    return np.concatenate(ids), np.concatenate(coordinates), np.concatenate(codes)
 
 
 def _codes(lines: Lines, fields: Layout) -> Integers:
-    """Last of some fields, 0 in most meshes."""
+    """Return the last of some fields as integers; mostly 0, which needs no parsing."""
     start, width = fields[-1]
     if (
         lines.in_columns
@@ -411,52 +418,63 @@ def _codes(lines: Lines, fields: Layout) -> Integers:
 
 
 def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
-    kinds, sections, materials = (
-        mesh.kinds,
-        read_sections(deck),
-        dict(_materials(deck, parts)),
-    )
+    """Return the data of all parts."""
+    kinds = mesh.kinds
+    sections = read_sections(deck)
+    materials = dict(_materials(deck, parts))
     unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
-    found: dict[int, PartData] = {}
+    part_data: dict[int, PartData] = {}
     for part, name in parts.materials.items():
         material = materials.get(name)
         section = _section(
             sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material
         )
-        why = unswitchable[part].reason if part in unswitchable else ""
-        found[part] = PartData(part, parts.titles.get(part, ""), material, section, why)
-    return found
+        reason = unswitchable[part].reason if part in unswitchable else ""
+        part_data[part] = PartData(
+            part, parts.titles.get(part, ""), material, section, reason
+        )
+    return part_data
 
 
 def _section(
     card: SectionCard | None, kinds: set[str], material: Material | None
 ) -> Section:
-    found: dict[str, Formulation] = {}
+    """Return the section of a part with the formulations of its elements."""
+    formulations_by_kind: dict[str, Formulation] = {}
     for kind in sorted(kinds):
-        one = formulations.ls_dyna(kind, card.elform if card else 0)
-        if one and (card or kind == "spring"):
-            found[kind] = one
-    damped = (
-        None
-        if material is None or material.kind != "spring"
-        else material.name.startswith(_DAMPERS)
-    )
+        formulation = formulations.ls_dyna(kind, card.elform if card else 0)
+        if formulation and (card or kind == "spring"):
+            formulations_by_kind[kind] = formulation
+    if material is None or material.kind != "spring":
+        damped = None
+    else:
+        damped = material.name.startswith(_DAMPERS)
     if card is None:
-        return Section(found, damped=damped)
+        return Section(formulations_by_kind, damped=damped)
     area = card.first if card.kind == "BEAM" and card.elform in (2, 3, 12) else None
     thickness = card.first if card.kind == "SHELL" else None
-    return Section(found, thickness, area, damped, None, not card.unturned, card.layers)
+    return Section(
+        formulations_by_kind,
+        thickness,
+        area,
+        damped,
+        None,
+        not card.unturned,
+        card.layers,
+    )
 
 
 def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
+    """Yield id and material of each *MAT card."""
     for card in deck.named("MAT"):
         if not card.data or card.name.startswith("MAT_ADD"):
             continue
-        row, number = card.data[0], material_of(card, card.data[0], 0)
+        row = card.data[0]
+        number = material_of(card, card.data[0], 0)
         name = card.name.removesuffix("_TITLE")
-        known = name.removeprefix("MAT_") in _ELASTIC
+        is_elastic = name.removeprefix("MAT_") in _ELASTIC
         density, modulus, poisson = (
-            card.positive(row, at) if known else None for at in (1, 2, 3)
+            card.positive(row, at) if is_elastic else None for at in (1, 2, 3)
         )
         yield (
             number,
@@ -465,6 +483,7 @@ def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
 
 
 def _kind(name: str, number: str, parts: Parts) -> str:
+    """Return the kind of a material: rigid, spring, airbag, void or deformable."""
     if number in parts.rigid_materials:
         return "rigid"
     if _SPRING.match(name):

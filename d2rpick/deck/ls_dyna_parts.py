@@ -1,4 +1,4 @@
-"""Parts, sections, sets, rigid materials and constraints of an LS-DYNA deck: what ids on switching cards refer to.
+"""Read parts, sections, sets, rigid materials and constraints of an LS-DYNA deck, to which switching cards refer.
 
 Columns: the vendor's keyword data as published in its Python library.
 """
@@ -26,16 +26,19 @@ _EXTRA_LINES: Final = {
     "FIELD": 1,
     "INERTIA": 3,
 }
-_FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}  # the last two add no line
+_FOLLOWED: Final = {
+    *_EXTRA_LINES,
+    "AVERAGED",
+    "TITLE",
+}  # AVERAGED and TITLE add no line
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # IRCS of *PART_INERTIA: one more line follows
+_ROTATED = 1  # value of IRCS of *PART_INERTIA that adds a line
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 _PER_LINE = 8
-_NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
-    WeakKeyDictionary()
-)  # what was found
-# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
+# Node sets of each deck, cached.
+_NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
+# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -49,15 +52,16 @@ NOT_TURNED: Final = {
     16: "tetrahedron with 10 nodes",
     17: "tetrahedron with 10 nodes",
 }
+# Lines of one section, by kind of element.
 _LINES: Final = {
     "SOLID": 1,
     "DISCRETE": 2,
     "SHELL": 2,
     "BEAM": 2,
     "TSHELL": 2,
-}  # of one section
+}
 _SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
-_ELEMENT_OPTIONS: Final = {  # their lines hold reals or words, or a single integer
+_ELEMENT_OPTIONS: Final = {  # options whose lines have no integers in the columns of ids
     *(
         "THICKNESS",
         "BETA",
@@ -73,11 +77,30 @@ _ELEMENT_OPTIONS: Final = {  # their lines hold reals or words, or a single inte
     "ELFORM",
 }
 
+_BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
+_JOINT_NODES = 6
+# Second words of *CONTACT keywords that define no contact.
+_NO_CONTACTS: Final = {
+    "ADD",
+    "AUTO",
+    "COUPLING",
+    "EXCLUDE",
+    "GEBOD",
+    "GUIDED",
+}
+# Contacts whose force can trigger a switch have one of these in their names.
+_ABLE: Final = (
+    "SURFACE_TO_SURFACE",
+    "NODES_TO_SURFACE",
+    "NODE_TO_SURFACE",
+)
+_MOST_ROWS = 8  # of a contact or wall without id; more rows may define a second one
+
 
 class PartSet(NamedTuple):
-    """Members of a part set, ranges still to be compared with the parts there are, and sets it adds up.
+    """Members of a part set: parts, ranges of part ids, and further part sets.
 
-    ``problems`` are fields that say nothing usable; with one of them the members cannot be known.
+    ``problems`` are fields that cannot be read; with one of them the members are unknown.
     """
 
     parts: tuple[int, ...] = ()
@@ -85,23 +108,23 @@ class PartSet(NamedTuple):
     sets: tuple[int, ...] = ()
     problems: tuple[Problem, ...] = ()
 
-    def joined(self, other: PartSet) -> PartSet:
-        """Return both together (``_COLLECT``)."""
+    def joined(self, further: PartSet) -> PartSet:
+        """Return the union of two sets (``_COLLECT``)."""
         return PartSet(
-            self.parts + other.parts,
-            self.ranges + other.ranges,
-            self.sets + other.sets,
-            self.problems + other.problems,
+            self.parts + further.parts,
+            self.ranges + further.ranges,
+            self.sets + further.sets,
+            self.problems + further.problems,
         )
 
 
 @dataclass(eq=False, repr=False)
 class Parts:
-    """Parts by id with material, title and section; part sets by id (None: of a kind that is not read).
+    """Material, title and section of each part; part sets by id (None for a kind of set that cannot be read).
 
-    ``all_known`` is False when an include was not read, a block is encrypted, or a keyword makes parts in a
-    way that is not followed: then a part that is missing here may still exist.  ``problems`` are ids of parts
-    and sets, and numbers of includes, that could not be read.
+    ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
+    cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
+    unreadable numbers of includes.
     """
 
     materials: dict[int, str] = field(default_factory=dict)
@@ -113,12 +136,12 @@ class Parts:
     all_known: bool = True
 
     def is_rigid(self, part: int) -> bool:
-        """Whether the part has *MAT_RIGID from the start."""
+        """Return True if the part has *MAT_RIGID."""
         return part in self.materials and self.materials[part] in self.rigid_materials
 
     def members(self, set_id: int) -> tuple[int, ...] | None:
-        """Parts of a part set, ascending; None when they cannot be known."""
-        found: set[int] = set()
+        """Return the parts of a part set, ascending; None if they are unknown."""
+        part_ids: set[int] = set()
         for current in self.reached(set_id):
             content = self.sets.get(current)
             if (
@@ -127,17 +150,20 @@ class Parts:
                 or (content.ranges and not self.materials)
             ):
                 return None
-            found.update(content.parts)
-            found.update(
+            part_ids.update(content.parts)
+            part_ids.update(
                 part
                 for low, high in content.ranges
                 for part in self.materials
                 if low <= part <= high
             )
-        return tuple(sorted(found))
+        return tuple(sorted(part_ids))
 
     def reached(self, set_id: int) -> list[int]:
-        """Return the set itself and all sets it adds up, directly or not, whether the deck has them or not."""
+        """Return the ids of the set and of all sets that it contains, directly or indirectly.
+
+        Sets that the deck does not define are included.
+        """
         return reached(
             [set_id],
             lambda one: content.sets if (content := self.sets.get(one)) else (),
@@ -145,7 +171,7 @@ class Parts:
 
 
 def read_parts(deck: Deck) -> Parts:
-    """Collect the parts, part sets and rigid materials of a deck."""
+    """Return the parts, part sets and rigid materials of a deck."""
     parts = Parts(
         problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted
     )
@@ -161,7 +187,7 @@ def read_parts(deck: Deck) -> Parts:
 
 
 def rigid_materials(deck: Deck) -> Iterator[Card]:
-    """Cards of rigid materials."""
+    """Yield the cards of rigid materials."""
     cards = deck.named("MAT_RIGID", "MAT_020", "MAT_20")
     return (
         card
@@ -171,49 +197,48 @@ def rigid_materials(deck: Deck) -> Iterator[Card]:
 
 
 def material_of(card: Card, row: Row, position: int) -> str:
-    """Id of a material with its offset, or its name where the deck uses names."""
+    """Return the id of a material with its offset as text, or its name if the deck uses names."""
     value = card.integer(row, position)
-    return (
-        value.field.text.upper()
-        if value.problem
-        else str(value.value + card.transform.material)
-    )
+    if value.problem:
+        return value.field.text.upper()
+    return str(value.value + card.transform.material)
 
 
 def _take_parts(card: Card, parts: Parts) -> None:
+    """Add the parts of a card."""
     options = card.options("PART")
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        options = (options - {"ATTACHMENT", "NODES"}) | {
-            "PRINT"
-        }  # one line more, like _PRINT
-    if (
-        "COMPOSITE" in options
-    ):  # one part, and a material for every ply: none of them makes it rigid
+        # ATTACHMENT adds one line, as PRINT does.
+        options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
+    # A composite is one part with a material for each ply, none of which makes it rigid.
+    if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add(card, card.rows[:2], "", parts)
         return
     if not options <= _FOLLOWED:
         parts.all_known = False
         return
-    rows, at = card.rows, 0
-    added = sum(_EXTRA_LINES.get(option, 0) for option in options)
-    while at + 1 < len(rows):  # a title, the ids, and what the options add
+    rows = card.rows
+    at = 0
+    extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
+    while at + 1 < len(rows):  # title, ids, and the lines of the options
         _add(card, rows[at : at + 2], material_of(card, rows[at + 1], 2), parts)
         at += 2
-        turned = (
+        is_rotated = (
             "INERTIA" in options
             and at < len(rows)
             and card.integer(rows[at], 4).value == _ROTATED
         )
-        at += added + turned
+        at += extra_lines + is_rotated
 
 
 def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
-    """Take the title and the ids of a part."""
+    """Add a part by its lines of title and ids."""
     title, row = lines
-    part, section = card.integer(row, 0), card.integer(row, 1)
+    part = card.integer(row, 0)
+    section = card.integer(row, 1)
     if part.problem:
         parts.problems.append((part.field, part.problem))
     elif part.value > 0:
@@ -224,7 +249,9 @@ def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
 
 
 def _take_set(card: Card, parts: Parts) -> None:
-    options, rows = card.options("SET_PART"), card.data
+    """Add a part set."""
+    options = card.options("SET_PART")
+    rows = card.data
     if not rows:
         return
     first = card.integer(rows[0], 0)
@@ -238,43 +265,47 @@ def _take_set(card: Card, parts: Parts) -> None:
         parts.sets[set_id] = None
         return
     content = _content(card, options, values)
-    known = parts.sets.get(set_id)
-    parts.sets[set_id] = (
-        known.joined(content) if known and "COLLECT" in options else content
-    )
+    earlier = parts.sets.get(set_id)
+    if earlier and "COLLECT" in options:
+        parts.sets[set_id] = earlier.joined(content)
+    else:
+        parts.sets[set_id] = content
 
 
 def _content(
     card: Card, options: Collection[str], values: Sequence[Value[int]]
 ) -> PartSet:
+    """Return the members of a part set from the values on its lines."""
     offset = card.transform.set_ if "ADD" in options else card.transform.part
-    told = "{!r} in a part set is not followed, a positive id was expected"
-    wrong = (one for one in values if one.problem or one.value < 0)
+    message = "{!r} in a part set cannot be used, expected a positive id"
+    wrong_values = (value for value in values if value.problem or value.value < 0)
     problems = tuple(
-        (one.field, one.problem or told.format(one.field.text)) for one in wrong
+        (value.field, value.problem or message.format(value.field.text))
+        for value in wrong_values
     )
     ids = tuple(value.value + offset for value in values if value.value > 0)
     if "GENERATE" in options:
         return PartSet(
             ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems
         )
-    return (
-        PartSet(sets=ids, problems=problems)
-        if "ADD" in options
-        else PartSet(parts=ids, problems=problems)
-    )
+    if "ADD" in options:
+        return PartSet(sets=ids, problems=problems)
+    return PartSet(parts=ids, problems=problems)
 
 
 def nodes_of_set(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
-    """Members of the node set with this number on a card; None of one that the deck has not, or is not followed."""
+    """Return the nodes of the node set with this number on a card; None if the deck lacks it or it cannot be read."""
     if deck not in _NODE_SETS:
         _NODE_SETS[deck] = {
-            id_: ids for one in deck.named("SET_NODE") for id_, ids in _node_set(one)
+            id_: ids
+            for set_card in deck.named("SET_NODE")
+            for id_, ids in _node_set(set_card)
         }
     return _NODE_SETS[deck].get(number + card.transform.set_)
 
 
 def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
+    """Yield id and nodes of a node set."""
     options = card.options("SET_NODE")
     if card.data and options <= _NODE_SET_OPTIONS:
         ids = [
@@ -284,23 +315,26 @@ def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
         ]
         if "GENERATE" in options:
             ids = [
-                one
+                node
                 for low, high in zip(ids[::2], ids[1::2], strict=False)
-                for one in range(low, high + 1)
+                for node in range(low, high + 1)
             ]
         yield card.integer(card.data[0], 0).value + card.transform.set_, frozenset(ids)
 
 
 def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
-    """Ids below the first line of a set."""
-    places = range(1 if "COLUMN" in options else _PER_LINE)
+    """Return the ids below the first line of a set."""
+    columns = range(1 if "COLUMN" in options else _PER_LINE)
     return [
-        card.integer(row, at) for row in card.data[1:] for at in places if row.cell(at)
+        card.integer(row, at) for row in card.data[1:] for at in columns if row.cell(at)
     ]
 
 
 class SectionCard(NamedTuple):
-    """A *SECTION as written: its kind, ELFORM, the first number of its second line, points through the thickness."""
+    """A *SECTION as written: its kind and ELFORM.
+
+    ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
+    """
 
     kind: str
     elform: int
@@ -309,12 +343,12 @@ class SectionCard(NamedTuple):
 
     @property
     def unturned(self) -> str:
-        """The formulation of solids whose stresses do not turn with a rigid body; empty for all others."""
+        """Return the formulation of solids whose stresses do not rotate with a rigid body; empty for others."""
         return NOT_TURNED.get(self.elform, "") if self.kind == "SOLID" else ""
 
 
 def read_sections(deck: Deck) -> dict[int, SectionCard]:
-    """Collect the sections by id."""
+    """Return the sections by id."""
     return {
         number: section
         for card in deck.named("SECTION")
@@ -323,17 +357,19 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
 
 
 def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
+    """Yield id and section of each section of a card."""
     kind = card.name.split("_")[1]
-    options, rows = card.options(f"SECTION_{kind}"), card.lines
+    options = card.options(f"SECTION_{kind}")
+    rows = card.lines
     titled = "TITLE" in options
     per_section = _LINES.get(kind)
     if per_section is None or options - {"TITLE"}:
-        rows, per_section, titled = rows[int(titled) :][:2], 2, False
+        rows = rows[int(titled) :][:2]
+        per_section = 2
+        titled = False
     for at in range(titled, len(rows), per_section + titled):
-        number, elform = (
-            card.integer(rows[at], 0),
-            card.integer(rows[at], 1, 1 if kind == "SOLID" else 2),
-        )
+        number = card.integer(rows[at], 0)
+        elform = card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
         layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
         through = (layers.value or 2) if layers and not layers.problem else None
         second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
@@ -346,7 +382,7 @@ def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Cards of elements that are searched for nodes that parts share, or those whose lines are not followed."""
+    """Return the element cards that are searched for shared nodes, or (``searched`` False) those that cannot be."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -358,12 +394,10 @@ def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
 Kind = Literal[
     "nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"
 ]
-_BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
-_JOINT_NODES = 6
 
 
 class Constraint(NamedTuple):
-    """A constraint: what it is, where it stands, its id (0: none), its nodes and the rigid part it belongs to."""
+    """A constraint: its kind, place, id (0 for none), nodes, and the rigid part to which it belongs."""
 
     kind: Kind
     place: Field
@@ -373,38 +407,43 @@ class Constraint(NamedTuple):
 
 
 def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
-    """Collect the constraints of some kinds; one whose nodes cannot be known has none."""
+    """Yield the constraints of some kinds; the set of nodes is empty if they are unknown."""
     for kind in kinds:
-        keyword, read = _CONSTRAINTS[kind]
+        keyword, read_card = _CONSTRAINTS[kind]
         for card in deck.named(keyword):
-            yield from read(deck, card, kind)
+            yield from read_card(deck, card, kind)
 
 
 def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    options, rows = card.options(_BODY), card.lines
-    if options - {"TITLE"}:  # further lines follow the first: one body per keyword
+    """Yield the nodal rigid bodies of a card."""
+    options = card.options(_BODY)
+    rows = card.lines
+    if options - {"TITLE"}:  # further options add lines, so the keyword has one body
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
-        body, nodes = card.integer(row, 0), card.integer(row, 2)
+        body = card.integer(row, 0)
+        nodes = card.integer(row, 2)
         members = nodes_of_set(deck, card, nodes.value) if nodes.value else None
         yield Constraint(kind, body.field, body.value, members or frozenset())
 
 
 def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Yield the extra nodes of a card."""
     for row in card.rows:
-        part, other = card.integer(row, 0), card.integer(row, 1)
-        if row.blank or part.problem or other.problem:
+        part = card.integer(row, 0)
+        node_or_set = card.integer(row, 1)
+        if row.blank or part.problem or node_or_set.problem:
             continue
-        single = (
-            None
-            if card.name.endswith("_SET")
-            else frozenset({other.value + card.transform.node})
-        )
-        nodes = single or nodes_of_set(deck, card, other.value) or frozenset()
+        if card.name.endswith("_SET"):
+            single = None
+        else:
+            single = frozenset({node_or_set.value + card.transform.node})
+        nodes = single or nodes_of_set(deck, card, node_or_set.value) or frozenset()
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
 
 def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Yield the joint of a card."""
     if card.name.startswith(
         (
             "CONSTRAINED_JOINT_STIFFNESS",
@@ -414,19 +453,21 @@ def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     ):
         return
     for row in _first(card):
-        number = (
-            card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
-        )
+        if card.name.endswith("_ID"):
+            number = card.integer(card.lines[0], 0).value
+        else:
+            number = 0
         yield _of_nodes(card, row, kind, _JOINT_NODES, number)
 
 
 def _of_two_nodes(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Two nodes on a line, on each where no option adds lines."""
+    """Return the constraints with two nodes on a line: one per line, unless an option adds lines."""
     rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _first(card)
     return (_of_nodes(card, row, kind, 2) for row in rows)
 
 
 def _generalized_welds(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Yield the generalized weld of a card."""
     for row in _first(card):
         members = card.integer(row, 0)
         yield Constraint(
@@ -438,22 +479,22 @@ def _generalized_welds(deck: Deck, card: Card, kind: Kind) -> Iterator[Constrain
 
 
 def _first(card: Card) -> tuple[Row, ...]:
-    """The first line, below that of an id (``_ID``)."""
+    """Return the first line after the line of an id (``_ID``)."""
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
 def _of_nodes(
-    card: Card, row: Row, kind: Kind, most: int, number: int = 0
+    card: Card, row: Row, kind: Kind, node_count: int, number: int = 0
 ) -> Constraint:
     """Read a constraint whose line lists its nodes."""
-    nodes = [card.integer(row, at) for at in range(most)]
+    nodes = [card.integer(row, at) for at in range(node_count)]
     ids = frozenset(
         node.value + card.transform.node for node in nodes if node.value > 0
     )
     return Constraint(kind, nodes[0].field, number, ids)
 
 
-# By what they are: their keyword, and the function that reads a card.
+# Keyword of each kind of constraint, and the function that reads a card of it.
 _CONSTRAINTS: Final[
     Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
 ] = {
@@ -466,24 +507,8 @@ _CONSTRAINTS: Final[
 }
 
 
-_NO_CONTACTS: Final = {
-    "ADD",
-    "AUTO",
-    "COUPLING",
-    "EXCLUDE",
-    "GEBOD",
-    "GUIDED",
-}  # first words of their names
-_ABLE: Final = (
-    "SURFACE_TO_SURFACE",
-    "NODES_TO_SURFACE",
-    "NODE_TO_SURFACE",
-)  # in the names of contacts that trigger
-_MOST_ROWS = 8  # of one definition without an id; more rows may hold another one
-
-
 class Entity(NamedTuple):
-    """A contact or rigid wall: keyword, id and title as given (0 and empty: none), its number in the deck."""
+    """A contact or rigid wall: keyword, id and title as given (0 and empty for none), and its number in the deck."""
 
     keyword: str
     id: int
@@ -492,41 +517,49 @@ class Entity(NamedTuple):
 
     @property
     def triggers(self) -> bool:
-        """Whether the force of a contact can switch parts."""
+        """Return True if the force of the contact can switch parts."""
         return any(name in self.keyword for name in _ABLE)
 
 
 class Entities(NamedTuple):
-    """What there is to name; ``all_known`` is False where one keyword may define several."""
+    """The contacts or rigid walls of a deck; ``all_known`` is False if one keyword may define several."""
 
     found: tuple[Entity, ...]
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Find by id, else by the order of definition, which counts for those without an id."""
-        by_id = next((one for one in self.found if one.id == number), None)
+        """Return the contact or wall with this id; without one, the entry with this number in the order of definition.
+
+        An entry with an id is never found by its number.
+        """
+        by_id = next((entity for entity in self.found if entity.id == number), None)
         return by_id or next(
-            (one for one in self.found if one.number == number and not one.id), None
+            (
+                entity
+                for entity in self.found
+                if entity.number == number and not entity.id
+            ),
+            None,
         )
 
 
 def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entities:
-    """List the contacts, or the rigid walls, of a deck."""
-    found: list[Entity] = []
+    """Return the contacts, or the rigid walls, of a deck."""
+    entities: list[Entity] = []
     all_known = not deck.unread and not deck.encrypted
     for card in deck.named(keyword):
-        words, number, title = card.name.split("_"), 0, ""
+        words = card.name.split("_")
+        number = 0
+        title = ""
         if words[1:2] and words[1] in _NO_CONTACTS:
             continue
         if {"ID", "TITLE"} & {*words} and card.rows:
-            number, title = (
-                card.integer(card.rows[0], 0).value,
-                card.rows[0].text[card.width :].strip(),
-            )
+            number = card.integer(card.rows[0], 0).value
+            title = card.rows[0].text[card.width :].strip()
         all_known = (
             all_known
             and not card.transform.rest
             and (number > 0 or len(card.rows) <= _MOST_ROWS)
         )
-        found.append(Entity(card.name, number, title, len(found) + 1))
-    return Entities(tuple(found), all_known)
+        entities.append(Entity(card.name, number, title, len(entities) + 1))
+    return Entities(tuple(entities), all_known)

@@ -1,10 +1,10 @@
-"""Sensors of LS-DYNA that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
+"""Follow sensors of LS-DYNA that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
 
-A control is on or off.  Its switches act in turn: when the condition of one holds, the control changes, and the next
-switch is asked.  A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
+A control is on or off. Its switches act in turn: when the condition of one is met, the control changes, and the next
+switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
 
-Source: the vendor's keyword data as published in its Python library.  That a set is made while its control is on, and
-undone while it is off, follows from the words of CODE 5 there; it was not tried with the solver.
+Source: the vendor's keyword data as published in its Python library. That a set makes its parts rigid while its control
+is on, and deformable while it is off, follows from the description of CODE 5 there. Not tried with the solver.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ _ALWAYS: Final = ((0.0, math.inf),)
 
 
 class Control(NamedTuple):
-    """A *SENSOR_CONTROL that switches a set, and its switches in the order of their turns.
+    """A *SENSOR_CONTROL that switches a set, with the ids of its switches in the order in which they act.
 
-    ``initial`` is its state at the start, ON or OFF; ``rounds``: how often all switches have their turn, infinite for
-    ever.
+    ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
+    infinite.
     """
 
     card: Card
@@ -53,14 +53,14 @@ class Control(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A control is on or off from ``time`` on [time of the deck]."""
+    """A control is on, or off, from ``time`` on [time of the deck]."""
 
     time: float
     on: bool
 
 
 def read_controls(deck: Deck) -> Iterator[Control]:
-    """List the controls of a deck that switch parts."""
+    """Yield the controls of a deck that switch parts."""
     for card in deck.named("SENSOR_CONTROL"):
         for first, second in zip(card.data[::2], card.data[1::2], strict=False):
             if card.word(first, _TYPE).value != "DEF2RIG":
@@ -87,18 +87,18 @@ def follow_control(
     Parameters
     ----------
     deck : Deck
-        With the switches and sensors of the control.
+        The deck with the switches and sensors of the control.
     control : Control
-        The one to follow.
+        The control to follow.
     forces : callable or None
-        When the force of a contact or wall is above a value; None without a history.
+        Returns the spans in which the force of a contact or wall is above a value; None without a history.
     end : float
-        Of the run [time].
+        End of the run [time].
 
     Returns
     -------
     list of Change or str
-        Its state at the start and all changes in order, or why it cannot be followed.
+        Its state at the start and all changes in order, or the reason why they are unknown.
     """
     if control.initial not in ("ON", "OFF"):
         return f"a control whose INITSTT is {control.initial!r}, not ON or OFF"
@@ -125,14 +125,14 @@ def follow_control(
 
 
 def _find_first_time(spans: Spans, since: float) -> float:
-    """Give the first time from ``since`` on at which a condition holds; infinite for never."""
+    """Return the first time from ``since`` on at which a condition is met; infinity if there is none."""
     return next((max(since, start) for start, end in spans if since < end), math.inf)
 
 
 def _find_spans_of_switch(
     deck: Deck, number: int, forces: Forces | None
 ) -> Spans | str:
-    """Find when the condition of a switch holds and makes a control change, or say why that is not known."""
+    """Return the spans in which the condition of a switch is met, or the reason why they are unknown."""
     card, row = _find_row(deck.named("SENSOR_SWITCH"), number) or (None, None)
     if card is None or row is None:
         return f"switch {number}, which the deck has not"
@@ -165,7 +165,7 @@ def _find_spans_of_switch(
 def _find_spans_of_sensor(
     deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
 ) -> Spans | str:
-    """Find when the force of a sensor is above a value, or below it."""
+    """Return the spans in which the force of a sensor is above (or below) a value, or why they are unknown."""
     card, row = _find_row(deck.named("SENSOR_DEFINE"), number) or (None, None)
     if card is None or row is None:
         return f"sensor {number}, which the deck has not"
@@ -187,7 +187,7 @@ def _find_spans_of_sensor(
 
 
 def _find_row(cards: Sequence[Card], number: int) -> tuple[Card, Row] | None:
-    """Find the line whose first field is this number, after the offset of its include."""
+    """Return the line whose first field is this number, after the id offset of its include, and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )

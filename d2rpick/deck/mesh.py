@@ -1,7 +1,7 @@
-"""Meshes: fixed columns of many lines at once, ids and reals as arrays, and the elements and nodes that these are.
+"""Read meshes: many lines in fixed columns at once as arrays, and the elements and nodes in them.
 
-A mesh of millions of lines is read in pieces.  Lines between commas and fields with parameters are rare there; they are
-taken one by one.  Columns of Radioss: Altair's public help for the elements, and the solver's published source.
+A mesh of millions of lines is read in pieces. Lines with commas and fields with parameters are rare in a mesh and are
+read one by one. Columns of Radioss: Altair's public help for the elements, and the solver's published source.
 """
 
 from __future__ import annotations
@@ -30,21 +30,25 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 
-_WIDEST: Final = 240  # columns that any line of a mesh uses
+_WIDEST: Final = 240  # columns of the longest line of a mesh
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-_ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines that do not stand in columns
-_ID_ENDS: Final = (
-    7  # last column of most ids: a line that has something there is not blank
-)
-_HIGHEST: Final = 10**17  # no id comes near: a longer number would overflow
-NO_NODE: Final = -1  # in place of a node that there is not
-_DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
-NOTHING: Final = -1  # in place of what is not an id
-_FEW: Final = 1000  # lines whose fields are read together: a deck may have a card for each of its elements
+_ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines without fixed columns
+# Last column of most ids: a line with a character there is not blank.
+_ID_ENDS: Final = 7
+_HIGHEST: Final = 10**17  # larger than any id; a longer number would overflow
+NO_NODE: Final = -1  # place of a missing node
+_DENSE: Final = 50_000_000  # largest id up to which a table of all ids is small enough
+NOTHING: Final = -1  # value of a field that is not an id
+# Up to so many lines all fields are parsed together, as a deck may have a card for each element.
+_FEW: Final = 1000
+
+_COMMENTS: Final = b"$#"
+_WIDTH, _REAL = 10, 20
+NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 def layout(*widths: int) -> Layout:
-    """Place fields one behind the other.
+    """Return first column and width of adjacent fields.
 
     Examples
     --------
@@ -56,7 +60,10 @@ def layout(*widths: int) -> Layout:
 
 
 class Lines:
-    """Data lines of a piece of a mesh: no comments, no blank ones; ``in_columns``: each stands in fixed columns."""
+    """Data lines of a piece of a mesh, without comments and blank lines.
+
+    ``in_columns``: all lines have fixed columns.
+    """
 
     def __init__(self, data: bytes, scope: Scope, comments: bytes) -> None:
         self._scope = scope
@@ -69,45 +76,48 @@ class Lines:
         self.cells = cells if keep.all() else cells[keep]
 
     def __len__(self) -> int:
-        """Give the number of lines."""
+        """Return the number of lines."""
         return len(self.cells)
 
     def integers(self, fields: Layout) -> Integers:
-        """Ids in these fields, shape (lines, fields): 0 for a blank, `NOTHING` for what is not an id."""
-        columns = [self._field(*place) for place in fields]
+        """Return the ids in these fields, shape (lines, fields).
+
+        0 for a blank, `NOTHING` for text that is not an id.
+        """
+        columns = [self._field(*field) for field in fields]
         if len(self) < _FEW and len({width for _, width in fields}) == 1:
-            found = _integers(np.concatenate(columns)).reshape(len(fields), len(self)).T
+            ids = _integers(np.concatenate(columns)).reshape(len(fields), len(self)).T
         else:
-            found = np.stack([*map(_integers, columns)], axis=1)
+            ids = np.stack([*map(_integers, columns)], axis=1)
         for row, texts in self._texts.items():
-            found[row] = [
-                _id(self._value(text)) for text in self._pieces(texts, fields)
-            ]
-        return found
+            ids[row] = [_id(self._value(text)) for text in self._pieces(texts, fields)]
+        return ids
 
     def reals(self, fields: Layout, wanted: slice) -> Reals:
-        """Give the numbers in ``wanted`` of the fields, shape (lines, wanted): 0 for a blank, NaN for what is none."""
-        found = np.stack(
-            [_reals(self._field(*place)) for place in fields[wanted]], axis=1
+        """Return the numbers in the fields ``wanted``, shape (lines, wanted).
+
+        0 for a blank, NaN for text that is not a number.
+        """
+        numbers = np.stack(
+            [_reals(self._field(*field)) for field in fields[wanted]], axis=1
         )
         for row, texts in self._texts.items():
-            found[row] = [
+            numbers[row] = [
                 self._value(text) for text in self._pieces(texts, fields)[wanted]
             ]
-        return found
+        return numbers
 
     def _field(self, start: int, width: int) -> NDArray[np.uint8]:
-        found = self.cells[:, start : start + width]
-        missing = width - found.shape[1]
-        return (
-            np.pad(found, ((0, 0), (0, missing)), constant_values=_BLANK)
-            if missing
-            else found
-        )
+        """Return the characters of a field (lines, width), padded with blanks."""
+        cells = self.cells[:, start : start + width]
+        missing = width - cells.shape[1]
+        if missing:
+            return np.pad(cells, ((0, 0), (0, missing)), constant_values=_BLANK)
+        return cells
 
     @cached_property
     def _texts(self) -> dict[int, str]:
-        """Lines that do not stand in columns, or refer to parameters."""
+        """Return the lines without fixed columns, or with parameters, by their row."""
         if self.in_columns:
             return {}
         special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(
@@ -119,16 +129,17 @@ class Lines:
         }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
+        """Return the texts of some fields of a line."""
         if "," in text:
             cells = text.split(",")
             return [
-                cells[place] if place < len(cells) else ""
-                for place in range(len(fields))
+                cells[position] if position < len(cells) else ""
+                for position in range(len(fields))
             ]
         return [text.expandtabs(8)[start : start + width] for start, width in fields]
 
     def _value(self, text: str) -> float:
-        """Value of a field; 0 for a blank, NaN for what is no number."""
+        """Return the value of a field: 0 for a blank, NaN for text that is not a number."""
         if not text.strip():
             return 0.0
         try:
@@ -138,21 +149,21 @@ class Lines:
 
 
 def lines_of(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
-    """Read the data lines of a card, piece by piece."""
+    """Yield the data lines of a card, piece by piece."""
     for data in _pieces_of(card.block):
         if data:
             yield Lines(data, card.scope, comments)
 
 
 def _pieces_of(block: Block) -> Iterator[bytes]:
-    """Bytes below the keyword line, in pieces that end with a line."""
+    """Yield the bytes below the keyword line in pieces of whole lines."""
     pieces = block.source.pieces(block.start, block.end)
     yield next(pieces).partition(b"\n")[2]
     yield from pieces
 
 
 def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Lines as rows of equal width, blanks behind those that are shorter; without line ends."""
+    """Return lines as rows of equal length, padded with blanks, without line ends."""
     ends = np.flatnonzero(raw == ord("\n"))
     if not raw.size or raw[-1] != ord("\n"):
         ends = np.append(ends, raw.size)
@@ -162,65 +173,68 @@ def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
     if (lengths == longest).all() and raw.size == lengths.size * (longest + 1):
         return raw.reshape(lengths.size, longest + 1)[:, : max(1, longest)]
     columns = np.arange(max(1, min(longest, _WIDEST)))
-    places = np.minimum(np.add.outer(starts, columns), raw.size - 1)
-    return np.where(columns < lengths[:, np.newaxis], raw[places], _BLANK)
+    offsets = np.minimum(np.add.outer(starts, columns), raw.size - 1)
+    return np.where(columns < lengths[:, np.newaxis], raw[offsets], _BLANK)
 
 
 def _integers(field: NDArray[np.uint8]) -> Integers:
+    """Parse a field of digits; 0 for a blank, `NOTHING` for other text."""
     value = np.zeros(len(field), np.int64)
-    known, groups = np.ones(len(field), bool), np.zeros(len(field), np.uint8)
-    before = np.zeros(len(field), bool)
+    is_valid = np.ones(len(field), bool)
+    groups = np.zeros(len(field), np.uint8)
+    was_digit = np.zeros(len(field), bool)
     for letters in np.ascontiguousarray(field.T):
         digits = letters - _ZERO
         is_digit = digits <= 9
         value = np.where(is_digit, 10 * value + digits, value)
-        known &= (is_digit | (letters == _BLANK)) & (value < _HIGHEST)
-        groups += is_digit & ~before
-        before = is_digit
-    return np.where(known & (groups <= 1), value, NOTHING)
+        is_valid &= (is_digit | (letters == _BLANK)) & (value < _HIGHEST)
+        groups += is_digit & ~was_digit
+        was_digit = is_digit
+    return np.where(is_valid & (groups <= 1), value, NOTHING)
 
 
 def _reals(field: NDArray[np.uint8]) -> Reals:
+    """Parse a field of reals; 0 for a blank, NaN for other text."""
     blank = (field == _BLANK).all(axis=1)
     texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
     texts = np.where(blank, b"0", texts)
     try:
         return texts.astype(np.float64)
-    except ValueError:  # 1.5-3 is a number for a solver
+    except ValueError:  # solvers also read numbers like 1.5-3
         return np.array([real(text.decode("latin-1")) for text in texts.tolist()])
 
 
 def _id(value: float) -> int:
+    """Return a value as an id, or `NOTHING`."""
     return int(value) if value >= 0 and value == int(value) else NOTHING
 
 
 def distinct(values: Places) -> Places:
-    """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
+    """Return the distinct values, ascending; sorting is faster here than hashing."""
     ordered = np.sort(values, axis=None)
-    return (
-        ordered[np.append(True, ordered[1:] != ordered[:-1])]
-        if ordered.size
-        else ordered
-    )
+    if ordered.size:
+        is_first: NDArray[np.bool_] = np.append(True, ordered[1:] != ordered[:-1])
+        ordered = ordered[is_first]
+    return ordered
 
 
 def _used(wanted: Sequence[Places]) -> Places:
-    """Node ids that elements have, ascending."""
-    highest = max((int(one.max(initial=0)) for one in wanted), default=0)
+    """Return the ids of the nodes of elements, ascending."""
+    highest = max((int(node_ids.max(initial=0)) for node_ids in wanted), default=0)
     if highest > _DENSE:
-        used = distinct(np.concatenate([distinct(one) for one in wanted]))
+        used = distinct(np.concatenate([distinct(node_ids) for node_ids in wanted]))
         return used[used > 0]
     mask = np.zeros(highest + 1, bool)
-    for one in wanted:
-        mask[one] = True
+    for node_ids in wanted:
+        mask[node_ids] = True
     mask[0] = False
     return np.flatnonzero(mask)
 
 
 class NodeTable:
-    """Nodes of a mesh, each with its place: those with coordinates, as given, then those that elements have beyond.
+    """Nodes of a mesh by place: those with coordinates in the order given, then those that only elements have.
 
-    ``ids`` are the ids by place, shape (nodes,).
+    ``ids`` are the node ids by place, shape (nodes,).
 
     Examples
     --------
@@ -236,7 +250,7 @@ class NodeTable:
         self._sorted = self.ids[self._order]
 
     def places(self, ids: Places) -> Places:
-        """Place of each node, `NO_NODE` for one that the table has not."""
+        """Return the place of each node; `NO_NODE` for a node that is not in the table."""
         if not self.ids.size:
             return np.full_like(ids, NO_NODE)
         if self._sorted[-1] <= _DENSE:
@@ -247,32 +261,35 @@ class NodeTable:
         return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
 
     def known(self, ids: Places) -> Places:
-        """Places of those nodes that the table has."""
-        found = self.places(ids)
-        return np.asarray(found[found != NO_NODE])
+        """Return the places of the nodes that are in the table."""
+        places_or_none = self.places(ids)
+        return np.asarray(places_or_none[places_or_none != NO_NODE])
 
     @cached_property
     def _lookup(self) -> Places:
-        """Place by id, where ids are small enough: quicker than a search."""
+        """Return the places by id, for small ids; faster than a search."""
         lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
         lookup[self._sorted[::-1]] = self._order[::-1]
         return lookup
 
 
 class Elements(NamedTuple):
-    """Elements of one kind: the id of the part, shape (n,), and the places of the nodes, shape (n, nodes)."""
+    """Elements of one kind: part ids, shape (n,), and places of their nodes in the node table, shape (n, nodes)."""
 
     kind: str
     part: Places
     nodes: Places
 
     def of(self, part: int) -> Places:
-        """Nodes of the elements of a part."""
+        """Return the nodes of the elements of a part."""
         return np.asarray(self.nodes[self.part == part])
 
 
 class Mesh(NamedTuple):
-    """Elements of a deck by kind, the table of their nodes, where these lie, and how many are not placed."""
+    """Elements of a deck by kind, with their node table and its coordinates.
+
+    ``lost`` is the number of nodes of elements that have no coordinates.
+    """
 
     elements: tuple[Elements, ...]
     table: NodeTable
@@ -286,22 +303,25 @@ class Mesh(NamedTuple):
         ids: Places,
         coordinates: Reals,
     ) -> Mesh:
-        """Put together blocks of elements (kind, parts, node ids) and all nodes with coordinates."""
-        blocks = [one for one in blocks if len(one[1])]
+        """Join blocks of elements (kind, part ids, node ids) with all nodes that have coordinates."""
+        blocks = [block for block in blocks if len(block[1])]
         kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in blocks})
-        alike = [
-            [one for one in blocks if (one[0], one[2].shape[1]) == kind]
+        blocks_by_kind = [
+            [block for block in blocks if (block[0], block[2].shape[1]) == kind]
             for kind in kinds
         ]
-        nodes = [np.concatenate([own for _, _, own in those]) for those in alike]
+        nodes = [
+            np.concatenate([node_ids for _, _, node_ids in same_kind])
+            for same_kind in blocks_by_kind
+        ]
         table = NodeTable(ids, nodes)
         elements = tuple(
             Elements(
-                those[0][0],
-                np.concatenate([part for _, part, _ in those]),
-                table.places(own),
+                same_kind[0][0],
+                np.concatenate([part for _, part, _ in same_kind]),
+                table.places(node_ids),
             )
-            for those, own in zip(alike, nodes, strict=True)
+            for same_kind, node_ids in zip(blocks_by_kind, nodes, strict=True)
         )
         lost = table.ids.size - ids.size
         return cls(
@@ -313,27 +333,26 @@ class Mesh(NamedTuple):
 
     @property
     def kinds(self) -> Mapping[int, set[str]]:
-        """Kinds of the elements of each part."""
-        found: dict[int, set[str]] = {}
-        for one in self.elements:
-            for part in np.unique(one.part).tolist():
-                found.setdefault(part, set()).add(one.kind)
-        return found
+        """Return the kinds of elements of each part."""
+        kinds_by_part: dict[int, set[str]] = {}
+        for elements in self.elements:
+            for part in np.unique(elements.part).tolist():
+                kinds_by_part.setdefault(part, set()).add(elements.kind)
+        return kinds_by_part
 
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
-        """Say which parts of elements are not those of the deck, whose keywords begin with ``sign``, or which nodes."""
+        """Yield notes on elements without a part in the deck and nodes without coordinates.
+
+        ``sign`` begins the keywords.
+        """
         if unknown := sorted(self.kinds.keys() - parts):
             yield f"elements of {name_units(unknown)}, which no {sign}PART of the deck defines"
         if self.lost:
             yield f"{self.lost} nodes of elements are not in any {sign}NODE of the deck"
 
 
-_COMMENTS: Final = b"$#"
-_WIDTH, _REAL = 10, 20
-
-
 class _Kind(NamedTuple):
-    """Kind of elements: what to call it, nodes that hold the part, ids on each of its lines."""
+    """Kind of element: its name, the nodes that define its size, and the number of ids on each of its lines."""
 
     name: str
     nodes: int
@@ -347,55 +366,61 @@ KINDS: Final = {
     "SPRING": _Kind("spring", 2, (3,)), "TETRA10": _Kind("tetrahedron", 10, (1, 10)),
     "BRIC20": _Kind("solid", 20, (9, 8, 4)), "SHEL16": _Kind("thick shell", 16, (9, 8)),
 }  # fmt: skip
-NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 def elements_of(
     card: Card, *, damaged: bool = False
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Kind, parts and node ids of the elements of a card, ``damaged`` ones too, with 0 for what is no node."""
+    """Yield kind, part ids and node ids of the elements of a card; a missing node is 0.
+
+    With ``damaged`` also yield elements whose ids are incomplete.
+    """
     kind = KINDS[card.words[0]]
     fields: Layout = layout(*[_WIDTH] * max(kind.lines))
-    found = [
+    line_ids = [
         lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)
     ]
-    if not found:
+    if not line_ids:
         return
-    values = np.concatenate(found)
-    per = len(kind.lines)
-    values = values[: len(values) // per * per].reshape(-1, per, values.shape[1])
+    values = np.concatenate(line_ids)
+    lines_per_element = len(kind.lines)
+    values = values[: len(values) // lines_per_element * lines_per_element].reshape(
+        -1, lines_per_element, values.shape[1]
+    )
     flat = np.concatenate(
         [values[:, line, :count] for line, count in enumerate(kind.lines)], axis=1
     )
-    good = (flat[:, : 1 + min(kind.nodes, 3)] > 0).all(axis=1) | damaged
-    nodes = np.maximum(flat[good, 1 : 1 + kind.nodes], 0)
+    is_element = (flat[:, : 1 + min(kind.nodes, 3)] > 0).all(axis=1) | damaged
+    nodes = np.maximum(flat[is_element, 1 : 1 + kind.nodes], 0)
     yield kind.name, np.full(len(nodes), number_of(card), np.int64), nodes
 
 
 def parts_with_elements(starter: Starter) -> set[int]:
-    """Parts that have elements of any kind."""
+    """Return the parts that have elements of any kind."""
     return {part for part, _ in _elements(starter)}
 
 
 def parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Parts all of whose nodes are some of these, or nodes of some parts, by the keys of ``groups``."""
+    """Return for each group of nodes and parts the parts all of whose nodes belong to it."""
     elements = [*_elements(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():
         of_parts = [members.ravel() for part, members in elements if part in parts]
-        known = np.unique(np.concatenate([np.array([0, *nodes]), *of_parts]))
+        group_nodes = np.unique(np.concatenate([np.array([0, *nodes]), *of_parts]))
         inside[key] = {part for part, _ in elements}
         for part, members in elements:
-            real = bool((members > 0).any(axis=1).all())
-            if part in inside[key] and not (real and np.isin(members, known).all()):
+            if part not in inside[key]:
+                continue
+            has_nodes = bool((members > 0).any(axis=1).all())
+            if not has_nodes or not np.isin(members, group_nodes).all():
                 inside[key].discard(part)
     return inside
 
 
 def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
-    """Part and node ids of elements, block by block; none where their lines are not followed."""
+    """Yield part and node ids of elements, block by block; node 0 if their lines cannot be read."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:
@@ -408,13 +433,14 @@ def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
 
 
 def nodes_of(cards: Iterable[Card]) -> tuple[Integers, Reals]:
-    """Ids of nodes (n,) and where they lie (n, 3) [length]."""
-    ids, places = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    """Return ids (n,) and coordinates (n, 3) of nodes [length]."""
+    ids = [np.empty(0, np.int64)]
+    coordinates = [np.empty((0, 3))]
     fields: Layout = layout(_WIDTH, _REAL, _REAL, _REAL)
     for card in cards:
         for lines in lines_of(card, _COMMENTS):
             if len(lines):
                 numbers = lines.integers(fields[:1])[:, 0]
                 ids.append(numbers[numbers > 0])
-                places.append(lines.reals(fields, slice(1, 4))[numbers > 0])
-    return np.concatenate(ids), np.concatenate(places)
+                coordinates.append(lines.reals(fields, slice(1, 4))[numbers > 0])
+    return np.concatenate(ids), np.concatenate(coordinates)

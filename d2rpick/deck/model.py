@@ -1,6 +1,6 @@
-"""What a deck says about its parts: elements by kind and formulation, material, nodes that parts share.
+"""Represent the contents of a deck: elements by kind and formulation, materials, shared nodes, supports and joints.
 
-Arrays of elements hold places of nodes in the table of nodes, not their ids; -1 where an element has no further node.
+Arrays of elements hold the places of nodes in the node table, not node ids; -1 stands for a missing node.
 """
 
 from __future__ import annotations
@@ -29,19 +29,18 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-_LAYERS: Final = 3  # points through the thickness where the deck does not tell: most shells have 2 to 5
+_LAYERS: Final = 3  # integration points through the thickness if the deck does not define them: most shells have 2 to 5
 SPRING: Final = "spring"
-DISCRETE: Final = frozenset(
-    {SPRING, "seatbelt"}
-)  # kinds of elements that are not switched by part
+# Kinds of elements that a switch of their part does not make rigid.
+DISCRETE: Final = frozenset({SPRING, "seatbelt"})
 
 
 class Hold(NamedTuple):
-    """A support or an imposed motion: what to call it, and whom it holds from ``start`` to ``end`` [time].
+    """A support or a prescribed motion: its name, and what it holds from ``start`` to ``end`` [time].
 
-    ``nodes`` are ids, or places once it is placed; ``parts`` are held as a whole.  ``axes`` are the global directions
-    of translation that it fixes, none where it fixes rotations alone.  ``counts``: whatever these are, since it moves
-    what it holds, or fixes it along axes of its own.
+    ``nodes`` are node ids, or places once it is `placed`. ``parts`` are held as a whole. ``axes`` are the fixed global
+    directions of translation; empty if only rotations are fixed. ``counts``: it holds the part whatever the axes are,
+    as it prescribes a motion or fixes local axes.
     """
 
     name: str
@@ -54,9 +53,10 @@ class Hold(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Gravity along an ``axis``, None where that is one of its own, by the ``values`` that it keeps for a while.
+    """Gravity along a global ``axis`` (None for a local one), with the constant ``values`` of its curve.
 
-    ``values`` are accelerations [length/time^2].  It acts on ``nodes`` (ids, or places) and ``parts``; None: on all.
+    ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
+    nodes.
     """
 
     axis: int | None
@@ -66,7 +66,7 @@ class Gravity(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A weld, tie or rigid body: ``kind`` is what to call it; its nodes (ids, or places), and parts that it names."""
+    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids, or places) and the parts that it names."""
 
     kind: str
     nodes: Places
@@ -74,9 +74,9 @@ class Joint(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Joints that are followed, and names and places of ties of which it is not known which parts they hold.
+    """Joints with known parts (``found``), and names of the ties whose parts are unknown.
 
-    ``switched`` are rigid bodies that are there to be switched.
+    ``switched`` are rigid bodies that exist to be switched.
     """
 
     found: tuple[Joint, ...]
@@ -85,7 +85,10 @@ class Joints(NamedTuple):
 
 
 class Boundary(NamedTuple):
-    """All that a deck has of them; ``gravity`` is None where it is not known.  ``notes`` say what is not followed."""
+    """Supports, prescribed motions and gravity of a deck; ``gravity`` is None if it is unknown.
+
+    ``notes`` name the cards that cannot be read.
+    """
 
     holds: tuple[Hold, ...] = ()
     gravity: tuple[Gravity, ...] | None = None
@@ -93,20 +96,20 @@ class Boundary(NamedTuple):
 
     @classmethod
     def of(
-        cls, holds: Sequence[Hold | str], pulls: Sequence[Gravity | str], *, whole: bool
+        cls, holds: Sequence[Hold | str], loads: Sequence[Gravity | str], *, whole: bool
     ) -> Boundary:
-        """Sort what was found from what is not followed; without the ``whole`` of a deck gravity is not known."""
-        gravity = tuple(one for one in pulls if isinstance(one, Gravity))
-        known = whole and len(gravity) == len(pulls)
-        notes = tuple(one for one in (*holds, *pulls) if isinstance(one, str))
+        """Separate supports and gravity from notes (text); if the deck is not ``whole``, gravity is unknown."""
+        gravity = tuple(load for load in loads if isinstance(load, Gravity))
+        is_known = whole and len(gravity) == len(loads)
+        notes = tuple(note for note in (*holds, *loads) if isinstance(note, str))
         return cls(
-            tuple(one for one in holds if isinstance(one, Hold)),
-            gravity if known else None,
+            tuple(hold for hold in holds if isinstance(hold, Hold)),
+            gravity if is_known else None,
             notes,
         )
 
     def placed(self, table: NodeTable) -> Boundary:
-        """Give it with the places of its nodes in a table of ids."""
+        """Return the same with node places in place of node ids."""
         return Boundary(
             placed(self.holds, table),
             self.gravity and placed(self.gravity, table),
@@ -121,21 +124,23 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Put places of nodes for their ids; nodes that are not in the table are left out."""
+    """Replace node ids by places in the table; nodes that are not in the table are dropped."""
     # The nodes of a joint are never None, which mypy reports for that kind alone.
     return tuple(
-        one if one.nodes is None else one._replace(nodes=table.known(one.nodes))  # type: ignore[redundant-expr]
-        for one in acting
+        load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
+        for load in acting
     )
 
 
 def ids(numbers: Iterable[int]) -> Places:
-    """Give node ids as an array, ascending."""
+    """Return node ids as an ascending array."""
     return np.array(sorted(numbers), np.int64)
 
 
 def plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
-    """Values that a function keeps from one point to the next, by a factor; none where it changes all the time.
+    """Return the values at which a function is constant between two points, times ``scale``.
+
+    Empty if it is never constant.
 
     Examples
     --------
@@ -143,16 +148,21 @@ def plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
     (0.0, 9.81)
     """
     return tuple(
-        sorted({scale * one for one, other in pairwise(ordinates) if one == other})
+        sorted(
+            {
+                scale * ordinate
+                for ordinate, next_ordinate in pairwise(ordinates)
+                if ordinate == next_ordinate
+            }
+        )
     )
 
 
 class Formulation(NamedTuple):
-    """How the elements of a part are computed: what to call it, and the class by which their cost is known.
+    """Formulation of the elements of a part: its name, and the class that defines their cost.
 
-    ``cost`` is a key of the weights, or None where nothing is known; ``measured`` tells whether the weight of its
-    class was measured for this formulation, or is taken over from one alike.  ``in_plane`` are the integration points
-    in each layer of a shell.
+    ``cost`` is a key of the weights, or None if it is unknown. ``measured``: the weight was measured for this
+    formulation, not for a similar one. ``in_plane`` is the number of integration points in each layer of a shell.
     """
 
     name: str
@@ -162,9 +172,11 @@ class Formulation(NamedTuple):
 
 
 class Material(NamedTuple):
-    """Name of a material, ``kind`` ("deformable", "rigid", "spring", "airbag", "void"), and what makes its wave speed.
+    """A material.
 
-    Numbers are None where the deck does not give them in a way that is followed.
+    Its keyword, ``kind`` ("deformable", "rigid", "spring", "airbag" or "void"), and its elastic constants.
+
+    Numbers are None if the deck does not define them in a way that can be read.
     """
 
     name: str
@@ -178,11 +190,11 @@ _NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
 
 class Section(NamedTuple):
-    """Section of a part: formulations by kind of element, thickness of shells, area of beams, damping of springs.
+    """Section of a part: formulations by kind of element, shell thickness, beam area, spring properties.
 
-    ``turns`` False: stresses of its solids do not turn with a rigid body.  ``damped`` is None where it is not known;
-    ``mass`` is that of one spring, ``stiffness`` its own along its length where that is constant; ``layers`` are
-    integration points through the thickness of shells.
+    ``turns`` is False if the stresses of its solids do not rotate with a rigid body. ``damped`` is None if it is
+    unknown. ``mass`` and ``stiffness`` are those of one spring; the stiffness is None if it is not constant. ``layers``
+    is the number of integration points through the shell thickness.
     """
 
     formulations: Mapping[str, Formulation] = _NO_FORMULATIONS
@@ -196,7 +208,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """What the deck says about one part besides its elements; ``unswitchable`` is why it must not be switched."""
+    """Data of one part without its elements; ``unswitchable`` is the reason why it must not be switched, or empty."""
 
     id: int
     title: str
@@ -209,14 +221,32 @@ class PartData(NamedTuple):
 class Inventory:
     """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
 
-    ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
-    ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
-    share no nodes; ``ties`` do too, but it is not known which; ``switched`` are rigid bodies that are there to be
-    switched.  ``watched`` are the places of nodes whose motion is
-    written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
-    ``history_groups`` are the ids of /THPART: groups of elements that a time history lists among its parts.
-    ``kept_off`` are main nodes of rigid bodies that a Radioss run keeps off, ``flaws`` what ruins it because of bodies.
-    ``boundary`` is what acts on the model from outside, ``left_rigid`` what stays rigid in a run that switches others.
+    Attributes
+    ----------
+    coordinates : array
+        Shape (nodes, 3), NaN for a node without coordinates [length].
+    notes : tuple of str
+        Cards that cannot be read; ``complete`` is False if elements or parts may be missing because of them.
+    joints, switched : tuple of Joint
+        Connections of parts that share no nodes, and rigid bodies that exist to be switched.
+    ties : tuple of str
+        Connections between unknown parts.
+    watched : array
+        Places of the nodes whose motion the run writes.
+    moved : bool
+        True if the deck moves nodes away from their coordinates.
+    files : tuple of SourceFile
+        All files of the deck.
+    history_groups : frozenset of int
+        Ids of /THPART: element groups that a time history lists among its parts.
+    kept_off : tuple of int
+        Main nodes of rigid bodies that a Radioss run keeps off.
+    flaws : tuple of Flaw
+        What makes a run with rigid bodies useless.
+    boundary : Boundary
+        Supports, prescribed motions and gravity.
+    left_rigid : LeftRigid, optional
+        Bodies that stay rigid in a run that switches others.
     """
 
     solver: str
@@ -239,85 +269,96 @@ class Inventory:
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
-        """Numbers of elements by part and kind."""
-        found: dict[int, Counter[str]] = {}
+        """Return the number of elements by part and kind."""
+        counts: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            _count(elements.kind, elements.part, found)
-        return found
+            _count(elements.kind, elements.part, counts)
+        return counts
 
     def formulation(self, part: int, kind: str) -> Formulation:
-        """How elements of a kind are computed in a part; without a cost where the deck does not tell."""
+        """Return the formulation of a kind of element in a part; its cost is None if the deck does not define it."""
         data = self.parts.get(part)
-        found = data.section.formulations.get(kind) if data else None
-        return found or Formulation(kind, None, measured=False)
+        formulation = data.section.formulations.get(kind) if data else None
+        return formulation or Formulation(kind, None, measured=False)
 
     def further_points(self, part: int, kind: str) -> int:
-        """Integration points of an element of a part beside those of one layer; of shells alone."""
+        """Return the number of integration points of a shell element beyond those of its first layer.
+
+        0 for other elements.
+        """
         data = self.parts.get(part)
-        layers = (
-            _LAYERS
-            if data is None or data.section.layers is None
-            else data.section.layers
-        )
+        if data is None or data.section.layers is None:
+            layers = _LAYERS
+        else:
+            layers = data.section.layers
         return self.formulation(part, kind).in_plane * max(layers - 1, 0)
 
     @cached_property
     def nodes_by_part(self) -> Mapping[int, Places]:
-        """Places of the nodes of every part, ascending."""
-        found: dict[int, list[Places]] = {}
+        """Return the places of the nodes of every part, ascending."""
+        pieces_by_part: dict[int, list[Places]] = {}
         for elements in self.elements:
             order = np.argsort(elements.part, kind="stable")
             parts, starts = np.unique(elements.part[order], return_index=True)
             for part, rows in zip(
                 parts.tolist(), np.split(order, starts[1:]), strict=True
             ):
-                found.setdefault(part, []).append(distinct(elements.nodes[rows]))
+                pieces_by_part.setdefault(part, []).append(
+                    distinct(elements.nodes[rows])
+                )
         joined = {
-            part: distinct(np.concatenate(pieces)) for part, pieces in found.items()
+            part: distinct(np.concatenate(pieces))
+            for part, pieces in pieces_by_part.items()
         }
         return {part: nodes[nodes != NO_NODE] for part, nodes in joined.items()}
 
     @cached_property
     def neighbours(self) -> Mapping[int, frozenset[int]]:
-        """Parts that share nodes with each part."""
-        times = np.zeros(len(self.coordinates), np.int32)
+        """Return for each part the parts that share nodes with it."""
+        owner_count = np.zeros(len(self.coordinates), np.int32)
         for nodes in self.nodes_by_part.values():
-            times[nodes] += 1
+            owner_count[nodes] += 1
         owners: dict[int, list[int]] = {}
         for part, nodes in self.nodes_by_part.items():
-            for node in nodes[times[nodes] > 1].tolist():
+            for node in nodes[owner_count[nodes] > 1].tolist():
                 owners.setdefault(node, []).append(part)
-        found: dict[int, set[int]] = {part: set() for part in self.nodes_by_part}
-        for together in {tuple(parts) for parts in owners.values()}:
-            for part in together:
-                found[part].update(other for other in together if other != part)
-        return {part: frozenset(others) for part, others in found.items()}
+        neighbours: dict[int, set[int]] = {part: set() for part in self.nodes_by_part}
+        for sharing in {tuple(parts) for parts in owners.values()}:
+            for part in sharing:
+                neighbours[part].update(
+                    neighbour for neighbour in sharing if neighbour != part
+                )
+        return {
+            part: frozenset(part_neighbours)
+            for part, part_neighbours in neighbours.items()
+        }
 
     @cached_property
     def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """By part the others that welds, ties or rigid bodies join to it, and what these are."""
-        holds = (
-            one
-            for one, whole in zip(self.switched, self.ready, strict=True)
+        """Return for each part the parts that joints connect to it, with the kinds of these joints."""
+        incomplete_bodies = (
+            body
+            for body, whole in zip(self.switched, self.ready, strict=True)
             if not whole
         )
-        return self._held_by([*self.joints, *holds])
+        return self._held_by([*self.joints, *incomplete_bodies])
 
     @cached_property
     def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """By part the others that springs hold to it, which then move against it."""
+        """Return for each part the parts connected to it by springs, which can move relative to it."""
         ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
         return self._held_by(
             [
                 Joint(SPRING, nodes[nodes != NO_NODE], frozenset())
-                for of in ends
-                for nodes in of
+                for spring_nodes in ends
+                for nodes in spring_nodes
             ]
         )
 
     def _held_by(
         self, joints: Sequence[Joint]
     ) -> Mapping[int, Mapping[int, frozenset[str]]]:
+        """Return for each part the parts that these joints connect to it, with the kinds of the joints."""
         wanted = np.zeros(len(self.coordinates), bool)
         for _, nodes, _ in joints:
             wanted[nodes] = True
@@ -325,50 +366,53 @@ class Inventory:
         for part, nodes in self.nodes_by_part.items():
             for node in nodes[wanted[nodes]].tolist():
                 owners.setdefault(node, set()).add(part)
-        found: dict[int, dict[int, frozenset[str]]] = {}
+        kinds_by_pair: dict[int, dict[int, frozenset[str]]] = {}
         for kind, nodes, parts in joints:
-            together = parts.union(*(owners.get(node, ()) for node in nodes.tolist()))
-            for part in together:
-                own = found.setdefault(part, {})
-                own.update(
+            linked_parts = parts.union(
+                *(owners.get(node, ()) for node in nodes.tolist())
+            )
+            for part in linked_parts:
+                part_links = kinds_by_pair.setdefault(part, {})
+                part_links.update(
                     {
-                        other: own.get(other, frozenset()) | {kind}
-                        for other in together
-                        if other != part
+                        linked_part: part_links.get(linked_part, frozenset()) | {kind}
+                        for linked_part in linked_parts
+                        if linked_part != part
                     }
                 )
-        return found
+        return kinds_by_pair
 
     @cached_property
     def ready(self) -> tuple[frozenset[int], ...]:
-        """Parts that lie whole in each of the rigid bodies that are there to be switched, springs left out."""
-        found = []
+        """Return for each rigid body in ``switched`` the parts that lie in it completely, without springs."""
+        whole_parts = []
         for _, nodes, parts in self.switched:
             mask = self._mask(parts)
             mask[nodes] = True
-            found.append(frozenset(part for part, own in self.nodes_by_part.items()
-                                   if not self._discrete(part) and mask[own].all()))  # fmt: skip
-        return tuple(found)
+            whole_parts.append(frozenset(part for part, part_nodes in self.nodes_by_part.items()
+                                   if not self._discrete(part) and mask[part_nodes].all()))  # fmt: skip
+        return tuple(whole_parts)
 
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Rigid bodies that these parts make: what springs hold together is one too, what nothing joins never is.
+        """Return the rigid bodies that these parts form: parts connected by nodes, joints or springs form one body.
 
-        A car with its engine on mounts is one body; engine, battery and wheels alone are several, as loose wheels are.
-        A rigid body that is there to be switched, and has none but these parts, makes one of those that it has;
-        parts on springs that it has in different ones stay apart.  Springs go with the body that has all their nodes.
+        A car with its engine on mounts is one body. Engine, battery and wheels alone are several, like loose wheels. If
+        all parts of a rigid body of the deck (attribute `switched`) are among these parts, they form one body. Springs
+        do not connect parts of two such bodies. A part of springs belongs to the body that contains all its nodes.
         """
         rigid = {part for part in parts if not self._discrete(part)} or set(parts)
         ready = [body for body in self.ready if body and body <= rigid]
-        of = {part: body for body in ready for part in body}
+        body_of_part = {part: body for body in ready for part in body}
 
         def linked(part: int) -> Iterable[int]:
-            own = of.get(part, frozenset[int]())
+            own_body = body_of_part.get(part, frozenset[int]())
             springs = (
-                other
-                for other in self.sprung.get(part, ())
-                if other in own or not (own and other in of)
+                sprung_part
+                for sprung_part in self.sprung.get(part, ())
+                if sprung_part in own_body
+                or not (own_body and sprung_part in body_of_part)
             )
-            return {*self._linked(part), *springs, *own}
+            return {*self._linked(part), *springs, *own_body}
 
         springs = set(parts) - rigid
         return tuple(
@@ -377,49 +421,53 @@ class Inventory:
         )
 
     def _within(self, body: Collection[int], springs: Collection[int]) -> list[int]:
-        """Those of some parts of springs whose nodes are all nodes of a body."""
+        """Return the parts of springs whose nodes all belong to a body."""
         mask = self._mask(body if springs else ())
         return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
     def _discrete(self, part: int) -> bool:
-        """Whether a part has springs alone: these hold no rigid body together, and move with it."""
+        """Return True if a part has only springs, which do not form a rigid body but move with one."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Groups of these parts that share nodes or are joined, directly or not."""
+        """Return the groups of these parts that share nodes or are joined, directly or indirectly."""
         return _together(parts, self._linked)
 
     def _linked(self, part: int) -> Iterable[int]:
+        """Return the parts that share nodes with a part or are joined to it."""
         return self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()
 
     def rigid_nodes(self, parts: Iterable[int]) -> int:
-        """Number of nodes of some parts."""
+        """Return the number of nodes of some parts."""
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Numbers of elements by part and kind that are rigid once these parts are rigid bodies.
+        """Return the number of elements by part and kind that are rigid once these parts are rigid bodies.
 
-        Radioss puts off every element whose nodes all lie in a body; LS-DYNA puts off those of the parts.
+        Radioss deactivates every element whose nodes all lie in a body, LS-DYNA the elements of the switched parts.
         """
         if self.solver != "radioss":
             return {part: self.counts[part] for part in parts if part in self.counts}
-        found: dict[int, Counter[str]] = {}
+        counts_by_part: dict[int, Counter[str]] = {}
         for body in self.bodies(parts):
             for part, counts in self._inside(body).items():
-                found[part] = found.get(part, Counter()) + counts
-        return found
+                counts_by_part[part] = counts_by_part.get(part, Counter()) + counts
+        return counts_by_part
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Numbers of elements whose nodes all lie in these parts."""
-        inside = np.append(self._mask(parts), True)  # the last stands for NO_NODE
-        found: dict[int, Counter[str]] = {}
+        """Return the number of elements by part and kind whose nodes all lie in these parts."""
+        inside = np.append(self._mask(parts), True)  # the last entry stands for NO_NODE
+        counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:
             _count(
-                elements.kind, elements.part[inside[elements.nodes].all(axis=1)], found
+                elements.kind,
+                elements.part[inside[elements.nodes].all(axis=1)],
+                counts_by_part,
             )
-        return found
+        return counts_by_part
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
+        """Return True for each node of some parts, shape (nodes,)."""
         mask = np.zeros(len(self.coordinates), bool)
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True
@@ -429,7 +477,8 @@ class Inventory:
 def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
     """Add elements of a kind to the counts of their parts."""
     for part, count in zip(
-        *(one.tolist() for one in np.unique(parts, return_counts=True)), strict=True
+        *(values.tolist() for values in np.unique(parts, return_counts=True)),
+        strict=True,
     ):
         counts.setdefault(part, Counter())[kind] += count
 
@@ -437,10 +486,13 @@ def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
 def _together(
     parts: Collection[int], linked: Callable[[int], Iterable[int]]
 ) -> tuple[tuple[int, ...], ...]:
-    """Groups of parts that are linked to each other, directly or not."""
-    left, found = set(parts), []
-    while left:
-        body = reached([min(left)], lambda part: left.intersection(linked(part)))
-        left.difference_update(body)
-        found.append(tuple(sorted(body)))
-    return tuple(sorted(found))
+    """Return the groups of parts that are linked to each other, directly or indirectly."""
+    remaining = set(parts)
+    groups = []
+    while remaining:
+        body = reached(
+            [min(remaining)], lambda part: remaining.intersection(linked(part))
+        )
+        remaining.difference_update(body)
+        groups.append(tuple(sorted(body)))
+    return tuple(sorted(groups))

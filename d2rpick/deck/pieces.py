@@ -1,7 +1,7 @@
-"""What hangs together of a mesh, node by node, what supports and imposed motions hold, and what swings on springs.
+"""Find connected pieces of a mesh, the supports of each part, and the longest period of masses on springs.
 
-Four wheels that nothing joins may be one part.  A support holds all that hangs together with its nodes.  A symmetry
-plane holds nothing: the model and its mirror image fly together as one body does.
+A part may consist of several pieces, such as four wheels. A support holds all pieces that are connected to its nodes. A
+symmetry plane does not hold the model: model and mirror image fly together like one body.
 """
 
 from __future__ import annotations
@@ -27,71 +27,12 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# What was found: a mesh may have millions of nodes.
+# Cached labels of the nodes of each deck: a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
 
-
-def pieces_of(
-    inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
-) -> int:
-    """Number of pieces of some parts that nothing joins; none without elements.
-
-    ``among`` are the parts through which they may hang together, by default the same; joints and springs count in any
-    case.
-    """
-    labels = labels_of(inventory, frozenset(parts if among is None else among))
-    nodes = [inventory.nodes_by_part.get(part, np.empty(0, np.int64)) for part in parts]
-    return np.unique(labels[np.concatenate(nodes)]).size
-
-
-def labels_of(
-    inventory: Inventory, parts: frozenset[int], *, springs: bool = True
-) -> Places:
-    """Number of the piece of each node of the deck (nodes,): what parts, springs and joints make hang together."""
-    known = _LABELS.setdefault(inventory, {})
-    if (parts, springs) not in known:
-        known[parts, springs] = _labels(inventory, parts, springs=springs)
-    return known[parts, springs]
-
-
-def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Places:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    size = len(inventory.coordinates)
-    ends = [
-        np.stack([np.repeat(one[:, 0], one.shape[1]), one.ravel()])
-        for one in _rows(inventory, parts, springs=springs)
-        if one.size
-    ]
-    links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
-    # older versions of scipy take no wider numbers
-    links = links[:, (links != NO_NODE).all(axis=0)].astype(np.int32)
-    graph = coo_array(
-        (np.ones(links.shape[1], bool), (links[0], links[1])), shape=(size, size)
-    )
-    return np.asarray(connected_components(graph, directed=False)[1])
-
-
-def _rows(
-    inventory: Inventory, parts: frozenset[int], *, springs: bool
-) -> Iterator[Places]:
-    """Nodes that hang together, a row each."""
-    wanted, own = np.array([*parts], np.int64), inventory.nodes_by_part
-    for elements in inventory.elements:
-        of_springs = np.full(len(elements.part), springs)
-        yield elements.nodes[
-            of_springs if elements.kind == SPRING else np.isin(elements.part, wanted)
-        ]
-    for _, nodes, named in inventory.joints:
-        yield np.concatenate([nodes, *(own[part] for part in named & own.keys())])[
-            np.newaxis
-        ]
-
-
-# Kinds of elements whose nodes do not turn.
+# Kinds of elements whose nodes have no rotations.
 _UNTURNED: Final = {
     "solid",
     "tetrahedron",
@@ -102,41 +43,108 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Nodes lie in one plane within this share of the size of what they belong to.
+# Nodes lie in one plane if they do so within this fraction of the size of their piece.
 _FLAT: Final = 1e-6
+# A piece below this fraction of the mass of all pieces on springs moves the others too little to matter.
+_HEAVY: Final = 0.05
+
+
+def pieces_of(
+    inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
+) -> int:
+    """Return the number of pieces of some parts that nothing connects; 0 without elements.
+
+    ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
+    """
+    labels = labels_of(inventory, frozenset(parts if among is None else among))
+    nodes = [inventory.nodes_by_part.get(part, np.empty(0, np.int64)) for part in parts]
+    return np.unique(labels[np.concatenate(nodes)]).size
+
+
+def labels_of(
+    inventory: Inventory, parts: frozenset[int], *, springs: bool = True
+) -> Places:
+    """Return for each node of the deck the number of its piece (nodes,); memoised.
+
+    Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
+    """
+    labels_by_parts = _LABELS.setdefault(inventory, {})
+    if (parts, springs) not in labels_by_parts:
+        labels_by_parts[parts, springs] = _labels(inventory, parts, springs=springs)
+    return labels_by_parts[parts, springs]
+
+
+def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Places:
+    """Compute the piece of each node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    size = len(inventory.coordinates)
+    ends = [
+        np.stack([np.repeat(row[:, 0], row.shape[1]), row.ravel()])
+        for row in _rows(inventory, parts, springs=springs)
+        if row.size
+    ]
+    links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
+    # older versions of scipy accept only 32-bit indices
+    links = links[:, (links != NO_NODE).all(axis=0)].astype(np.int32)
+    graph = coo_array(
+        (np.ones(links.shape[1], bool), (links[0], links[1])), shape=(size, size)
+    )
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _rows(
+    inventory: Inventory, parts: frozenset[int], *, springs: bool
+) -> Iterator[Places]:
+    """Yield arrays with connected nodes in each row."""
+    wanted = np.array([*parts], np.int64)
+    part_nodes = inventory.nodes_by_part
+    for elements in inventory.elements:
+        of_springs = np.full(len(elements.part), springs)
+        yield elements.nodes[
+            of_springs if elements.kind == SPRING else np.isin(elements.part, wanted)
+        ]
+    for _, nodes, joint_parts in inventory.joints:
+        yield np.concatenate(
+            [nodes, *(part_nodes[part] for part in joint_parts & part_nodes.keys())]
+        )[np.newaxis]
 
 
 def supports_of(
     inventory: Inventory,
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
-    """Give what holds each part that is held, and what holds the model.
+    """Return the supports of each part that has some, and the supports of the model.
 
-    What is fixed all over is an obstacle: it is held itself, and holds nothing that it does not hang together with.
+    A completely fixed piece is an obstacle: it is supported itself, but does not support a piece that it is not
+    connected to.
     """
     holds = inventory.boundary.holds
     if not holds:
         return {}, ()
-    own = inventory.nodes_by_part
-    labels = labels_of(inventory, frozenset(own))
-    held = [
-        np.concatenate([one.nodes, *(own[part] for part in one.parts & own.keys())])
-        for one in holds
+    part_nodes = inventory.nodes_by_part
+    labels = labels_of(inventory, frozenset(part_nodes))
+    hold_nodes = [
+        np.concatenate(
+            [hold.nodes, *(part_nodes[part] for part in hold.parts & part_nodes.keys())]
+        )
+        for hold in holds
     ]
     fixed = np.zeros((len(labels), 3), bool)
-    for one, nodes in zip(holds, held, strict=True):
-        if not one.counts and one.start <= 0 and np.isinf(one.end):
-            for axis in one.axes:
+    for hold, nodes in zip(holds, hold_nodes, strict=True):
+        if not hold.counts and hold.start <= 0 and np.isinf(hold.end):
+            for axis in hold.axes:
                 fixed[nodes, axis] = True
     turning = _turning(inventory)
     by_piece: dict[int, tuple[int, ...]] = {}
     whole: set[int] = set()
-    for piece, members in _pieces(inventory, labels, np.concatenate(held)):
+    for piece, members in _pieces(inventory, labels, np.concatenate(hold_nodes)):
         excused = _symmetries(inventory, members, fixed[members])
         by_piece[piece] = tuple(
             number
-            for number, (one, nodes) in enumerate(zip(holds, held, strict=True))
+            for number, (hold, nodes) in enumerate(zip(holds, hold_nodes, strict=True))
             if _counts(
-                one,
+                hold,
                 nodes[labels[nodes] == piece],
                 excused,
                 turning & ~fixed.any(axis=1),
@@ -144,95 +152,95 @@ def supports_of(
         )
         whole |= set() if fixed[members].all() else set(by_piece[piece])
     by_part = {part: sorted({number for piece in np.unique(labels[nodes]).tolist()
-                             for number in by_piece.get(piece, ())}) for part, nodes in own.items()}  # fmt: skip
-    named = {
+                             for number in by_piece.get(piece, ())}) for part, nodes in part_nodes.items()}  # fmt: skip
+    holds_by_part = {
         part: tuple(holds[number] for number in numbers)
         for part, numbers in by_part.items()
         if numbers
     }
-    return named, tuple(holds[number] for number in sorted(whole))
+    return holds_by_part, tuple(holds[number] for number in sorted(whole))
 
 
 def _pieces(
     inventory: Inventory, labels: Places, held: Places
 ) -> Iterator[tuple[int, Places]]:
-    """Pieces of which some nodes are held, and the nodes of elements in each."""
+    """Yield each piece with supported nodes, and the nodes of its elements."""
     used = np.unique(
         np.concatenate([np.empty(0, np.int64), *inventory.nodes_by_part.values()])
     )
     used = used[np.argsort(labels[used], kind="stable")]
-    of = labels[used]
+    node_labels = labels[used]
     for piece in np.unique(labels[held]).tolist():
-        members = used[slice(*np.searchsorted(of, [piece, piece + 1]))]
+        members = used[slice(*np.searchsorted(node_labels, [piece, piece + 1]))]
         if members.size:
             yield piece, members
 
 
 def _counts(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Whether a support holds some nodes of a piece; rotations count where translations are free."""
+    """Return True if a support holds some nodes of a piece; fixed rotations count if the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
 
 
 def _turning(inventory: Inventory) -> Mask:
-    """Whether each node has rotations."""
-    found = np.zeros(
+    """Return for each node True if it has rotations."""
+    has_rotations = np.zeros(
         len(inventory.coordinates) + 1, bool
-    )  # the last stands for NO_NODE
+    )  # the last entry stands for NO_NODE
     for elements in inventory.elements:
         if elements.kind not in _UNTURNED:
-            found[elements.nodes] = True
+            has_rotations[elements.nodes] = True
     for joint in inventory.joints:
-        found[joint.nodes] = True
-    return found[:-1]
+        has_rotations[joint.nodes] = True
+    return has_rotations[:-1]
 
 
 def _symmetries(inventory: Inventory, members: Places, fixed: Mask) -> frozenset[int]:
-    """Directions (of ``fixed``, (members, 3)) in which a piece is held as by a symmetry plane, or has no motion at all.
+    """Return the axes along which a piece is held by a symmetry plane, or fixed completely; ``fixed`` is (members, 3).
 
-    It lies on one side of the plane, which holds all of its nodes there, and gravity does not pull it against it.
+    The piece lies on one side of the plane, all its nodes on the plane are fixed, and gravity does not act along the
+    axis.
     """
     gravity = inventory.boundary.gravity
-    pulled = {None} if gravity is None else {one.axis for one in gravity}
-    if fixed.any(axis=0).all() or None in pulled:
+    gravity_axes = {None} if gravity is None else {load.axis for load in gravity}
+    if fixed.any(axis=0).all() or None in gravity_axes:
         return frozenset()
-    places = inventory.coordinates[members]
-    room = _FLAT * float(np.ptp(places, axis=0).max())
+    coordinates = inventory.coordinates[members]
+    tolerance = _FLAT * float(np.ptp(coordinates, axis=0).max())
     return frozenset(
         axis
         for axis in np.flatnonzero(fixed.any(axis=0)).tolist()
-        if axis not in pulled
+        if axis not in gravity_axes
         and (
             fixed[:, axis].all()
             or (
-                not inventory.moved and _is_plane(places[:, axis], fixed[:, axis], room)
+                not inventory.moved
+                and _is_plane(coordinates[:, axis], fixed[:, axis], tolerance)
             )
         )
     )
 
 
-def _is_plane(heights: NDArray[np.float64], fixed: Mask, room: float) -> bool:
+def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bool:
+    """Return True if the fixed nodes are all nodes on a plane that bounds the piece."""
     plane = heights[fixed][0]
-    beside = np.abs(heights - plane) <= room
-    one_side = heights.min() >= plane - room or heights.max() <= plane + room
-    return bool(one_side and (beside == fixed).all())
+    on_plane = np.abs(heights - plane) <= tolerance
+    one_side = heights.min() >= plane - tolerance or heights.max() <= plane + tolerance
+    return bool(one_side and (on_plane == fixed).all())
 
 
-# The longest period in which what springs hold together swings, by the masses and springs of a deck.
+# The longest period of pieces that oscillate on springs, from the masses and springs of a deck.
 #
-# A piece that hangs together without springs has mass m, those that its springs join it to have M: it swings against
-# them as their reduced mass mu = m M/(m + M) does.  By a spring of stiffness k along the unit vector l the stiffness
-# of all is the matrix K, the sum of k l l^T, and the period along an eigenvector of K is 2 pi (mu/lambda)^(1/2).  A
-# push is handed on first where the springs are stiffest, with the largest lambda; no period is below that with the
-# sum of all k, the trace of K.
-
-# What swings with a smaller share of the mass of all that hangs on springs moves the others too little.
-_HEAVY: Final = 0.05
+# A piece (connected without springs) has mass m, and the pieces that its springs connect to it have mass M.  The
+# reduced mass is mu = m M/(m + M).  A spring of stiffness k along the unit vector l adds k l l^T to the stiffness
+# matrix K.  The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).  A load is
+# transmitted first in the stiffest direction, so the period uses the largest lambda.  With the trace of K, the sum
+# of all k, it is the lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):
-    """The longest period [time], what it cannot be below [time], and in words what swings."""
+    """The longest period [time], its lower limit ``least`` [time], and a text that says what oscillates."""
 
     time: float
     least: float
@@ -240,50 +248,52 @@ class InnerPeriod(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """What hangs together without springs: its parts and its mass."""
+    """A piece connected without springs: its parts and its mass."""
 
     parts: frozenset[int]
     mass: float
 
 
 class _Spring(NamedTuple):
-    """A spring: its stiffness along its length as a matrix (3, 3), and the labels of what it joins."""
+    """A spring: its stiffness matrix (3, 3), and the labels of the pieces that it connects."""
 
     stiffness: Reals
     joins: frozenset[int]
 
 
 def inner_period(inventory: Inventory) -> InnerPeriod | None:
-    """Find the longest period in which the parts of a deck swing on springs against each other.
+    """Return the longest period in which the parts of a deck oscillate on springs relative to each other.
 
-    None where no springs join them, or the deck does not give every mass and stiffness in a way that is followed:
-    springs that are linear along their length (Radioss: /PROP/SPRING without functions).
+    None if no springs connect them, or a mass or stiffness is unknown: springs must be linear along their length
+    (Radioss: /PROP/SPRING without functions).
     """
-    stiff = frozenset(
+    stiff_parts = frozenset(
         part
         for part in inventory.nodes_by_part
         if not set(inventory.counts[part]) <= DISCRETE
     )
     if inventory.moved or not inventory.complete:
         return None
-    labels = labels_of(inventory, stiff, springs=False)
-    pieces = _masses_of_pieces(inventory, stiff, labels)
+    labels = labels_of(inventory, stiff_parts, springs=False)
+    pieces = _masses_of_pieces(inventory, stiff_parts, labels)
     springs = list(_springs(inventory, labels, pieces)) if pieces else []
     if not pieces or None in springs:
         return None
-    held = {
-        label: [one for one in springs if one and label in one.joins]
+    springs_by_piece = {
+        label: [spring for spring in springs if spring and label in spring.joins]
         for label in pieces
     }
-    whole = sum(piece.mass for label, piece in pieces.items() if held[label])
+    sprung_mass = sum(
+        piece.mass for label, piece in pieces.items() if springs_by_piece[label]
+    )
     heavy = [
         label
         for label in pieces
-        if held[label] and pieces[label].mass >= _HEAVY * whole
+        if springs_by_piece[label] and pieces[label].mass >= _HEAVY * sprung_mass
     ]
     return max(
-        (_period(label, pieces, held[label]) for label in heavy),
-        key=lambda one: one.time,
+        (_period(label, pieces, springs_by_piece[label]) for label in heavy),
+        key=lambda spring: spring.time,
         default=None,
     )
 
@@ -291,16 +301,23 @@ def inner_period(inventory: Inventory) -> InnerPeriod | None:
 def _masses_of_pieces(
     inventory: Inventory, parts: Collection[int], labels: Places
 ) -> Mapping[int, _Piece] | None:
-    """Pieces by their label; None where the mass of a part is not known."""
-    masses, made = masses_and_steps(inventory), dict[int, _Piece]()
+    """Return the pieces by label; None if the mass of a part is unknown."""
+    masses = masses_and_steps(inventory)
+    pieces_by_label = dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
     for elements in inventory.elements:
-        own, _ = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
+        element_sizes, _ = sizes_and_lengths(
+            elements.kind, elements.nodes, inventory.coordinates
+        )
         for part in set(np.unique(elements.part).tolist()) & sizes.keys():
-            of = elements.part == part
-            found, at = np.unique(labels[elements.nodes[of, 0]], return_inverse=True)
+            is_of_part = elements.part == part
+            piece_labels, label_index = np.unique(
+                labels[elements.nodes[is_of_part, 0]], return_inverse=True
+            )
             for label, size in zip(
-                found.tolist(), np.bincount(at, own[of]).tolist(), strict=True
+                piece_labels.tolist(),
+                np.bincount(label_index, element_sizes[is_of_part]).tolist(),
+                strict=True,
             ):
                 sizes[part][label] = sizes[part].get(label, 0.0) + size
     for part, pieces in sizes.items():
@@ -308,17 +325,18 @@ def _masses_of_pieces(
         if mass is None:
             return None
         for label, size in pieces.items():
-            before = made.get(label, _Piece(frozenset(), 0.0))
-            made[label] = _Piece(
-                before.parts | {part}, before.mass + mass * size / sum(pieces.values())
+            earlier = pieces_by_label.get(label, _Piece(frozenset(), 0.0))
+            pieces_by_label[label] = _Piece(
+                earlier.parts | {part},
+                earlier.mass + mass * size / sum(pieces.values()),
             )
-    return made
+    return pieces_by_label
 
 
 def _springs(
     inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]
 ) -> Iterator[_Spring | None]:
-    """Springs between two pieces; None for one that is not known."""
+    """Yield the springs between two pieces; None for a spring with unknown stiffness."""
     springs = (elements for elements in inventory.elements if elements.kind == SPRING)
     for elements in springs:
         for part, ends in zip(
@@ -329,11 +347,18 @@ def _springs(
                 continue
             data = inventory.parts.get(part)
             stiffness = data.section.stiffness if data else None
-            way = np.subtract(*inventory.coordinates[ends])
-            known = stiffness is not None and joins <= pieces.keys() and way.any()
+            direction = np.subtract(*inventory.coordinates[ends])
+            is_known = (
+                stiffness is not None and joins <= pieces.keys() and direction.any()
+            )
             yield (
-                _Spring(stiffness * np.outer(way, way) / (way @ way), joins)
-                if stiffness and known
+                _Spring(
+                    stiffness
+                    * np.outer(direction, direction)
+                    / (direction @ direction),
+                    joins,
+                )
+                if stiffness and is_known
                 else None
             )
 
@@ -341,20 +366,18 @@ def _springs(
 def _period(
     label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]
 ) -> InnerPeriod:
-    """Period in which a piece swings against those that springs join it to."""
-    piece, others = (
-        pieces[label],
-        frozenset[int]().union(*(one.joins for one in springs)) - {label},
-    )
-    mass = 1 / (1 / piece.mass + 1 / sum(pieces[one].mass for one in others))
-    stiffness = np.sum([one.stiffness for one in springs], axis=0)
-    most = float(np.linalg.eigvalsh(stiffness)[-1])
-    time, least = (
-        2 * math.pi * math.sqrt(mass / one)
-        for one in (most, float(np.trace(stiffness)))
-    )
+    """Return the period in which a piece oscillates relative to the pieces on the other ends of its springs."""
+    piece = pieces[label]
+    joined = frozenset[int]().union(*(spring.joins for spring in springs))
+    mass_of_others = sum(pieces[other].mass for other in joined - {label})
+    reduced_mass = 1 / (1 / piece.mass + 1 / mass_of_others)
+    stiffness = np.sum([spring.stiffness for spring in springs], axis=0)
+    largest = float(np.linalg.eigvalsh(stiffness)[-1])
+    total = float(np.trace(stiffness))
+    time = 2 * math.pi * math.sqrt(reduced_mass / largest)
+    shortest_period = 2 * math.pi * math.sqrt(reduced_mass / total)
     return InnerPeriod(
         time,
-        least,
+        shortest_period,
         f"{name_units(piece.parts)} of mass {piece.mass:.4g} on {len(springs)} springs",
     )

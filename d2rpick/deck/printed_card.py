@@ -1,4 +1,4 @@
-"""What the cards of all solvers share: what is asked for, what comes out, and how a number fits its columns."""
+"""Define what the cards of all solvers share: the options of a card, the printed card, and the number format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # columns of a field
-LONGEST = WIDTH - 1  # of a number: a blank stays between it and its neighbour
+LONGEST = WIDTH - 1  # characters of a number: a blank separates it from the next field
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
 _COMMENT_WIDTH = 78
@@ -34,22 +34,22 @@ PHYSICS = (
 
 
 class Printing(NamedTuple):
-    """What a card needs to say besides its times; a solver takes what its ``takes`` names.
+    """Options of a card besides its times; a solver uses the options listed in ``Solver.takes``.
 
     Attributes
     ----------
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int
-        Main nodes of the rigid bodies to be switched, for solvers that switch these.
+        Main nodes of the rigid bodies to switch, for solvers that switch bodies.
     off : tuple of int
         Main nodes of further rigid bodies, which stay off in all legs.
     merge : int, optional
-        Lead part that all others are merged into; without it each part becomes a body of its own.
+        Lead part into which all others are merged; without it each part becomes a rigid body of its own.
     bodies : tuple of tuple of int, optional
-        Parts that become one rigid body each; without ``merge`` those of a body are merged into its first.
+        Parts of each rigid body; without ``merge`` they are merged into the first part of their body.
     swset : pair of int
-        Ids of the two switch sets of the first window; those of further windows follow the larger one.
+        Ids of the two switch sets of the first window; further windows use the ids above the larger one.
     step_cap : float, optional
         Largest time step while rigid [time].
     end : float, optional
@@ -59,15 +59,17 @@ class Printing(NamedTuple):
     starter : str
         Cards that the starter deck of the run lacks.
     sensor : int
-        First id of sensors, where these switch.
+        First id of sensors, if sensors switch.
     contact, wall : int, optional
-        The contact, or the rigid wall, whose force switches, for solvers that take one.
+        Id of the contact, or of the rigid wall, whose force switches.
     pushed : tuple of (float, float)
-        When something pushes the parts, by a history [time]; ``speed`` is how fast they come to it [length/time].
+        Spans in which a contact force acts on the parts in a history [time].
+    speed : float, optional
+        Speed at which the parts approach the contact [length/time].
     delete_nodal_bodies, delete_node_sets : bool
         LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
     replaced : tuple of int
-        Main nodes of bodies that the new ones take the place of.
+        Main nodes of the bodies that new bodies replace.
     """
 
     part: tuple[int, ...] = ()
@@ -92,10 +94,10 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: ``text`` is all of it, ``files`` the same by the names that the solver expects.
+    """Solver input: ``text`` is all of it, ``files`` is the same by the file names that the solver expects.
 
-    ``windows`` are the times as printed, ``notes`` say where they are not those asked for.  ``starter`` are cards that
-    go into the starter deck, before its ``/END``, and ``sensors`` are those that switch bodies, by main node.
+    ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
+    for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
     """
 
     text: str
@@ -107,11 +109,11 @@ class PrintedCard:
 
 
 class Solver(NamedTuple):
-    """A solver whose input can be printed.
+    """A solver whose input d2rpick can print.
 
-    ``title`` is what people call it; ``histories`` are formats that it alone writes; ``switches`` is the field of
-    `Printing` that says whom it switches, ``takes`` are further ones; ``cards`` prints windows that follow each other,
-    with remarks as comments.
+    ``title`` is its name, ``histories`` are the formats that only this solver writes. ``switches`` is the field of
+    `Printing` that lists what it switches (parts or main nodes), ``takes`` are the further fields that it uses.
+    ``cards`` prints consecutive windows, with remarks as comments.
     """
 
     title: str
@@ -122,9 +124,9 @@ class Solver(NamedTuple):
 
 
 def shortest(value: float, width: int = LONGEST) -> str:
-    """Write a number in ``width`` characters so that it reads back, with as few of them as that takes.
+    """Return the shortest text of at most ``width`` characters that reads back as the number.
 
-    Where no text of that width reads back to the same double it is the nearest one that can be written.
+    If there is none, return the text that reads back as the nearest number.
 
     Examples
     --------
@@ -144,9 +146,9 @@ def shortest(value: float, width: int = LONGEST) -> str:
     fitting = [text for text in texts if len(text) <= width]
     if not fitting:
         raise DeckError(
-            f"{value:g} cannot be written in {width} columns, a number that fits was expected"
+            f"{value:g} cannot be written in {width} columns; give a number that fits"
         )
-    # exact before near, then with digits around a point, then short
+    # prefer an exact text, then digits on both sides of the point, then a short text
     return min(
         fitting,
         key=lambda text: (
@@ -159,7 +161,7 @@ def shortest(value: float, width: int = LONGEST) -> str:
 
 
 def comments(remarks: Sequence[str]) -> Iterator[str]:
-    """Remarks that cannot leave their comment lines, which are as long as those of the cards."""
+    """Yield remarks as lines that fit into the comment lines of a card."""
     for remark in remarks:
         yield from textwrap.wrap(
             printable(remark),
@@ -170,31 +172,31 @@ def comments(remarks: Sequence[str]) -> Iterator[str]:
 
 
 def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
-    """Return the windows, without the sign of a negative zero; DeckError unless they follow each other."""
+    """Return the windows with positive zeros; DeckError unless each begins after the one before."""
     if not windows:
-        raise DeckError("no window was given, at least one tr and td were expected")
+        raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
         if not 0 <= tr < td < math.inf:
             raise DeckError(f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected")
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:
-            what = "lies before" if end <= tr else "overlaps or touches"
-            found = f"the window {later:g} to {end:g} {what} the one given before it, {tr:g} to {td:g}"
+            relation = "lies before" if end <= tr else "overlaps or touches"
+            problem = f"the window {later:g} to {end:g} {relation} the one given before it, {tr:g} to {td:g}"
             raise DeckError(
-                f"{found}; windows of a part in the order of time were expected, apart from each other"
+                f"{problem}; give windows in the order of time that do not overlap"
             )
     return tuple((tr + 0.0, td) for tr, td in windows)
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
-    """Return ids that fit ``digits`` columns, each once; DeckError for any other, and for none at all."""
+    """Return the distinct ids; DeckError if there are none, or one does not fit into ``digits`` columns."""
     if not ids:
         raise DeckError(
-            "no id was given of what is switched, at least one was expected"
+            "no id of a part or body to switch was given, expected at least one"
         )
     for number in ids:
         if not 0 < number < 10**digits:
             raise DeckError(
-                f"id {number} does not fit, 1 to {10**digits - 1} was expected"
+                f"id {number} does not fit (expected 1 to {10**digits - 1})"
             )
     return list(dict.fromkeys(ids))

@@ -1,7 +1,7 @@
-"""Switching windows as solver input: one function per solver, one table of solvers.
+"""Print switching windows as solver input, with one function per solver and one table of solvers.
 
-LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window.  Radioss: engine files whose legs end at the
-switching times, with /RBODY/ON and /RBODY/OFF, or sensors of times that switch in one run.
+LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
+times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-_CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # without a force, with one
+_CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # CODE for no force and for a force
 _OF_OFFSET: Final = "OFFSET was not tried with the solver: it should exceed the thickness of the contact."
-_DELETE, _ACTIVATE = 1, 2  # constraints on the parts, by NRBF and NCSF
+_DELETE, _ACTIVATE = 1, 2  # values of NRBF and NCSF for constraints on the parts
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
     "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
@@ -54,178 +54,6 @@ _DELETED = (
     "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
 )
 _CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
-
-
-def _ls_dyna(
-    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
-) -> PrintedCard:
-    """Print two unpaired CODE 0 sets for each window, their times in at most 9 characters.
-
-    Raises
-    ------
-    DeckError
-        If windows do not follow each other, as given or as printed, or an id does not fit.
-    """
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
-    sets = list(_sets(printing.swset, len(windows)))
-    if printing.merge is not None:
-        check_ids(
-            [printing.merge], LONGEST
-        )  # stands right of an id, with a blank between them
-    texts = [(shortest(tr), shortest(td)) for tr, td in windows]
-    _check_printed([text for pair in texts for text in pair])
-    notes = tuple(
-        note
-        for times, pair in zip(windows, texts, strict=True)
-        for note in _roundings(times, pair)
-    )
-    told = (*notes, *_warnings(ids, printing), *comments(remarks))
-    spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
-    lines = [
-        *comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
-        *told,
-    ]
-    lines = [f"$ {line}" for line in lines]
-    part_sets = number_sets(
-        (ids, *group_by_lead(ids, printing).values()), printing.swset[0]
-    )
-    for members, number in part_sets.items():
-        lines += write_part_set(members, number)
-    for pair, numbers in zip(texts, sets, strict=True):
-        lines += _window(pair, numbers, ids, printing, part_sets)
-    text = "\n".join(lines) + "\n"
-    return PrintedCard(
-        text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes
-    )
-
-
-def _window(
-    texts: tuple[str, str],
-    sets: tuple[int, int],
-    ids: Sequence[int],
-    printing: Printing,
-    part_sets: PartSets,
-) -> Iterator[str]:
-    rigid, free = (
-        [*to_rigid(ids, printing, part_sets)],
-        [*to_deformable(ids, part_sets)],
-    )  # with a comment each
-    cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted, activated = _constraint_flags(printing)
-    yield from (
-        *header(
-            sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted
-        ),
-        *rigid,
-    )
-    yield from (
-        *header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated),
-        *free,
-    )
-
-
-def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
-    """Give NRBF and NCSF of the set that makes parts rigid, and of the one that makes them deformable."""
-    asked = (printing.delete_nodal_bodies, printing.delete_node_sets)
-    return [flag * _DELETE for flag in asked], [flag * _ACTIVATE for flag in asked]
-
-
-def _ls_dyna_contact(
-    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
-) -> PrintedCard:
-    """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or rigid wall (1 and 3).
-
-    The windows of the card are those in which the pair switches in the history.
-
-    Raises
-    ------
-    DeckError
-        As `_ls_dyna` does, and if no wait gives as many windows as are planned.
-    """
-    from d2rpick.deck.contact_timing import (
-        time_pair,
-    )  # not above: other cards do without
-
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
-    kind, number, pushes = _force_of(printing)
-    free, forced = _CODES[kind]
-    timing = time_pair(windows, pushes)
-    first, second = printing.swset
-    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
-    rigid, back = (
-        [*to_rigid(ids, printing, part_sets)],
-        [*to_deformable(ids, part_sets)],
-    )
-    cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
-    waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
-    returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
-    spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
-    told = (
-        *comments(
-            [f"Rigid from {spans} in the history; written by d2rpick {__version__}"]
-        ),
-    )
-    told += (*_warnings(ids, printing), *_BY_FORCE[:2], _OF_OFFSET, *comments(remarks))
-    lines = [f"$ {line}" for line in told]
-    for members, name in part_sets.items():
-        lines += write_part_set(members, name)
-    deleted, activated = _constraint_flags(printing)
-    earliest, counts = shortest(timing.earliest), (len(rigid) - 1, 0)
-    lines += (
-        *header(first, earliest, shortest(cap), counts, waits, deleted),
-        *rigid,
-        *header(second, "0.0", "0.0", (0, len(back) - 1), returns, activated),
-        *back,
-    )
-    text = "\n".join(lines) + "\n"
-    return PrintedCard(text, timing.windows, {_FILE: text})
-
-
-def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
-    """Ids of the switch sets of each window, all different."""
-    if first[0] == first[1]:
-        raise DeckError(
-            f"both switch sets are {first[0]}, two different ids were expected"
-        )
-    above = max(first) + 1
-    check_ids([*first, above + 2 * count])
-    yield first
-    yield from ((above + 2 * i, above + 2 * i + 1) for i in range(count - 1))
-
-
-def _check_printed(texts: Sequence[str]) -> None:
-    for one, other in pairwise(texts):
-        if float(one) >= float(other):
-            found = f"two switching times are both {one} in {LONGEST} characters"
-            raise DeckError(f"{found}, different times were expected")
-
-
-def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
-    for name, value, text in zip(("tr", "td"), asked, texts, strict=True):
-        if float(text) != value:
-            off = f"{float(text) - value:+.1e} off {value!r}"
-            yield f"{name} is printed as {text}, {off}: nearest in {LONGEST} characters."
-
-
-def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
-    yield from (
-        *PHYSICS,
-        *(_DELETED if deleted else _LEFT_ACTIVE),
-        "Springs and dampers are not switched.",
-        _CAPPED,
-    )
-    if printing.merge is None and printing.bodies:
-        yield from (
-            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
-            for body in printing.bodies
-            if len(body) > 1
-        )
-    elif printing.merge is None and len(ids) > 1:
-        yield "Merge parts that share nodes (d2rpick card --merge), never loose ones."
-    elif printing.merge is not None and printing.merge not in ids:
-        yield f"Part {printing.merge} is the lead: it must be rigid already."
-
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _OF_RADIOSS = (
@@ -250,20 +78,217 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
+DEFAULT: Final = "ls-dyna"  # solver for histories that name none
+
+
+def _ls_dyna(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
+    """Print two unpaired CODE 0 sets for each window, with times of at most 9 characters.
+
+    Raises
+    ------
+    DeckError
+        If windows overlap or are not in order, as given or as printed, or an id does not fit.
+    """
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.part)
+    sets = list(_sets(printing.swset, len(windows)))
+    if printing.merge is not None:
+        # The lead id follows another id in the same line, separated by a blank.
+        check_ids([printing.merge], LONGEST)
+    texts = [(shortest(tr), shortest(td)) for tr, td in windows]
+    _check_printed([text for pair in texts for text in pair])
+    notes = tuple(
+        note
+        for times, pair in zip(windows, texts, strict=True)
+        for note in _roundings(times, pair)
+    )
+    comment_lines = (*notes, *_warnings(ids, printing), *comments(remarks))
+    spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
+    lines = [
+        *comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
+        *comment_lines,
+    ]
+    lines = [f"$ {line}" for line in lines]
+    part_sets = number_sets(
+        (ids, *group_by_lead(ids, printing).values()), printing.swset[0]
+    )
+    for members, number in part_sets.items():
+        lines += write_part_set(members, number)
+    for pair, numbers in zip(texts, sets, strict=True):
+        lines += _window(pair, numbers, ids, printing, part_sets)
+    text = "\n".join(lines) + "\n"
+    return PrintedCard(
+        text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes
+    )
+
+
+def _window(
+    texts: tuple[str, str],
+    sets: tuple[int, int],
+    ids: Sequence[int],
+    printing: Printing,
+    part_sets: PartSets,
+) -> Iterator[str]:
+    # Both begin with a comment line.
+    """Yield the lines of the two switch sets of one window."""
+    rigid_lines = [*to_rigid(ids, printing, part_sets)]
+    deformable_lines = [*to_deformable(ids, part_sets)]
+    cap = printing.step_cap or choose_step_cap(*map(float, texts))
+    deleted, activated = _constraint_flags(printing)
+    yield from (
+        *header(
+            sets[0],
+            texts[0],
+            shortest(cap),
+            (len(rigid_lines) - 1, 0),
+            constraints=deleted,
+        ),
+        *rigid_lines,
+    )
+    yield from (
+        *header(
+            sets[1],
+            texts[1],
+            "0.0",
+            (0, len(deformable_lines) - 1),
+            constraints=activated,
+        ),
+        *deformable_lines,
+    )
+
+
+def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
+    """Return NRBF and NCSF of the set that makes parts rigid, and of the set that makes them deformable."""
+    is_deleted = (printing.delete_nodal_bodies, printing.delete_node_sets)
+    return [flag * _DELETE for flag in is_deleted], [
+        flag * _ACTIVATE for flag in is_deleted
+    ]
+
+
+def _ls_dyna_contact(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
+    """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or of a rigid wall (CODE 1 and 3).
+
+    The windows of the card are those in which the pair switches in the history.
+
+    Raises
+    ------
+    DeckError
+        As `_ls_dyna`, and if no TIME3 gives as many windows as planned.
+    """
+    from d2rpick.deck.contact_timing import (
+        time_pair,
+    )  # not above: other cards do without
+
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.part)
+    kind, number, pushes = _force_of(printing)
+    free, forced = _CODES[kind]
+    timing = time_pair(windows, pushes)
+    first, second = printing.swset
+    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
+    rigid_lines = [*to_rigid(ids, printing, part_sets)]
+    deformable_lines = [*to_deformable(ids, part_sets)]
+    cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
+    waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
+    returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
+    spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
+    comment_lines = (
+        *comments(
+            [f"Rigid from {spans} in the history; written by d2rpick {__version__}"]
+        ),
+    )
+    comment_lines += (
+        *_warnings(ids, printing),
+        *_BY_FORCE[:2],
+        _OF_OFFSET,
+        *comments(remarks),
+    )
+    lines = [f"$ {line}" for line in comment_lines]
+    for members, name in part_sets.items():
+        lines += write_part_set(members, name)
+    deleted, activated = _constraint_flags(printing)
+    earliest = shortest(timing.earliest)
+    counts = (len(rigid_lines) - 1, 0)
+    lines += (
+        *header(first, earliest, shortest(cap), counts, waits, deleted),
+        *rigid_lines,
+        *header(
+            second,
+            "0.0",
+            "0.0",
+            (0, len(deformable_lines) - 1),
+            returns,
+            activated,
+        ),
+        *deformable_lines,
+    )
+    text = "\n".join(lines) + "\n"
+    return PrintedCard(text, timing.windows, {_FILE: text})
+
+
+def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
+    """Yield the ids of the two switch sets of each window, all different."""
+    if first[0] == first[1]:
+        raise DeckError(f"both switch sets have id {first[0]}; give two different ids")
+    above = max(first) + 1
+    check_ids([*first, above + 2 * count])
+    yield first
+    yield from ((above + 2 * i, above + 2 * i + 1) for i in range(count - 1))
+
+
+def _check_printed(texts: Sequence[str]) -> None:
+    """Raise DeckError unless each printed time is later than the one before."""
+    for text, next_text in pairwise(texts):
+        if float(text) >= float(next_text):
+            problem = f"two switching times are both {text} in {LONGEST} characters"
+            raise DeckError(f"{problem}; give different times")
+
+
+def _roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
+    """Yield a note for each time that the card cannot write exactly."""
+    for name, value, text in zip(("tr", "td"), times, texts, strict=True):
+        if float(text) != value:
+            difference = f"{float(text) - value:+.1e} off {value!r}"
+            yield f"{name} is printed as {text}, {difference}: nearest in {LONGEST} characters."
+
+
+def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
+    """Yield the comment lines of an LS-DYNA card."""
+    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    yield from (
+        *PHYSICS,
+        *(_DELETED if deleted else _LEFT_ACTIVE),
+        "Springs and dampers are not switched.",
+        _CAPPED,
+    )
+    if printing.merge is None and printing.bodies:
+        yield from (
+            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
+            for body in printing.bodies
+            if len(body) > 1
+        )
+    elif printing.merge is None and len(ids) > 1:
+        yield "Merge parts that share nodes (d2rpick card --merge), never loose ones."
+    elif printing.merge is not None and printing.merge not in ids:
+        yield f"Part {printing.merge} is the lead: it must be rigid already."
 
 
 def _radioss(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print the engine files, a leg up to each switch and one to the end.
+    """Print the engine files: one leg up to each switch, and one to the end of the run.
 
-    The main nodes are those of /RBODY in the starter file, of bodies without sensor.  Without a cap the step is
-    held below a thousandth of the rigid window while the bodies are rigid.
+    The main nodes are those of /RBODY in the starter deck, for bodies without sensor. Without a given limit, the time
+    step is at most 1/1000 of the rigid window while the bodies are rigid.
 
     Raises
     ------
     DeckError
-        If windows do not follow each other, an id does not fit, or the run does not end after the last window.
+        If windows overlap or are not in order, an id does not fit, or the run does not end after the last window.
     """
     windows, ids, end = _of_run(windows, printing)
     files = {
@@ -279,9 +304,9 @@ def _radioss(
 def _radioss_sensors(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print sensors of times that switch the bodies with these main nodes, and one engine file for the whole run.
+    """Print time sensors that switch the bodies with these main nodes, and one engine file for the whole run.
 
-    The largest step holds for the whole run, so that it is the least of those that the windows ask for.
+    The time-step limit applies to the whole run, so it is the least of the limits of the windows.
 
     Raises
     ------
@@ -301,14 +326,14 @@ def _radioss_sensors(
 def _radioss_contact(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print a sensor of the force of a contact or rigid wall, by which the bodies are deformable in the contacts.
+    """Print a force sensor of a contact or rigid wall that makes the bodies deformable during contacts.
 
-    The windows of the card are those in which it switches in the history.
+    The windows of the card are those in which the sensor switches in the history.
 
     Raises
     ------
     DeckError
-        As `_radioss` does, and if no wait gives as many windows as are planned.
+        As `_radioss`, and if no Tdelay gives as many windows as planned.
     """
     from d2rpick.deck.contact_timing import time_sensor
 
@@ -320,33 +345,37 @@ def _radioss_contact(
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
         (timing.latest, math.inf)
     ]
-    how = (
+    explanation = (
         f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).",
         *_BY_FORCE,
     )
     sensors = _sensors(spans, printing.sensor, [sensor])
-    return _of_sensors(timing.windows, printing, sensors, (*how, *remarks))
+    return _of_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
 
 
 def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
-    """Give the kind and number of what pushes, and when; DeckError unless one is given and a history shows it."""
+    """Return kind, id and contact times of the contact or wall.
+
+    Raises
+    ------
+    DeckError
+        Unless one contact or wall is given and the history shows when its force acts.
+    """
     from d2rpick.deck.contact_timing import Pushes
 
     if (printing.contact is None) == (printing.wall is None):
         raise DeckError(
-            "a card for switches by force needs one `contact`, or one rigid `wall`, by its number"
+            "a card for switches by force needs one `contact`, or one rigid `wall`, by its id"
         )
     if not printing.pushed:
         raise DeckError(
             "a card for switches by force needs a history with the force of that contact or wall, or with momenta of"
             " the parts"
         )
-    kind, number = (
-        ("INTER", printing.contact)
-        if printing.contact is not None
-        else ("RWALL", printing.wall)
-    )
-    return kind, number or 0, Pushes(printing.pushed, printing.speed)
+    pushes = Pushes(printing.pushed, printing.speed)
+    if printing.contact is not None:
+        return "INTER", printing.contact, pushes
+    return "RWALL", printing.wall or 0, pushes
 
 
 def _of_sensors(
@@ -359,7 +388,8 @@ def _of_sensors(
     from d2rpick.deck.radioss_sensors import STOPS_SINCE
 
     texts, last = sensors
-    ids, end = check_ids(printing.node), printing.end or 0.0
+    ids = check_ids(printing.node)
+    end = printing.end or 0.0
     cap = min(
         leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None
     )
@@ -371,26 +401,33 @@ def _of_sensors(
     )
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
     nodes = ", ".join(map(str, ids))
-    how = (
+    instructions = (
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
     )
-    slow = (
+    step_warning = (
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
         " where it takes fewer without switching, set --step-cap to the deformable step or more."
     )
-    told = _told(
-        tuple(windows), printing, (*_OF_SENSORS, *how, slow, *remarks), files, texts
+    card = _told(
+        tuple(windows),
+        printing,
+        (*_OF_SENSORS, *instructions, step_warning, *remarks),
+        files,
+        texts,
     )
-    return replace(told, sensors=dict.fromkeys(ids, last), notes=(*told.notes, slow))
+    return replace(
+        card, sensors=dict.fromkeys(ids, last), notes=(*card.notes, step_warning)
+    )
 
 
 def _sensors(
     spans: Sequence[Times], first: int, further: Sequence[str] = ()
 ) -> tuple[str, int]:
-    """Write sensors with ids from ``first`` on, and give the id of the one that is active in one of ``spans``.
+    """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines all of them.
 
-    ``further`` are sensors, with a place for their id, while which it is active too.
+    It is active in each of ``spans`` and while one of ``further`` is active; these texts have a placeholder for their
+    id.
     """
     from d2rpick.deck.radioss_sensors import NEVER
 
@@ -402,11 +439,11 @@ def _sensors(
     kinds += further
     texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
     last = first
-    for number, other in enumerate(
+    for number, next_sensor in enumerate(
         range(first + 1, first + len(kinds)), start=first + len(kinds)
     ):
         texts.append(
-            f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n"
+            f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{next_sensor:10d}\n"
         )
         last = number
     return "".join(texts), last
@@ -415,19 +452,25 @@ def _sensors(
 def _of_run(
     windows: Sequence[Times], printing: Printing
 ) -> tuple[tuple[Times, ...], list[int], float]:
-    """Return the windows, main nodes and end of a run; DeckError where they do not make one."""
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.node)
+    """Return windows, main nodes and end of a run.
+
+    Raises
+    ------
+    DeckError
+        If a window, a main node, the name or the end is missing or wrong.
+    """
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.node)
     if not _RUN_NAME.fullmatch(printing.name):
         raise DeckError(
-            f"the name of the run is {printing.name!r}, letters, digits, '.', '_' and '-' were expected"
+            f"the name of the run is {printing.name!r} (expected letters, digits, '.', '_' and '-')"
         )
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:
-        found = (
-            "the end of the run is not given"
-            if printing.end is None
-            else f"the run ends at {printing.end:g}"
-        )
-        raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
+        if printing.end is None:
+            problem = "the end of the run is not given"
+        else:
+            problem = f"the run ends at {printing.end:g}"
+        raise DeckError(f"{problem}, expected a time after td = {windows[-1][1]:g}")
     return windows, ids, printing.end
 
 
@@ -436,14 +479,15 @@ def _told(
     printing: Printing,
     remarks: Sequence[str],
     files: Mapping[str, str],
-    more: str = "",
+    further_cards: str = "",
 ) -> PrintedCard:
-    """Put comments, cards for the starter deck and engine files together."""
+    """Combine comments, cards for the starter deck and engine files to a card."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
     head = comments(
         [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]
     )
-    text, starter = "".join(f"# {line}\n" for line in head), printing.starter + more
+    text = "".join(f"# {line}\n" for line in head)
+    starter = printing.starter + further_cards
     text += (
         f"# ---- into {printing.name}_0000.rad, before /END\n{starter}"
         if starter
@@ -482,11 +526,10 @@ SOLVERS: Final[Mapping[str, Solver]] = {
         _radioss_contact,
     ),
 }
-DEFAULT: Final = "ls-dyna"  # of histories that name no solver
 
 
 def solver_of(history_format: str) -> str:
-    """Name the solver that wrote a history of this format (several are joined by ``+``).
+    """Return the solver that wrote a history of this format; several formats are joined by ``+``.
 
     Examples
     --------
@@ -506,14 +549,14 @@ def cards(
     solver: str = DEFAULT,
     remarks: Sequence[str] = (),
 ) -> PrintedCard:
-    """Print the cards of windows.
+    """Print the card for some windows.
 
     Parameters
     ----------
     windows : sequence of (float, float)
-        tr and td of each [time of the model], 0 <= tr < td, each after the one before.
+        tr and td of each window [time of the model], 0 <= tr < td, each after the one before.
     printing : Printing
-        Whom the card switches, and what else it says.
+        Parts or bodies to switch, and further options.
     solver : str
         A key of `SOLVERS`.
     remarks : sequence of str
@@ -522,7 +565,7 @@ def cards(
     Raises
     ------
     DeckError
-        If windows do not follow each other, or the solver's input cannot say what is asked for.
+        If windows overlap or are not in order, or an option does not fit the solver's input.
 
     Examples
     --------

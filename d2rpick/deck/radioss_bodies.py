@@ -1,7 +1,7 @@
-"""The rigid bodies that a Radioss deck lacks: cards for its starter deck, one /RBODY for each group of joined parts.
+"""Write the rigid bodies that a Radioss deck lacks, as cards for its starter deck: one /RBODY for each group of parts.
 
 Source: Altair's public help for /RBODY, /GRNOD, /INIVEL and /GRAV, and runs computed with OpenRadioss: gravity and
-initial velocities act on a rigid body only by its main node.
+initial velocities act on a rigid body only through its main node.
 """
 
 from __future__ import annotations
@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
 
 _PER_LINE: Final = 10
-_STAYS: Final = 1  # Ikrem: the starter leaves the nodes in rigid walls
-# Where cards that act on a group of nodes name it: columns of 10, in the first line below the title.
+_STAYS: Final = (
+    1  # value of Ikrem with which the starter keeps the nodes in rigid walls
+)
+# Field (of 10 columns, from 0) that names the node group, in the first line below the title.
 _GROUP_OF_VELOCITY: Final = {"TRA": 6, "ROT": 6, "T+G": 6, "GRID": 6, "AXIS": 2}
 _GROUP_OF_GRAVITY: Final = 4
 
@@ -47,9 +49,9 @@ _GROUP_OF_GRAVITY: Final = 4
 class Bodies(NamedTuple):
     """Rigid bodies that switch some parts.
 
-    ``nodes`` are the main nodes of all of them; ``cards`` is what the starter deck lacks, to stand before its /END,
-    empty where it has all; ``notes`` say what these cards add.  ``sensor`` and all ids above it are free for sensors.
-    ``replaced`` are main nodes of bodies that have to leave the starter deck.
+    ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
+    /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
+    ``replaced`` are the main nodes of bodies that have to be removed from the starter deck.
     """
 
     nodes: tuple[int, ...]
@@ -60,24 +62,24 @@ class Bodies(NamedTuple):
 
 
 def bodies_for(path: str, parts: Collection[int]) -> Bodies:
-    """Find the rigid bodies of some parts in a Radioss deck, and write those that it lacks.
+    """Find the rigid bodies of some parts in a Radioss deck, and write the missing ones.
 
-    A new body has a new main node at the centre of mass of its parts and takes all their nodes (/GRNOD/PART).  Initial
-    velocities and gravity of groups of nodes get the main node too.  Bodies are on by default: the first leg has to
-    put them off.
+    A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
+    is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first leg has to
+    deactivate them.
 
     Parameters
     ----------
     path : str
         A file of the run.
     parts : collection of int
-        Ids of the parts to be switched.
+        Ids of the parts to switch.
 
     Raises
     ------
     DeckError
-        If the deck is no whole Radioss deck, a part has no elements, or a rigid body of the deck holds some of their
-        nodes and cannot switch them.
+        If the deck is not a complete Radioss deck, a part has no elements, or a rigid body of the deck contains some of
+        their nodes and cannot switch them.
     """
     run = read_run(path)
     starter = _whole(run)
@@ -85,49 +87,53 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
     groups = NodeGroups(starter)
     if unknown := sorted(part for part in parts if not _nodes([part], groups)):
         raise DeckError(
-            f"{path}: {name_units(unknown)} {are(unknown)} without nodes that are followed; name others"
+            f"{path}: {name_units(unknown)} {are(unknown)} without elements that can be read; give other parts"
         )
-    nodes, lacking = list[int](), list[tuple[int, ...]]()
+    nodes = list[int]()
+    lacking = list[tuple[int, ...]]()
     unused = frozenset(kept_off(run.legs))
     for group in inventory.bodies(parts):
-        there = _ready(starter, inventory, group, groups, unused)
-        nodes += there
-        if not there:
+        main_nodes = _ready(starter, inventory, group, groups, unused)
+        nodes += main_nodes
+        if not main_nodes:
             lacking.append(group)
-    made = _Made(starter, inventory, groups)
-    texts = [made.body(group) for group in lacking]
+    new_bodies = _Made(starter, inventory, groups)
+    texts = [new_bodies.body(group) for group in lacking]
     mains = tuple(main for main, _ in texts)
     notes = tuple(
         f"/RBODY with main node {main} is new, for {name_units(group)}{_apart(inventory, group)}"
         for main, group in zip(mains, lacking, strict=True)
     )
     cards = "".join(text for _, text in texts)
-    gone = replaced(run, cards)
+    replaced_bodies = replaced(run, cards)
     notes += tuple(
-        f"/RBODY {body.id}, which every leg of the run keeps off, has to go ({body.card.at}): a new one takes its nodes"
-        for body in gone
+        f"/RBODY {body.id} ({body.card.at}) is off in the whole run and must be removed: a new body takes its nodes"
+        for body in replaced_bodies
     )
     return Bodies(
         (*nodes, *mains),
         cards,
         notes,
-        made.next("SENSOR"),
-        tuple(body.node.value for body in gone),
+        new_bodies.next("SENSOR"),
+        tuple(body.node.value for body in replaced_bodies),
     )
 
 
 def replaced(run: Run, cards: str) -> tuple[Body, ...]:
-    """Give the bodies of a run that its legs keep off all the time, and whose nodes new bodies in ``cards`` take.
+    """Return the bodies that are off in the whole run and whose nodes belong to new bodies in ``cards``.
 
-    A node lies in one body, so that these have to leave the starter deck.
+    A node belongs to one body, so these bodies have to be removed from the starter deck.
     """
     if run.starter is None or not cards:
         return ()
     added = Starter(blocks=[*blocks(SourceFile("the card", cards.encode()))])
     members = [
-        known for body in added.bodies if (known := added.group_members(body.group))
+        group_members
+        for body in added.bodies
+        if (group_members := added.group_members(body.group))
     ]
-    groups, unused = NodeGroups(run.starter), frozenset(kept_off(run.legs))
+    groups = NodeGroups(run.starter)
+    unused = frozenset(kept_off(run.legs))
     taken = _nodes({part for _, parts in members for part in parts}, groups)
     return tuple(
         body
@@ -137,25 +143,27 @@ def replaced(run: Run, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Whether a body is never rigid; ``unused`` are the main nodes of those that no leg puts on."""
+    """Return True if a body is never rigid; ``unused`` are the main nodes of the bodies that no leg activates."""
     return body.node.value in unused and not body.sensor
 
 
 def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
+    """Return a remark if the body joins pieces that nothing else connects."""
     pieces = pieces_of(inventory, parts)
-    return (
-        f"; it keeps {pieces} pieces together that nothing joins" if pieces > 1 else ""
-    )
+    if pieces > 1:
+        return f"; it joins {pieces} pieces that nothing else connects"
+    return ""
 
 
 def _stiff(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Those of some parts that are not springs alone; of springs alone all."""
+    """Return the parts that do not consist of springs alone; all parts if each of them does."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
 
 
 def _nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
+    """Return the ids of all nodes of some parts."""
     return frozenset(
         node
         for part in parts
@@ -164,26 +172,32 @@ def _nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
 
 
 def _whole(run: Run) -> Starter:
-    """Give the starter deck; DeckError where ids, nodes or their places may be unknown."""
-    starter, path = run.starter, run.deck.path
+    """Return the starter deck.
+
+    Raises
+    ------
+    DeckError
+        If ids, nodes or their positions may be unknown.
+    """
+    starter = run.starter
+    path = run.deck.path
     if starter is None:
         raise DeckError(
-            f"{path}: the run has no starter deck (NAME_0000.rad); name a run that has one"
+            f"{path}: the run has no starter deck (NAME_0000.rad); give a run that has one"
         )
-    for one in run.deck.unread:
+    for include in run.deck.unread:
         raise DeckError(
-            f"{one.name.at}: {one.name.text} was not read: {one.reason}; its ids may be those of new cards"
+            f"{include.name.at}: {include.name.text} was not read ({include.reason}), so free ids are unknown; add it"
         )
-    for block, told in cuts(run.deck):
-        raise DeckError(f"{block.source.name}: {told} Complete it first")
+    for block, sign in cuts(run.deck):
+        raise DeckError(f"{block.source.name}: {sign} Complete the file first")
     if starter.moved or starter.transformed:
-        what = (
-            "ids of a //SUBMODEL may be moved"
-            if starter.moved
-            else "/TRANSFORM moves nodes"
-        )
+        if starter.moved:
+            problem = "ids of a //SUBMODEL may be moved"
+        else:
+            problem = "/TRANSFORM moves nodes"
         raise DeckError(
-            f"{path}: {what}, which is not followed; write the /RBODY by hand, and name its main node"
+            f"{path}: {problem}, which d2rpick does not evaluate; write the /RBODY yourself and give its main node"
         )
     return starter
 
@@ -195,46 +209,56 @@ def _ready(
     groups: NodeGroups,
     unused: Collection[int],
 ) -> tuple[int, ...]:
-    """Main nodes of the bodies of the deck that hold a group of parts.
+    """Return the main nodes of the bodies in the deck that contain exactly a group of parts.
 
-    None where it has nothing of it in any, or in bodies alone that are never rigid, which a new one replaces.
+    Empty if no body contains any of their nodes, or only bodies that are never rigid, which a new one replaces.
     """
     stiff = set(_stiff(inventory, group))
-    own = _nodes(stiff, groups)
-    touching = [body for body in starter.bodies if _touches(body, groups, own)]
+    group_nodes = _nodes(stiff, groups)
+    touching = [body for body in starter.bodies if _touches(body, groups, group_nodes)]
     if not touching:
         return ()
-    held = rigid_parts(starter, {body.node.value: body.group for body in touching})
-    whole = {node: set(_stiff(inventory, parts)) for node, parts in held.items()}
-    found = frozenset[int]().union(*whole.values())
+    parts_by_body = rigid_parts(
+        starter, {body.node.value: body.group for body in touching}
+    )
+    stiff_by_body = {
+        node: set(_stiff(inventory, parts)) for node, parts in parts_by_body.items()
+    }
+    held_parts = frozenset[int]().union(*stiff_by_body.values())
     if (
-        found == stiff
-        and all(whole.values())
+        held_parts == stiff
+        and all(stiff_by_body.values())
         and not any(body.sensor for body in touching)
     ):
         return tuple(body.node.value for body in touching)
-    if all(_is_unused(one, unused) for one in touching):
+    if all(_is_unused(body, unused) for body in touching):
         return ()
     body = next(
-        (one for one in touching if one.sensor or not whole[one.node.value] <= stiff),
+        (
+            body
+            for body in touching
+            if body.sensor or not stiff_by_body[body.node.value] <= stiff
+        ),
         touching[0],
     )
-    place, who = f"{body.card.at}: /RBODY {body.id}", name_units(sorted(stiff))
+    location = f"{body.card.at}: /RBODY {body.id}"
+    part_names = name_units(sorted(stiff))
     if body.sensor:
         raise DeckError(
-            f"{place} of {who} is switched by sensor {body.sensor} already; remove that first"
+            f"{location} of {part_names} is switched by sensor {body.sensor} already; remove the sensor first"
         )
     raise DeckError(
-        f"{place} holds nodes of {who}, but not these parts alone and whole: a node lies in one body;"
-        " name the parts that it holds, or remove it"
+        f"{location} contains nodes of {part_names}, but not exactly these parts, and a node belongs to one body;"
+        " give the parts that it contains, or remove it"
     )
 
 
 def _touches(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
+    """Return True if a body contains one of these nodes."""
     members = groups.members(body.group)
     if members is None:
         raise DeckError(
-            f"{body.card.at}: the nodes of /RBODY {body.id} are not known; name them by parts or numbers"
+            f"{body.card.at}: the nodes of /RBODY {body.id} are unknown; define its group by parts or node ids"
         )
     return body.node.value in nodes or not nodes.isdisjoint(members)
 
@@ -253,8 +277,10 @@ class _Made:
         self._free = {"NODE": int(nodes_of(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Main node and cards of the body of some parts, with what moves and pulls its main node."""
-        node, group, alone = self.next("NODE"), self.next("GRNOD"), self.next("GRNOD")
+        """Return main node and cards of a new body of some parts, with the velocities and gravity of its main node."""
+        node = self.next("NODE")
+        group = self.next("GRNOD")
+        alone = self.next("GRNOD")
         moving = "".join(self._moving(parts, alone))
         x, y, z = self._centre(parts)
         text = f"/NODE\n{node:10d}{x:20.12g}{y:20.12g}{z:20.12g}\n"
@@ -269,21 +295,24 @@ class _Made:
         return node, text
 
     def next(self, kind: str) -> int:
-        """Give an id above all that cards of a kind have."""
+        """Return an unused id above all ids of a kind of card."""
         if kind not in self._free:
             words = (keyword(block) for block in self._starter.blocks)
             ids = (
                 whole(word)
-                for first, *others in words
+                for first, *further_words in words
                 if first == kind
-                for word in others
+                for word in further_words
             )
             self._free[kind] = max(ids, default=0)
         self._free[kind] += 1
         return self._free[kind]
 
     def _centre(self, parts: Sequence[int]) -> Reals:
-        """Centre of mass (3,) [length]; where a mass is not known the mean of the nodes: the starter moves it there."""
+        """Return the centre of mass (3,) [length], or the mean of the nodes if a mass is unknown.
+
+        The starter corrects it.
+        """
         parts = _stiff(self._inventory, parts)
         masses = [
             mass
@@ -302,24 +331,29 @@ class _Made:
         )
 
     def _moving(self, parts: Sequence[int], alone: int) -> Iterator[str]:
-        """Give the main node what moves or pulls the nodes of its body."""
-        own = _nodes(parts, self._groups)
+        """Yield the initial velocities and gravity that act on the nodes of the body, for its main node."""
+        body_nodes = _nodes(parts, self._groups)
         for card in self._starter.named("INIVEL"):
             column = _GROUP_OF_VELOCITY.get("".join(card.words[1:2]))
-            reached = own & self._reached(card, column)
-            if reached and (column is None or reached != own):
+            reached = body_nodes & self._reached(card, column)
+            if reached and (column is None or reached != body_nodes):
                 raise DeckError(
-                    f"{card.at}: it does not move all nodes of {name_units(parts)} as one body, and the starter gives"
-                    " them the velocity of the main node; write the /RBODY by hand, or move all of them by one card"
+                    f"{card.at}: it does not give all nodes of {name_units(parts)} one velocity, as the starter does"
+                    " with a rigid body; write the /RBODY yourself, or use one card for all nodes"
                 )
             if reached and column is not None:
                 yield self._again(card, column, alone)
         for card in self._starter.named("GRAV"):
-            if below_title(card) and own & self._reached(card, _GROUP_OF_GRAVITY):
+            if below_title(card) and body_nodes & self._reached(
+                card, _GROUP_OF_GRAVITY
+            ):
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)
 
     def _reached(self, card: Card, column: int | None) -> frozenset[int]:
-        """Nodes of the group that a card names in a column, or those that it lists; none of one that acts on all."""
+        """Return the nodes of the group in a column of a card, or the nodes that it lists.
+
+        Empty for a card without group.
+        """
         rows = card.rows[1:]
         if column is None:
             return frozenset(card.integer(row, 0).value for row in rows)
@@ -328,19 +362,22 @@ class _Made:
         )
         if members is None:
             raise DeckError(
-                f"{card.at}: its nodes are not known; name them by parts or numbers"
+                f"{card.at}: its nodes are unknown; define its group by parts or node ids"
             )
         return members
 
     def _again(self, card: Card, column: int, group: int) -> str:
-        """Write a card with a new id and another group."""
-        title, first, *rest = (row.text for row in card.rows)
+        """Return a copy of a card with a new id and another node group."""
+        title, first, *further_lines = (row.text for row in card.rows)
         at = 1 + (card.words[0] == "INIVEL")
         head = "/".join(
             ["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]]
         )
-        before, after = (
-            first[: 10 * column].ljust(10 * column),
-            first[10 * (column + 1) :],
+        text_before = first[: 10 * column].ljust(10 * column)
+        text_after = first[10 * (column + 1) :]
+        return (
+            "\n".join(
+                [head, title, f"{text_before}{group:10d}{text_after}", *further_lines]
+            )
+            + "\n"
         )
-        return "\n".join([head, title, f"{before}{group:10d}{after}", *rest]) + "\n"

@@ -1,7 +1,7 @@
-"""Keyword blocks of Radioss files: engine files, with legs of a run and the rigid bodies they switch, and the starter.
+"""Read keyword blocks of Radioss files: the legs in engine files and the bodies they switch, and the starter deck.
 
-A block is a line that begins with ``/``, and the data lines below it.  Columns of the starter: Altair's public help for
-/RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
+A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
+for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
 """
 
 from __future__ import annotations
@@ -29,11 +29,40 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # of an id
+_DIGITS = 10  # most digits of an id
+
+# Elements whose stresses do not rotate with a rigid body.
+WITHOUT_FRAME: Final = {
+    "TETRA4",
+    "TETRA10",
+    "BRIC20",
+    "SHEL16",
+}
+_WIDTH: Final = 10
+# Fields (of 10 columns) of main node, sensor, group and Ikrem; the mass before the group takes two.
+_OF_BODY: Final = (
+    0,
+    1,
+    6,
+    7,
+)
+# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
+_IRIGID: Final = 5
+_OF_RIGID_PART: Final = (0, 5)
+_RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
+_ICOROTATIONAL: Final = 2  # value of Iframe
+# Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
+_NOT_TURNED: Final = {
+    1,
+    2,
+    12,
+}
+_DEFAULT_ISOLID: Final = 1
+SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
-    """Keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
+    """Yield keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
     start: tuple[int, str] | None = None
     for position, raw in _marks(source):
         if start:
@@ -46,7 +75,10 @@ def blocks(source: SourceFile) -> Iterator[Block]:
 
 
 def _marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
-    """Lines that begin with ``/`` or ``#include``, and where; found without a look at each line of a mesh."""
+    """Yield offset and text of the lines that begin with ``/`` or ``#include``.
+
+    Lines of a mesh are not looked at one by one.
+    """
     position = 0
     for lines in source.pieces(0):
         yield from ((position + at, raw) for at, raw in _marked(lines))
@@ -54,14 +86,15 @@ def _marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _marked(lines: bytes) -> list[tuple[int, bytes]]:
-    found = [0] if lines[:1] in (b"/", b"#") else []
+    """Return the same for a piece of whole lines."""
+    offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
         while at >= 0:
-            found.append(at + 1)
+            offsets.append(at + 1)
             at = lines.find(mark, at + 1)
     marked = [
-        (at, lines[at : lines.find(b"\n", at) + 1 or None]) for at in sorted(found)
+        (at, lines[at : lines.find(b"\n", at) + 1 or None]) for at in sorted(offsets)
     ]
     return [
         (at, raw)
@@ -71,40 +104,38 @@ def _marked(lines: bytes) -> list[tuple[int, bytes]]:
 
 
 def keyword(block: Block) -> tuple[str, ...]:
-    """Words of a keyword line in upper case; empty for an ``#include``.
+    """Return the words of a keyword line in upper case; empty for an ``#include``.
 
-    The name of the run in ``/RUN/name/1`` is in upper case too: `Card.block` has it as written.
+    The run name in ``/RUN/name/1`` is in upper case too; `Card.block` has it as written.
     """
-    return (
-        tuple(word.strip().upper() for word in block.head[1:].split("/"))
-        if block.head.startswith("/")
-        else ()
-    )
+    if block.head.startswith("/"):
+        return tuple(word.strip().upper() for word in block.head[1:].split("/"))
+    return ()
 
 
 def whole(text: str) -> int:
-    """Read an id of a keyword line or of 10 columns; 0 for what is none."""
+    """Read an id from a keyword line or a field of 10 columns; 0 for other text."""
     text = text.strip()
     return int(text) if text.isdecimal() and len(text) <= _DIGITS else 0
 
 
 def card_of(block: Block) -> Card:
-    """Show a block as a card, whose fields are 10 columns wide."""
+    """Return a block as a card with fields of 10 columns."""
     return Card("/".join(keyword(block)), block, Scope())
 
 
 def number_of(card: Card, at: int = 1) -> int:
-    """Id in the keyword of a card, as one of its words; 0 for none."""
+    """Return the id at a position of the keyword; 0 if there is none."""
     return whole("".join(card.words[at:][:1]))
 
 
 def below_title(card: Card) -> tuple[Row, ...]:
-    """Lines that are not blank, below that of the title, which may be blank."""
+    """Return the lines below the title that are not blank; the title itself may be blank."""
     return tuple(row for row in card.rows[1:] if not row.blank)
 
 
 class Start(NamedTuple):
-    """An /INIV: velocities given at the start of a leg to ranges of nodes, or to a group of nodes (else 0)."""
+    """An /INIV: velocities at the start of a leg for ranges of nodes, or for a node group (0 for none)."""
 
     card: Card
     ranges: tuple[tuple[int, int], ...]
@@ -113,26 +144,26 @@ class Start(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Leg:
-    """One engine run: its name and number as /RUN gives them, its end, the main nodes it switches, its step limit."""
+    """One engine run: name and number from /RUN, its end, the main nodes that it switches, and its time-step limit."""
 
     run: Card
     name: str
     number: int
     stop: Value[float]
+    # Each card with True if it makes bodies rigid, and its main nodes.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
-    )  # True: made rigid
+    )
     cap: Value[float] | None = None
     version: str = ""
     starts: list[Start] = field(default_factory=list)
-    resets: list[int] = field(
-        default_factory=list
-    )  # sensors that are reset at its start
-    sensor: int = 0  # which ends it, at a time that nobody knows before
+    # Sensors that are reset at its start.
+    resets: list[int] = field(default_factory=list)
+    sensor: int = 0  # sensor that ends it, at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[Leg]:
-    """Read the legs of a file: one, or several where printed cards are read as they come."""
+    """Read the legs of a file: one, or several for printed cards in one text."""
     legs: list[Leg] = []
     waiting: list[Card] = []
     for card in map(card_of, blocks(source)):
@@ -145,31 +176,32 @@ def read_legs(source: SourceFile) -> list[Leg]:
 
 
 def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
-    """Main nodes of the bodies that the first leg puts off and none puts on, in the order of the file."""
-    states = {
-        node.value: rigid
-        for leg in legs[:1]
-        for _, rigid, nodes in leg.switched
-        for node in nodes
-        if node.value
-    }
-    on = {
-        node.value
-        for leg in legs
-        for _, rigid, nodes in leg.switched
-        for node in nodes
-        if rigid
-    }
-    return tuple(node for node, rigid in states.items() if not rigid and node not in on)
+    """Return the main nodes that the first leg deactivates and no leg activates, in the order of the file."""
+    is_rigid_in_first_leg: dict[int, bool] = {}
+    activated: set[int] = set()
+    for index, leg in enumerate(legs):
+        for _, rigid, nodes in leg.switched:
+            numbers_of_card = [node.value for node in nodes]
+            if rigid:
+                activated.update(numbers_of_card)
+            if index == 0:
+                is_rigid_in_first_leg.update(dict.fromkeys(numbers_of_card, rigid))
+    return tuple(
+        node
+        for node, rigid in is_rigid_in_first_leg.items()
+        if node and not rigid and node not in activated
+    )
 
 
 def _leg(card: Card) -> Leg:
-    missing = Value(0.0, card.here, "the end of the run is missing below /RUN")
+    """Begin a leg with its /RUN."""
+    missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
     return Leg(card, name, number_of(card, 2), next(numbers(card), missing))
 
 
 def _take(leg: Leg, card: Card) -> None:
+    """Add a card of an engine file to its leg."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(
@@ -188,72 +220,48 @@ def _take(leg: Leg, card: Card) -> None:
 
 
 def _start(card: Card) -> Start:
-    """Read whom an /INIV moves: single nodes, by type 1 first and last of ranges, by type 2 a group.
+    """Read the nodes of an /INIV: type 0 lists nodes, type 1 first and last node of ranges, type 2 a node group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
     type_ = number_of(card, 3)
-    before = 5 if card.words[1:2] == ("AXIS",) else 1  # numbers of the velocity
-    ids = [_integer(value).value for value in numbers(card)][before:]
+    if card.words[1:2] == ("AXIS",):
+        velocity_count = 5
+    else:
+        velocity_count = 1
+    ids = [_integer(value).value for value in numbers(card)][velocity_count:]
     if type_ == 2:
         return Start(card, (), ids[0] if ids else 0)
-    pairs = (
-        zip(ids[::2], ids[1::2], strict=False)
-        if type_ == 1
-        else zip(ids, ids, strict=True)
-    )
+    if type_ == 1:
+        pairs = zip(ids[::2], ids[1::2], strict=False)
+    else:
+        pairs = zip(ids, ids, strict=True)
     return Start(card, tuple(pairs), 0)
 
 
 def numbers(card: Card) -> Iterator[Value[float]]:
-    """All numbers below a keyword, in free format."""
+    """Yield all numbers below a keyword, in free format."""
     for distance, line in card.block.lines():
         column = 0
         for word in line.split():
             column = line.index(word, column)
-            place = Field(word, card.block, distance, column + 1)
+            word_field = Field(word, card.block, distance, column + 1)
             column += len(word)
             try:
-                yield Value(float(number(word)), place)
+                yield Value(float(number(word)), word_field)
             except ExpressionError as error:
-                yield Value(0.0, place, str(error))
+                yield Value(0.0, word_field, str(error))
 
 
 def _integer(value: Value[float]) -> Value[int]:
+    """Return a number as an integer."""
     if not value.problem and value.value != int(value.value):
         return Value(0, value.field, f"{value.field.text!r} is not an integer")
     return Value(int(value.value), value.field, value.problem)
 
 
-WITHOUT_FRAME: Final = {
-    "TETRA4",
-    "TETRA10",
-    "BRIC20",
-    "SHEL16",
-}  # their stresses do not turn with a rigid body
-_WIDTH: Final = 10
-_OF_BODY: Final = (
-    0,
-    1,
-    6,
-    7,
-)  # main node, sensor, group, Ikrem in columns of 10: the mass between takes two
-# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
-_IRIGID: Final = 5
-_OF_RIGID_PART: Final = (0, 5)
-_RIGID_PARTS_SINCE: Final = 2612  # version of the format
-_ICOROTATIONAL: Final = 2  # Iframe
-_NOT_TURNED: Final = {
-    1,
-    2,
-    12,
-}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
-_DEFAULT_ISOLID: Final = 1
-SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
-
-
 class PartLine(NamedTuple):
-    """What /PART says: ids of property, material and subset."""
+    """Title of a /PART, and its ids of property, material and subset."""
 
     title: str
     prop: int
@@ -263,42 +271,43 @@ class PartLine(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Starter:
-    """What a starter deck says about its rigid bodies; by its ``blocks`` from the files ``sources``."""
+    """A starter deck: its ``blocks`` in reading order, from the files ``sources``."""
 
     sources: list[SourceFile] = field(default_factory=list)
     blocks: list[Block] = field(default_factory=list)
 
     @cached_property
     def cards(self) -> Sequence[Card]:
-        """All blocks as cards, in reading order."""
+        """Return all blocks as cards, in reading order."""
         return [card_of(block) for block in self.blocks]
 
     def named(self, *keywords: str) -> list[Card]:
-        """Cards whose first word is one of these."""
+        """Return the cards whose keyword begins with one of these words."""
         return [card for card in self.cards if card.words[0] in keywords]
 
     @cached_property
     def version(self) -> int:
-        """That of the format."""
-        found = [card for card in self.named("BEGIN") if card.rows]
-        rows = below_title(found[-1]) if found else ()
-        return found[-1].integer(rows[0], 0).value if rows else 0
+        """Return the input version of /BEGIN; 0 if there is none."""
+        begin_cards = [card for card in self.named("BEGIN") if card.rows]
+        rows = below_title(begin_cards[-1]) if begin_cards else ()
+        return begin_cards[-1].integer(rows[0], 0).value if rows else 0
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Rigid bodies, each with all that is merged into it.
+        """Return the rigid bodies, each with all bodies that are merged into it.
 
-        One of /RBODY/LAGMUL, whose keyword has no id there, is never switched.
+        A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
         return self.rigid.bodies
 
     @cached_property
     def rigid(self) -> RigidBodies:
-        """Rigid bodies as the engine has them."""
+        """Return the rigid bodies as the engine has them."""
         written = [*self._written_bodies(), *self._bodies_of_parts()]
         return make_rigid_bodies(written, [*self._merges()], self._last_node)
 
     def _written_bodies(self) -> Iterator[Body]:
+        """Yield the bodies of /RBODY."""
         for card in self.named("RBODY"):
             for row in below_title(card)[: number_of(card) > 0]:
                 node, sensor, group, keeps = (card.integer(row, at) for at in _OF_BODY)
@@ -308,7 +317,7 @@ class Starter:
                 )
 
     def _bodies_of_parts(self) -> Iterator[Body]:
-        """Bodies that the starter makes of parts with Irigid 1."""
+        """Yield the bodies that the starter makes of parts with Irigid 1."""
         for card in self.named("PART") if self.version >= _RIGID_PARTS_SINCE else ():
             if len(card.rows) > 2 and card.integer(card.rows[1], _IRIGID).value == 1:
                 node, sensor = (card.integer(card.rows[2], at) for at in _OF_RIGID_PART)
@@ -324,25 +333,27 @@ class Starter:
                 )
 
     def _merges(self) -> Iterator[Merge]:
+        """Yield the lines of /MERGE/RBODY."""
         for card in self.named("MERGE"):
             for row in below_title(card) if card.words[1:2] == ("RBODY",) else ():
-                main, main_kind, other, kind = (
+                main, main_kind, merged, kind = (
                     card.integer(row, at).value for at in range(4)
                 )
-                yield Merge(main_kind or BODY, main, kind or BODY, other)
+                yield Merge(main_kind or BODY, main, kind or BODY, merged)
 
     def _last_node(self) -> int:
-        """Highest id of a node."""
+        """Return the highest node id."""
         return max(self._node_ids(), default=0)
 
     def _node_ids(self) -> Iterator[int]:
+        """Yield the ids of all nodes."""
         for card in self.named("NODE"):
             for _, line in card.block.lines():
                 yield whole(line[:_WIDTH])
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
-        """What /PART says, by the ids of the parts."""
+        """Return the /PART lines by part id."""
         return {
             number_of(card): PartLine(
                 card.rows[0].text.strip(),
@@ -354,18 +365,18 @@ class Starter:
 
     @cached_property
     def subsets(self) -> Mapping[int, tuple[int, ...]]:
-        """Ids of the subsets in each."""
+        """Return the ids of the subsets in each subset."""
         return {
             number_of(card): _ids(below_title(card)) for card in self.named("SUBSET")
         }
 
     @cached_property
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
-        """What a group of nodes is made of, and the ids of that."""
-        found = (card for card in self.named("GRNOD") if card.words[1:])
+        """Return the kind of members of each node group (NODE, PART, SUBSET or GRNOD) and their ids."""
+        group_cards = (card for card in self.named("GRNOD") if card.words[1:])
         written = {
             number_of(card, 2): (card.words[1], _ids(below_title(card)))
-            for card in found
+            for card in group_cards
         }
         rigid_parts = {
             body.group: ("PART", (body.part,)) for body in self._bodies_of_parts()
@@ -374,43 +385,44 @@ class Starter:
 
     @cached_property
     def sensors(self) -> Mapping[int, Card]:
-        """Cards of the sensors by id."""
+        """Return the sensor cards by id."""
         return {
             number_of(card, 2): card for card in self.named("SENSOR") if card.words[1:]
         }
 
     @property
     def moved(self) -> bool:
-        """Whether a submodel may offset its ids."""
-        return bool(self.named(""))  # before the second slash of //SUBMODEL
+        """Return True if a submodel may offset ids."""
+        return bool(self.named(""))  # //SUBMODEL has no word between its slashes
 
     @property
     def transformed(self) -> bool:
-        """Whether nodes are moved."""
+        """Return True if the deck moves nodes."""
         return bool(self.named("TRANSFORM"))
 
     @property
     def unturned(self) -> dict[int, str]:
-        """Parts of solids whose stresses do not turn with a rigid body, and of which kind these are."""
+        """Return the kind of elements of solids whose stresses do not rotate with a rigid body, by part."""
         defaults = [
             _isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        isolid, iframe = defaults[0] if defaults else (0, 0)  # the first one counts
+        isolid, iframe = defaults[0] if defaults else (0, 0)  # the first card is used
         solids = (
             card
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
+        # The flags of each property; their line may be blank.
         flags = {
             number_of(card, 2): _isolid_and_iframe(card, card.rows[1])
             for card in solids
-        }  # it may be blank
+        }
         props = {
             prop
-            for prop, (own, frame) in flags.items()
-            if (own or isolid or _DEFAULT_ISOLID) in _NOT_TURNED
+            for prop, (prop_isolid, frame) in flags.items()
+            if (prop_isolid or isolid or _DEFAULT_ISOLID) in _NOT_TURNED
             and (frame or iframe) != _ICOROTATIONAL
         }
         bricks = {number_of(card) for card in self.named("BRICK")}
@@ -419,15 +431,18 @@ class Starter:
             for part, line in self.parts.items()
             if part in bricks and line.prop in props
         ]
-        found = dict.fromkeys(turned, "bricks with Isolid 1, 2 or 12 without Iframe 2")
-        others = map(number_of, self.named(*WITHOUT_FRAME))
-        return found | dict.fromkeys(
-            others, "tetrahedra, 20-node bricks or 16-node shells"
+        formulations = dict.fromkeys(
+            turned, "bricks with Isolid 1, 2 or 12 without Iframe 2"
+        )
+        parts_without_frame = map(number_of, self.named(*WITHOUT_FRAME))
+        return formulations | dict.fromkeys(
+            parts_without_frame, "tetrahedra, 20-node bricks or 16-node shells"
         )
 
     def group_members(self, group: int) -> tuple[set[int], set[int]] | None:
-        """Nodes and whole parts of a group of nodes; None where they cannot be known."""
-        nodes, parts = set[int](), set[int]()
+        """Return the nodes and the complete parts of a node group; None if they are unknown."""
+        nodes = set[int]()
+        parts = set[int]()
         for kind, ids in map(self._group, reached([group], self._groups_in)):
             if kind in ("NODE", "NODENS"):
                 nodes.update(ids)
@@ -438,16 +453,16 @@ class Starter:
             elif kind in ("MAT", "PROP"):
                 parts.update(self._parts_of(kind, ids))
             elif kind == "SUBSET":
-                below = {*reached(ids, lambda one: self.subsets.get(one, ()))}
+                below = {*reached(ids, lambda number: self.subsets.get(number, ()))}
                 parts.update(
                     part for part, line in self.parts.items() if line.subset in below
                 )
-            elif kind != "GRNOD" or any(one <= 0 for one in ids):
+            elif kind != "GRNOD" or any(number <= 0 for number in ids):
                 return None
         return nodes, parts
 
     def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
-        """Give the nodes of the deck from a first to a last one, of each pair of ends."""
+        """Yield the nodes of the deck in ranges, given by pairs of first and last node."""
         ranges = [
             range(first, last + 1)
             for first, last in zip(ends[::2], ends[1::2], strict=False)
@@ -457,25 +472,28 @@ class Starter:
                 yield node
 
     def _parts_of(self, kind: str, ids: Collection[int]) -> Iterator[int]:
-        """Give the parts that have one of some materials, or properties."""
+        """Yield the parts with one of some materials, or properties."""
         for part, line in self.parts.items():
             if (line.material if kind == "MAT" else line.prop) in ids:
                 yield part
 
     def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
+        """Return kind and ids of the members of a group."""
         return self.groups.get(group, ("", ()))
 
     def _groups_in(self, group: int) -> tuple[int, ...]:
+        """Return the node groups in a group."""
         kind, ids = self._group(group)
         return ids if kind == "GRNOD" else ()
 
 
 def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
+    """Return the values of Isolid and Iframe in a line."""
     return card.integer(row, 0).value, card.integer(row, 7).value
 
 
 def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Ids on lines of 10 columns; a word ends what can be followed and counts as -1."""
+    """Return the ids on lines with fields of 10 columns; -1 for text that is not an id."""
     cells = [
         row.text[start : start + _WIDTH].strip()
         for row in rows
@@ -485,7 +503,7 @@ def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
 
 
 def reals(row: Row, count: int) -> list[float]:
-    """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
+    """Read numbers in fields of 20 columns; 0 for a blank, NaN for text that is not a number."""
     return [
         real(row.text[at : at + 2 * _WIDTH])
         for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)

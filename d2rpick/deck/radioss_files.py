@@ -1,4 +1,4 @@
-"""Which files belong to a Radioss run, and what may be wrong with one: all that a deck of LS-DYNA needs to know."""
+"""Recognise the files of a Radioss run, and name what can be wrong with it: all that readers of LS-DYNA decks need."""
 
 from __future__ import annotations
 
@@ -15,33 +15,35 @@ THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"
 NOT_FOLLOWED: Final = "deck-not-followed"
 LEFT_RIGID: Final = "body-left-rigid"
-# What ruins a run, in a few words, and the rule that says more.
+# Short text of each flaw that makes a run useless, with the rule that explains it.
 RUINS: Final = {
     THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
     AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
     LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
-
-class Flaw(NamedTuple):
-    """What is wrong, with a stable ``code``, and where; `NOT_FOLLOWED` tells what was not judged, and why."""
-
-    code: str
-    place: Field
-    message: str
-
-
-HEAD: Final = 256 * 1024  # bytes in which a file shows what it is
+HEAD: Final = 256 * 1024  # bytes at the beginning of a file that identify it
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# Those of files of Radioss are compiled where they are needed.
+# Patterns for files of Radioss are compiled on use.
 STARTER: Final = rb"(?mi)^/BEGIN"
 ENGINE: Final = rb"(?mi)^/RUN/"
 _NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
 _NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 
 
+class Flaw(NamedTuple):
+    """A flaw of a run with a stable ``code``, its place and its message.
+
+    `NOT_FOLLOWED` says what could not be judged.
+    """
+
+    code: str
+    place: Field
+    message: str
+
+
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is a starter deck or an engine file."""
+    """Return True if a file that begins like this is a starter deck or an engine file."""
     first = _KEYWORD.search(head)
     return (
         first is not None
@@ -51,45 +53,51 @@ def recognises(head: bytes) -> bool:
 
 
 def run_files(path: str) -> list[str]:
-    """Files of the run that ``path`` belongs to; none where it is not a file of a Radioss run.
+    """Return the files of the run that ``path`` belongs to; empty if it is not a file of a Radioss run.
 
-    The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in its folder belong
-    together; a file of another name goes by the name of the run that it holds.
+    The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in one folder belong together. A
+    file of another name belongs to the run that it names in /BEGIN or /RUN.
     """
     try:
         if not os.path.isfile(path):  # noqa: PTH113  start-up
-            return []  # a pipe gives its bytes once
+            return []  # a pipe can be read only once
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
-            # room for more than there is costs ten times the reading
+            # a larger buffer than the file costs ten times the reading
             head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
         if not recognises(head):
             return []
         from pathlib import Path  # not above: start-up
 
         folder = Path(path).parent
-        beside = sorted(os.listdir(folder))  # noqa: PTH208  nothing is asked of each file: there may be many runs
+        file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects: there may be many runs
     except (OSError, ValueError):
-        return []  # said by who reads it
+        return []  # whoever reads the file reports the error
     name = _run_name(path, head)
-    numbered = (re.fullmatch(_NUMBERED, one) for one in beside if one.startswith(name))
+    numbered = (
+        re.fullmatch(_NUMBERED, file_name)
+        for file_name in file_names
+        if file_name.startswith(name)
+    )
     alike = (folder / match[0] for match in numbered if match and match[1] == name)
-    files = [str(one) for one in alike if one.is_file()]
-    return files if any(Path(path).samefile(one) for one in files) else [path, *files]
+    files = [str(file_name) for file_name in alike if file_name.is_file()]
+    if any(Path(path).samefile(file_name) for file_name in files):
+        return files
+    return [path, *files]
 
 
 def root_of(path: str) -> str:
-    """Give the name that all files of a run begin with, ``NAME`` of ``NAME_0001.rad``; empty if a file has none.
+    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``, empty for another name.
 
-    The engine looks for the restart that begins like its own file, whatever the name in /RUN is.  Source: runs
-    computed with OpenRadioss.
+    The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
+    runs computed with OpenRadioss.
     """
     numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
     return numbered[1] if numbered else ""
 
 
 def _run_name(path: str, head: bytes) -> str:
-    """Name of a run by that of its file, else by what stands in it."""
+    """Return the name of a run from its file name, else from its content."""
     if root := root_of(path):
         return root
-    found = re.search(_NAME, head)
-    return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""
+    match = re.search(_NAME, head)
+    return (match[1] or match[2] or b"").decode("latin-1").strip() if match else ""

@@ -1,4 +1,4 @@
-"""What ruins a Radioss run with rigid bodies that are switched, without more than a warning of the starter.
+"""Find what makes a Radioss run with switched rigid bodies useless, although the starter at most warns.
 
 Source: the published source of OpenRadioss at bd4557ba7 (kinchk.F, checkrby.F, hm_read_rwall_*.F, lecinv.F), Altair's
 public help for /RWALL, /RBODY, /INIVEL and /INIV, and runs computed with OpenRadioss.
@@ -24,104 +24,112 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import Run
 
-_PENALTY_SINCE: Final = 2026  # version of the format from which on a wall has Iform
+_PENALTY_SINCE: Final = 2026  # input version from which a wall has Iform
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
-_WITH_KIND: Final = {"LAGMUL", "THERM"}  # a wall's geometry may stand behind it
+_WITH_KIND: Final = {"LAGMUL", "THERM"}  # words that may precede the geometry of a wall
 
 
 class NodeGroups:
-    """Groups of nodes of a starter deck; its mesh is read when a group asks for it."""
+    """Node groups of a starter deck; its mesh is read on request."""
 
     def __init__(self, starter: Starter) -> None:
         self._starter = starter
         self._found: dict[int, frozenset[int] | None] = {0: frozenset()}
 
     def members(self, group: int) -> frozenset[int] | None:
-        """Ids of the nodes of a group; None where they are not known."""
+        """Return the node ids of a group; None if they are unknown."""
         if group not in self._found:
             self._found[group] = self._members(group)
         return self._found[group]
 
     def _members(self, group: int) -> frozenset[int] | None:
-        known = self._starter.group_members(group)
-        if known is None or any(part not in self.by_part for part in known[1]):
+        """Compute the node ids of a group."""
+        nodes_and_parts = self._starter.group_members(group)
+        if nodes_and_parts is None or any(
+            part not in self.by_part for part in nodes_and_parts[1]
+        ):
             return None
-        return frozenset(known[0]).union(
-            *(self.by_part[part].tolist() for part in known[1])
+        return frozenset(nodes_and_parts[0]).union(
+            *(self.by_part[part].tolist() for part in nodes_and_parts[1])
         )
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
-        """Ids of nodes by part; a part with particles, which are not followed, is left out."""
-        found: dict[int, list[Integers]] = {
+        """Return the node ids by part; parts with particles are left out, as these are not read."""
+        nodes_by_part: dict[int, list[Integers]] = {
             part: [np.empty(0, np.int64)] for part in self._starter.parts
         }
         for card in self._starter.named(*KINDS):
             if card.words[1:]:
-                part = found.setdefault(number_of(card), [np.empty(0, np.int64)])
+                part = nodes_by_part.setdefault(
+                    number_of(card), [np.empty(0, np.int64)]
+                )
                 part += [np.unique(nodes) for _, _, nodes in elements_of(card)]
         unknown = {
             number_of(card)
             for card in self._starter.named(*NOT_COUNTED)
             if card.words[1:]
         }
-        joined = {
-            part: np.unique(np.concatenate(nodes)) for part, nodes in found.items()
+        joined_nodes = {
+            part: np.unique(np.concatenate(nodes))
+            for part, nodes in nodes_by_part.items()
         }
         return {
             part: nodes[nodes > 0]
-            for part, nodes in joined.items()
+            for part, nodes in joined_nodes.items()
             if part not in unknown
         }
 
     @cached_property
     def placed(self) -> tuple[Integers, Reals]:
-        """Ids of all nodes (n,) and where they lie (n, 3) [length]."""
+        """Return ids (n,) and coordinates (n, 3) of all nodes [length]."""
         return nodes_of(self._starter.named("NODE"))
 
 
 def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
-    """Find what ruins a run in which the rigid bodies with these main nodes are switched, or kept off.
+    """Return the flaws of a run in which the rigid bodies with these main nodes are switched, or kept off.
 
-    `NOT_FOLLOWED` tells what is not known, and why.
+    A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
     """
     starter = run.starter
-    bodies = (
-        [body for body in starter.bodies if body.node.value in switched]
-        if starter
-        else []
-    )
+    if starter:
+        bodies = [body for body in starter.bodies if body.node.value in switched]
+    else:
+        bodies = []
     if starter is None or not bodies or not run.pushed:
         return ()
     if starter.moved:
-        why = "ids of a //SUBMODEL may be moved: what its rigid walls and initial velocities do to /RBODY is not known"
+        why = "a //SUBMODEL may offset ids, so rigid walls and initial velocities of rigid bodies were not checked"
         return (Flaw(NOT_FOLLOWED, bodies[0].card.here, why),)
     groups = NodeGroups(starter)
     unknown = [body for body in bodies if groups.members(body.group) is None]
-    found = [
+    flaws = [
         _unknown(body.group, _numbered([body]), body.card.here) for body in unknown
     ]
-    found += [
+    flaws += [
         flaw
         for wall in starter.named("RWALL")
         for flaw in _of_wall(wall, starter, groups, bodies)
     ]
-    found += [*_of_starts(run, groups, bodies)]
-    if not run.deck.unread:  # else a velocity may stand in what was not read
-        found += _of_velocities(run, starter, groups, bodies)
-    return tuple(dict.fromkeys(found))
+    flaws += [*_of_starts(run, groups, bodies)]
+    if not run.deck.unread:  # otherwise an unread include may contain a velocity
+        flaws += _of_velocities(run, starter, groups, bodies)
+    return tuple(dict.fromkeys(flaws))
 
 
-def _unknown(group: int, whose: str, place: Field) -> Flaw:
-    told = f"the nodes of group {group} of {whose} are not known: what becomes of those of rigid bodies was not judged"
-    return Flaw(NOT_FOLLOWED, place, told)
+def _unknown(group: int, whose: str, field: Field) -> Flaw:
+    """Return the flaw that the nodes of a group are unknown."""
+    message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
+    return Flaw(NOT_FOLLOWED, field, message)
 
 
 def _numbered(bodies: Sequence[Body]) -> str:
+    """Return the names of some bodies."""
     return f"/RBODY {', '.join(in_rows(body.id for body in bodies))}"
 
 
 def _within(body: Body, groups: NodeGroups) -> frozenset[int]:
+    """Return the nodes of a body."""
     return groups.members(body.group) or frozenset()
 
 
@@ -131,9 +139,10 @@ def _within(body: Body, groups: NodeGroups) -> frozenset[int]:
 def _of_wall(
     card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Find the bodies whose nodes the starter takes from a wall.
+    """Yield the flaws of a rigid wall: bodies whose nodes the starter removes from it.
 
-    A body keeps them by its Ikrem; OpenRadioss takes the Ikrem of the /RBODY with the highest id for that of all.
+    Ikrem 1 keeps the nodes of a body in the wall; OpenRadioss applies the Ikrem of the /RBODY with the highest id to
+    all.
     """
     keeps = max(starter.bodies, key=lambda body: body.id).stays
     bodies = [body for body in bodies if not (body.stays and keeps)]
@@ -149,12 +158,13 @@ def _of_wall(
     for group in (added, left_out):
         if groups.members(group) is None:
             yield _unknown(group, wall, card.here)
-    near, without = _near(card, node, starter, groups), groups.members(left_out)
+    near = _near(card, node, starter, groups)
+    without = groups.members(left_out)
     if near is None:
         yield Flaw(
             NOT_FOLLOWED,
             card.here,
-            f"which nodes lie near {wall} is not known: it was not judged by them",
+            f"the nodes near {wall} are unknown, so they were not checked",
         )
     if without is None:
         return
@@ -163,18 +173,16 @@ def _of_wall(
     owners = [body for body, taken in lost if taken]
     if owners:
         count = len(frozenset[int]().union(*(taken for _, taken in lost)))
-        found = f"the starter takes {count} of {len(nodes)} nodes from {wall}, those of {_numbered(owners)}, also while"
-        why = "the bodies are off (warning 446): they go through the wall"
-        way_out = (
-            "give every /RBODY Ikrem 1, and let none be on while it touches the wall"
-        )
-        yield Flaw(THROUGH_WALL, card.here, f"{found} {why}; {way_out}")
+        problem = f"the starter removes {count} of {len(nodes)} nodes from {wall}, those of {_numbered(owners)}"
+        why = "even while the bodies are off (warning 446), so they go through the wall"
+        cure = "give every /RBODY Ikrem 1, and deactivate the body before it touches the wall"
+        yield Flaw(THROUGH_WALL, card.here, f"{problem}, {why}; {cure}")
 
 
 def _near(
     card: Card, node: int, starter: Starter, groups: NodeGroups
 ) -> frozenset[int] | None:
-    """Nodes within the distance of a wall in front of it; None where they are not known."""
+    """Return the nodes within the distance of a wall, on its front side; None if they are unknown."""
     rows = card.rows[1:]
     reach, _, diameter = reals(rows[1], 3)
     if reach == 0:
@@ -184,27 +192,27 @@ def _near(
     points = np.array([reals(row, 3) for row in rows[2:5]])
     if not kind or not len(points) or starter.transformed:
         return None
-    ids, places = groups.placed
+    ids, coordinates = groups.placed
     if node:
         if not (ids == node).any():
             return None
-        points[0] = places[ids == node][0]
-    with np.errstate(invalid="ignore", over="ignore"):  # of a field that is no number
-        distance = _distance(kind, places, points, diameter / 2)
-    return (
-        None
-        if distance is None
-        else frozenset(
-            ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist()
-        )
+        points[0] = coordinates[ids == node][0]
+    with np.errstate(invalid="ignore", over="ignore"):  # fields that are not a number
+        distance = _distance(kind, coordinates, points, diameter / 2)
+    if distance is None:
+        return None
+    return frozenset(
+        ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist()
     )
 
 
-def _distance(kind: str, places: Reals, points: Reals, radius: float) -> Reals | None:
-    """Distance of nodes (n, 3) in front of a wall; None where it is not given."""
-    off = places - points[0]
+def _distance(
+    kind: str, coordinates: Reals, points: Reals, radius: float
+) -> Reals | None:
+    """Return the distance of nodes (n, 3) in front of a wall; None if its geometry is incomplete."""
+    offsets = coordinates - points[0]
     if kind == "SPHER":
-        return np.asarray(np.linalg.norm(off, axis=1) - radius)
+        return np.asarray(np.linalg.norm(offsets, axis=1) - radius)
     if len(points) < (3 if kind == "PARAL" else 2):
         return None
     along = points[1:] - points[0]
@@ -213,9 +221,9 @@ def _distance(kind: str, places: Reals, points: Reals, radius: float) -> Reals |
     if not length > 0:
         return None
     normal = normal / length
-    ahead = off @ normal
+    ahead = offsets @ normal
     return np.asarray(
-        np.linalg.norm(off - np.outer(ahead, normal), axis=1) - radius
+        np.linalg.norm(offsets - np.outer(ahead, normal), axis=1) - radius
         if kind == "CYL"
         else ahead
     )
@@ -227,42 +235,44 @@ def _distance(kind: str, places: Reals, points: Reals, radius: float) -> Reals |
 def _of_velocities(
     run: Run, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Find the bodies with moving nodes whose main node is in no /INIVEL.
+    """Yield flaws of bodies with moving nodes whose main node is in no /INIVEL.
 
-    The starter gives all nodes of a body the velocity of its main node, also where the first leg puts the body off.
+    The starter gives all nodes of a body the velocity of its main node, even if the first leg deactivates the body.
     """
-    given: list[tuple[Card, int, frozenset[int]]] = []
+    velocities: list[tuple[Card, int, frozenset[int]]] = []
     for card in starter.named("INIVEL"):
         group, nodes = _moved(card)
         members = nodes or groups.members(group)
         if members is None:
             yield _unknown(group, f"/{card.name}", card.here)
             return
-        given.append((card, group, members))
+        velocities.append((card, group, members))
     started = run.legs[0].starts if run.legs else []
-    moving = frozenset().union(*(nodes for _, _, nodes in given))
+    moving = frozenset().union(*(nodes for _, _, nodes in velocities))
     resting = [body for body in bodies if body.node.value not in moving]
     resting = [
         body
         for body in resting
-        if not any(_reached(one, groups, _within(body, groups)) for one in started)
+        if not any(_reached(start, groups, _within(body, groups)) for start in started)
     ]
-    for card, group, nodes in given:
+    for card, group, nodes in velocities:
         held = [body for body in resting if nodes & _within(body, groups)]
         if held:
             mains = ", ".join(in_rows(body.node.value for body in held))
-            found = f"/{card.name} moves nodes of {_numbered(held)}, and no /INIVEL the main node ({mains})"
-            why = "the starter gives all nodes of a body the velocity of its main node, also where it is off: they rest"
+            problem = f"/{card.name} moves nodes of {_numbered(held)}, but no /INIVEL moves the main node ({mains})"
+            why = "the starter gives all nodes of a body the velocity of its main node, even if it is off, so they rest"
             yield Flaw(
                 AT_REST,
                 card.here,
-                f"{found}: {why}; move it too" + f" (node group {group})" * bool(group),
+                f"{problem}: {why}; add the main node"
+                + f" to node group {group}" * bool(group),
             )
 
 
 def _moved(card: Card) -> tuple[int, frozenset[int]]:
-    """Group of nodes of an /INIVEL, or the nodes that it lists; neither where it moves nothing, or later."""
-    kind, rows = "".join(card.name.split("/")[1:2]), card.rows[1:]
+    """Return the node group of an /INIVEL, or the nodes that it lists; neither if it moves nothing at the start."""
+    kind = "".join(card.name.split("/")[1:2])
+    rows = card.rows[1:]
     if kind == "NODE":
         return 0, frozenset(
             node for row in rows if (node := card.integer(row, 0).value) > 0
@@ -270,7 +280,8 @@ def _moved(card: Card) -> tuple[int, frozenset[int]]:
     axis = kind == "AXIS"
     if kind == "FVM" or len(rows) < 1 + axis:
         return 0, frozenset()
-    speeds, later = reals(rows[axis], 3 + axis), rows[1 + axis : 2 + axis]
+    speeds = reals(rows[axis], 3 + axis)
+    later = rows[1 + axis : 2 + axis]
     if not any(speeds) or any(
         reals(row, 1)[0] or card.integer(row, 2).value for row in later
     ):
@@ -279,12 +290,12 @@ def _moved(card: Card) -> tuple[int, frozenset[int]]:
 
 
 def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator[Flaw]:
-    """Find the bodies that are on in a leg whose /INIV moves their nodes and not their main node."""
+    """Yield flaws of bodies that are on in a leg whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
         for _, rigid, nodes in leg.switched:
-            named = {node.value for node in nodes}
-            on = on | named if rigid else on - named
+            leg_nodes = {node.value for node in nodes}
+            on = on | leg_nodes if rigid else on - leg_nodes
         mains = frozenset(body.node.value for body in bodies if body.node.value in on)
         resting = mains - frozenset().union(
             *(_reached(start, groups, mains) for start in leg.starts)
@@ -297,18 +308,20 @@ def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator
                 body for body in held if _reached(start, groups, _within(body, groups))
             ]
             if held:
-                found = (
-                    f"/{start.card.name} moves nodes of {_numbered(held)}, on in leg {leg.number}, "
-                    f"not the main node"
+                problem = (
+                    f"/{start.card.name} moves nodes of {_numbered(held)}, which is on in engine file {leg.number}, "
+                    f"but not the main node"
                 )
-                why = "a body that is on has the velocity of its main node, so this gives it none"
+                why = "a body that is on has the velocity of its main node, so it does not move"
                 yield Flaw(
-                    AT_REST, start.card.here, f"{found}: {why}; move the main node too"
+                    AT_REST,
+                    start.card.here,
+                    f"{problem}: {why}; add the main node",
                 )
 
 
 def _reached(start: Start, groups: NodeGroups, nodes: frozenset[int]) -> frozenset[int]:
-    """Those of some nodes that an /INIV moves."""
+    """Return the nodes among ``nodes`` that an /INIV moves."""
     listed = (
         node
         for node in nodes

@@ -1,4 +1,4 @@
-"""Rigid bodies as the starter of Radioss makes them: with a main node each, and merged as /MERGE/RBODY asks for.
+"""Build the rigid bodies as the starter of Radioss does: each with a main node, and merged according to /MERGE/RBODY.
 
 Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
 computed with it.  Bodies of parts were not computed, as the function that makes them is in no program at hand: their
@@ -17,20 +17,19 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    Group = tuple[str, tuple[int, ...]]  # what it is made of, and the ids of that
+    Group = tuple[str, tuple[int, ...]]  # kind of its members, and their ids
 
-# What a line of /MERGE/RBODY names: a body by its id, a node, a group of nodes, the body of a part with Irigid.
+# Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
-MADE_HERE: Final = (
-    10**10
-)  # ids from here on are beyond those of a deck: groups of nodes that are made here
+# First id of node groups that d2rpick adds: larger than any id of a deck.
+MADE_HERE: Final = 10**10
 
 
 class Body(NamedTuple):
-    """A rigid body: its id, main node, sensor and group of nodes (0: none).
+    """A rigid body: its id, main node, sensor and node group (0 for none).
 
-    ``stays``: its nodes are to stay in rigid walls (Ikrem 1, or a sensor).  ``part`` is the part of which the starter
-    makes the body (Irigid); such a body has no id in the deck.
+    ``stays``: the starter keeps its nodes in rigid walls (Ikrem 1, or a sensor). ``part`` is the part from which the
+    starter makes the body (Irigid); such a body has no id in the deck.
     """
 
     id: int
@@ -43,12 +42,12 @@ class Body(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Return the name of the body for messages."""
         return f"/RBODY {self.id}" if self.id else f"the rigid body of part {self.part}"
 
 
 class Merge(NamedTuple):
-    """A line of /MERGE/RBODY: the main body, and what is joined to it, each with the kind of its id."""
+    """A line of /MERGE/RBODY: the main body and what is merged into it, each with the kind of its id."""
 
     main_kind: int
     main: int
@@ -57,10 +56,10 @@ class Merge(NamedTuple):
 
 
 class RigidBodies(NamedTuple):
-    """Bodies that the engine knows by their main nodes.
+    """Rigid bodies that the engine knows by their main nodes.
 
-    ``joined_to`` are those of them to which others were merged, by the main nodes of these, which the engine does not
-    know.  ``groups`` are groups of nodes that hold merged bodies.
+    ``joined_to`` maps the main node of each merged body, which the engine does not know, to the body that contains it.
+    ``groups`` are the node groups that contain merged bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -71,16 +70,16 @@ class RigidBodies(NamedTuple):
 def make_rigid_bodies(
     in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]
 ) -> RigidBodies:
-    """Give the bodies of a deck as the engine has them.
+    """Return the rigid bodies of a deck as the engine has them.
 
     Parameters
     ----------
     in_deck : sequence of Body
-        As the deck has them, those that are made of parts last.
+        Bodies as written in the deck, those of parts last.
     merges : sequence of Merge
         All lines of /MERGE/RBODY.
     last_node : callable
-        Gives the highest id of a node; asked only if a body has no main node.
+        Returns the highest node id; called only if a body has no main node.
     """
     bodies = [*_add_main_nodes(in_deck, last_node)]
     if not merges:
@@ -91,10 +90,8 @@ def make_rigid_bodies(
     mains: dict[int, int] = {}
     further_groups: dict[int, list[Group]] = {}
     for merge in merges:
-        main, joined = (
-            by_name.get((merge.main_kind, merge.main)),
-            by_name.get((merge.kind, merge.other)),
-        )
+        main = by_name.get((merge.main_kind, merge.main))
+        joined = by_name.get((merge.kind, merge.other))
         if main is None:
             continue
         if joined and joined is not main:
@@ -132,9 +129,10 @@ def make_rigid_bodies(
 def _add_main_nodes(
     in_deck: Sequence[Body], last_node: Callable[[], int]
 ) -> Iterator[Body]:
-    """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies.
+    """Yield the bodies with the main nodes that the starter adds.
 
-    The bodies of parts come last, in the order of the parts in the deck: their ids are above all others.
+    These are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the order of
+    the parts in the deck, as their ids are above all others.
     """
     lacking = sorted(
         (body for body in in_deck if not body.node.value),
@@ -152,7 +150,7 @@ def _add_main_nodes(
 
 
 def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:
-    """Give the id of a group that has all members, and add it, and those of single nodes, to ``groups``."""
+    """Return the id of a node group that contains all members, and add it to ``groups``."""
     if not members:
         return 0
     if len(members) == 1 and members[0][0] == "GRNOD":
@@ -167,7 +165,7 @@ def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:
 
 
 def _add(group: Group, groups: dict[int, Group]) -> int:
-    """Add a group under an id that no other has, and give that; those of parts lie below twice `MADE_HERE`."""
+    """Add a node group under an unused id and return the id; ids of groups of parts are below twice `MADE_HERE`."""
     number = 2 * MADE_HERE + len(groups)
     groups[number] = group
     return number

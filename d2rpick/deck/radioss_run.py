@@ -1,7 +1,7 @@
-"""A Radioss run: when which part is rigid over its legs, or by sensors of times, and what stays rigid.
+"""Read a Radioss run: when each part is rigid over its legs or by time sensors, and what stays rigid.
 
-Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and stay as they
-were in each later one unless it says otherwise.
+Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
+in later runs unless an engine file changes it.
 """
 
 from __future__ import annotations
@@ -51,51 +51,52 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, repr=False)
 class Run:
-    """The starter deck, where it was found, and the legs in the order of their numbers; ``deck`` has the files."""
+    """A Radioss run: its starter deck (if found) and its legs in the order of their numbers.
+
+    ``deck`` lists its files.
+    """
 
     deck: Deck
     starter: Starter | None = None
     legs: list[Leg] = field(default_factory=list)
-    included: dict[str, SourceFile] = field(
-        default_factory=dict
-    )  # by path: one that is included twice is read once
+    # Includes by path: a file that is included twice is read once.
+    included: dict[str, SourceFile] = field(default_factory=dict)
 
     @cached_property
     def named(self) -> frozenset[int]:
-        """Main nodes that the legs switch."""
-        return frozenset(
-            node.value
-            for leg in self.legs
-            for _, _, nodes in leg.switched
-            for node in nodes
-        )
+        """Return the main nodes that the legs switch."""
+        main_nodes: set[int] = set()
+        for leg in self.legs:
+            for _, _, nodes in leg.switched:
+                main_nodes.update(node.value for node in nodes)
+        return frozenset(main_nodes)
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """When each sensor is reset for the first time [time]: at the start of a leg with /SENS/RESET."""
-        found: dict[int, float] = {}
+        """Return the time of the first reset of each sensor (/SENS/RESET) [time]: the start of a leg."""
+        first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
             for sensor in leg.resets:
-                found.setdefault(sensor, start)
+                first_resets.setdefault(sensor, start)
             start = leg.stop.value
-        return found
+        return first_resets
 
     @property
     def pushed(self) -> bool:
-        """Whether rigid walls, or velocities that are given to nodes, may do something to its bodies."""
+        """Return True if rigid walls or given velocities may act on its bodies."""
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
 
 
 def read_run(path: str, content: bytes | None = None) -> Run:
-    """Read a run: of its files, or from ``content``.
+    """Read a run from its files, or from ``content``.
 
     Raises
     ------
     DeckError
-        If a file cannot be read, or holds neither a starter deck nor an engine file.
+        If a file cannot be read, or is neither a starter deck nor an engine file.
     """
     run = Run(Deck(path))
     files = run_files(path) if content is None else []
@@ -104,7 +105,7 @@ def read_run(path: str, content: bytes | None = None) -> Run:
         head = source.read(0, HEAD)
         if not recognises(head):
             raise DeckError(
-                f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected"
+                f"{name}: no /BEGIN or /RUN was found, expected a file of a Radioss run"
             )
         run.deck.sources.append(source)
         if re.search(ENGINE, head):
@@ -123,6 +124,7 @@ def read_run(path: str, content: bytes | None = None) -> Run:
 
 
 def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    """Add a file of the starter deck and its includes."""
     if run.starter is None:
         return
     run.starter.sources.append(source)
@@ -139,13 +141,15 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
 
 
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    """Add the file that an #include names, or record that it was not read."""
     from pathlib import Path  # not above: start-up
 
-    asked = card.block.head.split(maxsplit=1)[1:]
-    name = asked[0].strip() if asked else ""
+    words = card.block.head.split(maxsplit=1)[1:]
+    name = words[0].strip() if words else ""
     folders = (Path(source.name).parent, Path(run.deck.path).parent)
-    there = (str(folder / name) for folder in folders if os.path.isfile(folder / name))  # noqa: PTH113  long names
-    path, chain = next(there, None), (*chain, os.path.realpath(source.name))
+    paths = (str(folder / name) for folder in folders)
+    candidates = (path for path in paths if os.path.isfile(path))  # noqa: PTH113  long names
+    path, chain = next(candidates, None), (*chain, os.path.realpath(source.name))
     if reason := why_unread(path, chain):
         run.deck.unread.append(Unread(card.here._replace(text=name), reason))
     elif path is not None:
@@ -157,25 +161,25 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
 
 @dataclass(eq=False, repr=False)
 class LegSwitch(SwitchSet):
-    """Bodies switched at the beginning of a leg, at ``at``; ``stop_field`` is where that time is written."""
+    """Bodies that are switched when a leg begins, at time ``at``; ``stop_field`` is the field with that time."""
 
     at: float = 0.0
     stop_field: Field | None = None
 
     @cached_property
     def time(self) -> float | None:
-        """When it switches [time of the run]."""
+        """Return the switching time [time of the run]."""
         return self.at
 
     @property
     def time_field(self) -> Field:
-        """The end of the leg before, or the keyword in the first leg."""
+        """Return the field with the end of the previous leg, or the keyword in the first leg."""
         return self.stop_field or self.card.here
 
 
 @dataclass(eq=False, repr=False)
 class RunWindows:
-    """Windows of a run, the cards that make them, and the parts of the bodies by main node, where they are known."""
+    """Rigid windows of a run, the cards that make them, and the parts of the bodies by main node, if known."""
 
     windows: Windows
     sets: tuple[LegSwitch, ...]
@@ -183,12 +187,17 @@ class RunWindows:
 
 
 def in_order(legs: list[Leg]) -> bool:
-    """Whether the legs are all there, from the first on, and each ends at a known time, not before the one before."""
+    """Return True if the legs are complete from the first one on, and each ends at a known time.
+
+    No leg may end before the previous one.
+    """
     if any(leg.sensor for leg in legs[:-1]):
         return False
     numbers = [leg.number for leg in legs]
     stops = [leg.stop for leg in legs]
-    sorted_stops = all(one.value <= other.value for one, other in pairwise(stops))
+    sorted_stops = all(
+        stop.value <= next_stop.value for stop, next_stop in pairwise(stops)
+    )
     return (
         numbers == list(range(1, len(legs) + 1))
         and sorted_stops
@@ -199,20 +208,19 @@ def in_order(legs: list[Leg]) -> bool:
 def find_run_windows(
     run: Run, contacts: Contacts | None = None, forces: Forces | None = None
 ) -> RunWindows:
-    """Follow every body that a leg or a sensor switches through the run.
+    """Return the windows of every body that a leg or a sensor switches.
 
-    A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
-    For sensors of forces ``contacts`` gives when something pushes some parts, and ``forces`` when an interface or wall
-    pushes anything; None where no history shows it.
+    A body with unknown parts is one unit, named by its main node.  If the legs are not in order there are no windows.
+    For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
+    in which an interface or wall has a force; None if no history shows them.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
     bodies = {body.node.value: body for body in starter.bodies} if starter else {}
-    lines = [line.part for one in sets for line in one.switched]
+    lines = [line.part for leg_switch in sets for line in leg_switch.switched]
     switched = {part.value for part in lines if part.value and not part.problem}
-    sensors = {
-        node for node, body in bodies.items() if body.sensor
-    }  # whatever the legs say of them
+    # Bodies with a sensor ignore /RBODY/ON and /RBODY/OFF.
+    sensors = {node for node, body in bodies.items() if body.sensor}
     groups = {
         node: bodies[node].group for node in (*switched, *sensors) if node in bodies
     }
@@ -242,16 +250,23 @@ def find_run_windows(
 
 
 def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
-    before: Leg | None = None
+    """Yield the cards of all legs that switch bodies, with their times."""
+    previous: Leg | None = None
     for leg in legs:
-        at, place = (before.stop.value, before.stop.field) if before else (0.0, None)
+        if previous:
+            time, stop_field = (previous.stop.value, previous.stop.field)
+        else:
+            time, stop_field = (0.0, None)
         for card, rigid, nodes in leg.switched:
             lines = tuple(Switched(node, False, rigid) for node in nodes)
-            yield LegSwitch(card, "plain", None, lines, nodes, at=at, stop_field=place)
-        before = leg
+            yield LegSwitch(
+                card, "plain", None, lines, nodes, at=time, stop_field=stop_field
+            )
+        previous = leg
 
 
 def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
+    """Return the parts of a body as units, or the body itself."""
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [
         Unit(node, is_body=True)
     ]
@@ -260,20 +275,22 @@ def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg
 ) -> list[Window]:
-    """Windows of a body: on from the start unless the first leg says otherwise."""
+    """Return the windows of a unit of a body, which is on from the start unless the first leg deactivates it."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (0.0, Event(unit, start, Switched(Value(node, first.run.here), False, True)))
     ]
-    for one in sets:
-        for line in [line for line in one.switched if line.part.value == node][:1]:
+    for leg_switch in sets:
+        for line in [line for line in leg_switch.switched if line.part.value == node][
+            :1
+        ]:
             if (
-                one.at == events[-1][0] == 0
+                leg_switch.at == events[-1][0] == 0
                 and line.to_rigid
                 and events[-1][1].line.to_rigid
             ):
-                events.pop()  # it is this line that says it
-            events.append((one.at or 0.0, Event(unit, one, line)))
+                events.pop()  # this card repeats the default
+            events.append((leg_switch.at or 0.0, Event(unit, leg_switch, line)))
     return [
         window
         for window in follow(unit, events)[0]
@@ -287,20 +304,21 @@ def find_course(
     contacts: Contacts | None,
     forces: Forces | None = None,
 ) -> Course:
-    """Give what is known of the course of a run for sensors that switch some parts."""
-    known = (
+    """Return the course of a run for the sensors that switch some parts."""
+    has_contacts = (
         contacts is not None
         and parts
         and run.starter is not None
         and only_force(run.starter)
     )
-    return Course(run.resets, contacts(parts) if known and contacts else None, forces)
+    spans = contacts(parts) if has_contacts and contacts else None
+    return Course(run.resets, spans, forces)
 
 
 def _by_sensor(
     run: Run, body: Body, parts: dict[int, set[int]], course: Course
 ) -> Iterator[Window]:
-    """Windows of a body with a sensor: it is rigid while the sensor is not active."""
+    """Yield the windows of a body with a sensor: it is rigid while the sensor is inactive."""
     active = active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
@@ -331,45 +349,52 @@ def _by_sensor(
 
 
 def _always(body: Body) -> Window:
-    """Window of a part that the starter makes a rigid body (Irigid), and that nothing switches."""
-    unit, by = Unit(body.part), LegSwitch(body.card, "plain", None, (), ())
+    """Return the window of a part that the starter makes rigid (Irigid) and nothing switches."""
+    unit = Unit(body.part)
+    by = LegSwitch(body.card, "plain", None, (), ())
     return Window(
         unit, 0.0, None, Event(unit, by, Switched(body.node, False, True)), None
     )
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
-    """Parts that lie whole in the group of each body: those that it names, and those all of whose nodes it has.
+    """Return the parts that lie completely in the group of each body: named by it, or with all nodes in it.
 
     Parameters
     ----------
     starter : Starter
-        The deck.
+        The starter deck.
     bodies : mapping
-        Group of nodes by main node.
+        Node group by main node.
 
     Returns
     -------
     dict
-        Parts by main node; empty where the members of the group are not known.
+        Parts by main node; empty if the members of the group are unknown.
     """
     members = {node: starter.group_members(group) for node, group in bodies.items()}
-    known = {node: found for node, found in members.items() if found}
-    named = {node: {*known[node][1]} if node in known else set() for node in bodies}
-    every = starter.parts.keys()
-    # another part may lie in the nodes of those that are named, as a skin does
-    asked = {node: found for node, found in known.items() if every - found[1]}
-    if asked:
+    known_members = {node: found for node, found in members.items() if found}
+    whole_parts = {
+        node: {*known_members[node][1]} if node in known_members else set()
+        for node in bodies
+    }
+    all_parts = starter.parts.keys()
+    # Another part may lie on the nodes of the named parts, as a skin does.
+    incomplete = {
+        node: found for node, found in known_members.items() if all_parts - found[1]
+    }
+    if incomplete:
         from d2rpick.deck.mesh import parts_within  # loads numpy
 
-        for node, parts in parts_within(starter, asked).items():
-            named[node] |= parts
-    return named
+        for node, parts in parts_within(starter, incomplete).items():
+            whole_parts[node] |= parts
+    return whole_parts
 
 
 def parts_off(run: Run) -> tuple[int, ...]:
-    """Parts of the bodies that the first leg puts off, ascending; none without a starter deck."""
-    nodes, bodies = kept_off(run.legs[:1]), run.starter.bodies if run.starter else ()
+    """Return the parts of the bodies that the first leg deactivates, ascending; empty without a starter deck."""
+    nodes = kept_off(run.legs[:1])
+    bodies = run.starter.bodies if run.starter else ()
     groups = {
         body.node.value: body.group for body in bodies if body.node.value in nodes
     }
@@ -378,42 +403,42 @@ def parts_off(run: Run) -> tuple[int, ...]:
 
 
 def find_parts_of_fixed_bodies(run: Run) -> set[int]:
-    """Parts of the bodies that are on from the start to the end, since no leg and no sensor switches them.
+    """Return the parts of the bodies that are on all the time, because no leg and no sensor switches them.
 
-    Without engine files all bodies of /RBODY may be switched; those of parts with Irigid are rigid all the same.
+    Without engine files all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
     bodies = run.starter.bodies if run.starter and not run.starter.moved else ()
     fixed = [
         body for body in bodies
         if not body.sensor and body.node.value not in run.named and (run.legs or body.part)
     ]  # fmt: skip
-    held = (
-        rigid_parts(run.starter, {body.node.value: body.group for body in fixed})
-        if run.starter and fixed
-        else {}
-    )
+    if run.starter and fixed:
+        held = rigid_parts(run.starter, {body.node.value: body.group for body in fixed})
+    else:
+        held = {}
     return set().union(*held.values())
 
 
 def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
-    """Give the sensors that switch the rigid bodies of parts, by part."""
+    """Return the sensor that switches the rigid body of each part, by part."""
     sensors = {
         body.node.value: body
         for body in starter.bodies
         if body.sensor and not starter.moved
     }
-    held = (
-        rigid_parts(starter, {node: body.group for node, body in sensors.items()})
-        if sensors
-        else {}
-    )
+    if sensors:
+        held = rigid_parts(
+            starter, {node: body.group for node, body in sensors.items()}
+        )
+    else:
+        held = {}
     return {
         part: sensors[node].sensor for node, parts in held.items() for part in parts
     }
 
 
 class LeftRigid(NamedTuple):
-    """Parts that lie whole in such bodies, where to put them off, what is wrong, and how it is mended."""
+    """Parts that stay rigid in a run that switches others, the place of the cure, the problem and the cure."""
 
     parts: tuple[int, ...]
     place: Field
@@ -422,7 +447,10 @@ class LeftRigid(NamedTuple):
 
 
 def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
-    """Find the bodies that no leg names, of a run with ``windows``, where they hold whole parts."""
+    """Return the bodies that no leg names and that contain whole parts, in a run with ``windows``.
+
+    None if there are none.
+    """
     if run.starter is None or run.starter.moved or not windows:
         return None
     bodies = [
@@ -430,34 +458,43 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
         for body in run.starter.bodies
         if not body.sensor and body.node.value not in run.named
     ]
-    parts = (
-        rigid_parts(run.starter, {body.node.value: body.group for body in bodies})
-        if bodies
-        else {}
-    )
+    if bodies:
+        parts = rigid_parts(
+            run.starter, {body.node.value: body.group for body in bodies}
+        )
+    else:
+        parts = {}
     bodies = [body for body in bodies if parts.get(body.node.value)]
-    held = sorted({part for body in bodies for part in parts[body.node.value]})
-    if not held:
+    rigid_parts_listed = sorted(
+        {part for body in bodies for part in parts[body.node.value]}
+    )
+    if not rigid_parts_listed:
         return None
-    places = [card.here for card, _, _ in run.legs[0].switched]
+    switch_fields = [card.here for card, _, _ in run.legs[0].switched]
     mains = in_rows(body.node.value for body in bodies)
-    found = f"no leg switches {_names(bodies)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
-    way_out = f"name main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every leg"
-    if made := [
+    rigid = f"{name_units(rigid_parts_listed)} {are(rigid_parts_listed)} rigid"
+    problem = (
+        f"no engine file switches {_names(bodies)}, so {rigid} from time 0 to the end"
+    )
+    cure = f"list main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every engine file"
+    if new_nodes := [
         body.node.value for body in bodies if body.node.field.text in ("", "0")
     ]:
-        way_out += f" (the starter makes {name_units(made, 'node')}: see its listing)"
+        cure += f" (the starter makes {name_units(new_nodes, 'node')}: see its listing)"
     return LeftRigid(
-        tuple(held), places[0] if places else run.legs[0].run.here, found, way_out
+        tuple(rigid_parts_listed),
+        switch_fields[0] if switch_fields else run.legs[0].run.here,
+        problem,
+        cure,
     )
 
 
 def _names(bodies: Sequence[Body]) -> str:
-    """Name bodies: those of the deck by their ids, those of rigid parts by the parts."""
+    """Return the names of bodies: by their ids, or by the parts of rigid parts."""
     ids = [body.id for body in bodies if body.id]
     parts = sorted(body.part for body in bodies if body.part)
-    named = [f"/RBODY {', '.join(in_rows(ids))}"] * bool(ids)
-    named += [
+    names = [f"/RBODY {', '.join(in_rows(ids))}"] * bool(ids)
+    names += [
         f"the rigid {'bodies' if len(parts) > 1 else 'body'} of {name_units(parts)}"
     ] * bool(parts)
-    return " and ".join(named)
+    return " and ".join(names)

@@ -1,9 +1,9 @@
-"""Sensors of times: when they are active over the legs of a Radioss run.
+"""Find when the sensors of a Radioss run are active.
 
-A rigid body with a sensor is deformable while that is active and rigid while it is not, whatever /RBODY/ON and OFF say.
-Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7 (sensor_time.F,
-sensor_init.F, rbyonf.F), and runs computed with it: Tstop has a line of its own, and is read in every version of the
-format; the delay of a sensor of others has no effect.
+A rigid body with a sensor is deformable while the sensor is active, and rigid while it is not, whatever /RBODY/ON and
+/RBODY/OFF say. Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7
+(sensor_time.F, sensor_init.F, rbyonf.F), and runs computed with it: Tstop has a line of its own, and is read in every
+version of the format; the delay of a sensor with other sensors as input has no effect.
 """
 
 from __future__ import annotations
@@ -23,23 +23,26 @@ if TYPE_CHECKING:
     # When the force of an interface or rigid wall acts, by its kind and number; None where that is not known.
     Forces = Callable[[str, int], Spans | None]
 
-STOPS_SINCE: Final = (
-    2023  # version of the format in whose description a sensor of time has an end
-)
-NEVER: Final = 1e20
-# Sensors of forces, and what histories call that of which they are.
+# Input version from which a time sensor has an end (Tstop).
+STOPS_SINCE: Final = 2023
+NEVER: Final = 1e20  # times from here on never come
+# Kinds of force sensors, with the name that histories use for what exerts the force.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
-# Ties, fluids, and parts of other contacts: they push nothing that flies.
+# Types of /INTER without contact force on a flying body: ties, fluids, and parts of other contacts.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
 _WIDTH: Final = 10
-_SINGLE: Final = 1e-6  # times of a T01 have seven digits
+_SINGLE: Final = (
+    1e-6  # relative rounding of the times in a T01 file, which have seven digits
+)
 
 
 class Course(NamedTuple):
-    """What is known of a run: when sensors are reset for the first time, by number, and when something pushes [time].
+    """Known course of a run.
 
-    ``contacts`` are spans of the only contact or rigid wall of the deck; None where no history shows them.  ``forces``
-    gives those of each by what the solver wrote of its force; these come first.
+    The time of the first reset of each sensor, and the spans in which contact forces act [time].
+
+    ``contacts`` are the spans of the only contact or rigid wall of the deck; None if no history shows them. ``forces``
+    returns the spans of one contact or wall from its written force, and is preferred.
     """
 
     resets: Mapping[int, float] = MappingProxyType({})
@@ -47,7 +50,7 @@ class Course(NamedTuple):
     forces: Forces | None = None
 
     def find_contacts(self, kind: str, number: int) -> Spans | None:
-        """Find when an interface or rigid wall pushes [time]; None where no history shows it."""
+        """Return the spans in which an interface or rigid wall has a force [time]; None if no history shows them."""
         written = self.forces(kind, number) if self.forces else None
         return self.contacts if written is None else written
 
@@ -69,7 +72,8 @@ def active_spans(
     card = starter.sensors.get(number)
     if card is None or number in above:
         return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows, kind = below_title(card), card.words[1]
+    rows = below_title(card)
+    kind = card.words[1]
     if kind in _OF_FORCES:
         return _while_pushed(starter, number, rows, course)
     if kind not in ("TIME", "OR", "AND", "NOT"):
@@ -85,16 +89,27 @@ def active_spans(
         return ((max(delay, 0.0), stop),) if delay < stop else ()
     if len(rows) < 2:
         return f"sensor {number}, which names no other"
-    asked = [card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)]
-    found = [active_spans(starter, one, course, (*above, number)) for one in asked]
-    for one in found:
-        if isinstance(one, str):
-            return f"sensor {number}, of {one}"
-    known = [one for one in found if not isinstance(one, str)]
+    input_ids = [
+        card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)
+    ]
+    spans_of_inputs = [
+        active_spans(starter, sensor_input, course, (*above, number))
+        for sensor_input in input_ids
+    ]
+    for sensor_input in spans_of_inputs:
+        if isinstance(sensor_input, str):
+            return f"sensor {number}, of {sensor_input}"
+    known_spans = [
+        sensor_input
+        for sensor_input in spans_of_inputs
+        if not isinstance(sensor_input, str)
+    ]
     if kind == "OR":
-        return either(known)
+        return either(known_spans)
     return inactive(
-        either([inactive(one) for one in known]) if kind == "AND" else known[0]
+        either([inactive(sensor_input) for sensor_input in known_spans])
+        if kind == "AND"
+        else known_spans[0]
     )
 
 
@@ -132,18 +147,19 @@ def _while_pushed(
 def find_contacts_of_sensor(
     starter: Starter, number: int, course: Course
 ) -> Spans | None:
-    """Find when those forces act for which a sensor, or one that it asks for, waits [time].
+    """Return when the forces act for which a sensor, or one of its inputs, waits [time].
 
-    None where it waits for none, or where no history shows it.
+    None if it waits for none, or if no history shows it.
     """
-    known = []
-    for other in reached([number], lambda asking: _asked(starter, asking)):
-        card = starter.sensors.get(other)
+    force_spans = []
+    for sensor in reached([number], lambda asking: _asked(starter, asking)):
+        card = starter.sensors.get(sensor)
         rows = below_title(card) if card and card.words[1] in _OF_FORCES else ()
         if card and len(rows) > 1:
-            kind, entity = _OF_FORCES[card.words[1]], card.integer(rows[1], 0).value
-            known.append(course.find_contacts(kind, entity))
-    spans = [contacts for contacts in known if contacts is not None]
+            kind = _OF_FORCES[card.words[1]]
+            entity = card.integer(rows[1], 0).value
+            force_spans.append(course.find_contacts(kind, entity))
+    spans = [contacts for contacts in force_spans if contacts is not None]
     return either(spans) if spans else None
 
 
@@ -151,15 +167,13 @@ def _asked(starter: Starter, number: int) -> Sequence[int]:
     """Sensors that another one asks for."""
     card = starter.sensors.get(number)
     rows = below_title(card) if card and card.words[1] in ("OR", "AND", "NOT") else ()
-    return (
-        [card.integer(rows[1], at).value for at in range(2)]
-        if card and len(rows) > 1
-        else []
-    )
+    if card and len(rows) > 1:
+        return [card.integer(rows[1], at).value for at in range(2)]
+    return []
 
 
 def only_force(starter: Starter) -> bool:
-    """Whether a deck has one contact or rigid wall that pushes: then what pushes by the momenta is that."""
+    """Return True if a deck has only one contact or rigid wall, so that the momenta show the force of that one."""
     contacts = [
         card
         for card in starter.named("INTER")
@@ -169,17 +183,18 @@ def only_force(starter: Starter) -> bool:
 
 
 def either(several: Sequence[Spans]) -> Spans:
-    """Spans in which one of several is active."""
+    """Return the spans in which at least one of several sensors is active."""
     joined: list[tuple[float, float]] = []
-    for start, stop in sorted(one for spans in several for one in spans):
+    for start, stop in sorted(span for spans in several for span in spans):
         if joined and start <= joined[-1][1]:
-            start, stop = joined[-1][0], max(stop, joined.pop()[1])
+            start = joined[-1][0]
+            stop = max(stop, joined.pop()[1])
         joined.append((start, stop))
     return tuple(joined)
 
 
 def inactive(spans: Spans) -> Spans:
-    """Spans between those in which a sensor is active."""
+    """Return the spans in which a sensor is not active."""
     ends = [0.0, *(end for span in spans for end in span), math.inf]
     pairs = zip(ends[::2], ends[1::2], strict=True)
     return tuple((start, stop) for start, stop in pairs if start < stop)

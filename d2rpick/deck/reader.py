@@ -1,4 +1,4 @@
-"""Reads an LS-DYNA keyword deck with its includes: the cards that matter for switching, in reading order."""
+"""Read an LS-DYNA keyword deck with its includes: the cards that matter for switching, in reading order."""
 
 from __future__ import annotations
 
@@ -32,91 +32,8 @@ if TYPE_CHECKING:
 
 
 _CONTINUED = " +"
-_FACTORS, _OF_TIME = 3, 1  # of mass, time and length
+_FACTORS, _OF_TIME = 3, 1  # factors of mass, time and length; index of the time factor
 UNKNOWN_KIND = "this kind of include is not read"
-
-
-class Unread(NamedTuple):
-    """An include that was not read: its name as written, and why."""
-
-    name: Field
-    reason: str
-
-
-class Restart(NamedTuple):
-    """When a restart begins [time of the run], and where that is written."""
-
-    at: float
-    stop_field: Field
-
-
-def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
-    """Names of the files that an ``*INCLUDE`` card asks for, the transform of each, and what of that is unreadable.
-
-    ``*INCLUDE`` has one name in a line, ``*INCLUDE_TRANSFORM`` one alone, and its numbers.
-    """
-    names = _names(card)
-    if card.name == "INCLUDE":
-        yield from ((name, card.transform, ()) for name, _ in names)
-    elif first := next(names, None):
-        name, rest = first
-        own, problems = _transform(card, rest)
-        yield name, own.inside(card.transform), problems
-
-
-def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
-    """Every file name, joined over lines that end in blank-plus, its parameters resolved, and the rows below it."""
-    waiting = list(card.rows)
-    while waiting:
-        first = waiting.pop(0)
-        if first.blank:
-            continue
-        text = first.text.rstrip()
-        while text.endswith(_CONTINUED) and waiting:
-            text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
-        yield (
-            first.field(0)._replace(text=card.scope.text(text.strip().strip('"'))),
-            waiting,
-        )
-
-
-def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
-    """Numbers of ``*INCLUDE_TRANSFORM``; a row left out, a blank and a factor 0 mean no change."""
-    places = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
-    offsets = [
-        card.integer(rows[row], position) if row < len(rows) else None
-        for row, position in places
-    ]
-    factors = (
-        [card.real(rows[2], at, 1.0) for at in range(_FACTORS)] if len(rows) > 2 else []
-    )
-    factor = factors[_OF_TIME] if factors else None
-    node, part, material, set_, rest = (
-        value.value if value else 0 for value in offsets
-    )
-    time = (factor.value if factor else 0.0) or 1.0
-    problems = tuple(
-        (value.field, value.problem)
-        for value in (*offsets, factor)
-        if value and value.problem
-    )
-    scaled = any(one.value not in (0.0, 1.0) for one in factors)
-    turn = card.integer(rows[3], 0) if len(rows) > 3 else None
-    moved = turn is not None and (
-        bool(turn.problem) or turn.value != 0
-    )  # what cannot be read may move them
-    return Transform(node, part, material, set_, rest, time, scaled, moved), problems
-
-
-def _folder(file: str) -> Path:
-    from pathlib import Path  # not above: a deck without includes does without it
-
-    return Path(file).parent
-
-
-def _portable(name: str) -> str:
-    return name.replace("\\", "/")
-
 
 _KEPT: Final = (
     *(
@@ -147,25 +64,136 @@ _KEPT: Final = (
     *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
+# Both are relative to the folder of the main deck.
 _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
-)  # both relative to the folder of the main deck
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled where it is needed
-SWITCHING: Final = re.compile(
-    r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE
-)  # keywords meant to switch
+)
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled on use
+# Keywords that seem to be switching cards.
+SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # includes in includes
+_DEEPEST = 60  # levels of nested includes
 _MOST_FILES = 10_000
+_MESH: Final = (
+    r"\*(ELEMENT_|NODE\b)|"
+    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
+)
+# Keywords of engine files that need values: a file that ends with one of them alone is truncated.
+_WITH_VALUES: Final = (
+    "RUN",
+    "RBODY",
+    "DT",
+    "DTIX",
+    "STOP",
+    "INIV",
+    "SENS",
+    "TFILE",
+    "VERS",
+    "BCS",
+    "BCSR",
+    "DEL",
+    "END",
+)
+
+
+class Unread(NamedTuple):
+    """An include that was not read: its name as written, and the reason."""
+
+    name: Field
+    reason: str
+
+
+class Restart(NamedTuple):
+    """The start of a restart [time of the run], and the field with that time."""
+
+    at: float
+    stop_field: Field
+
+
+def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
+    """Yield for each file of an ``*INCLUDE`` card its name, its transform, and the unreadable fields of the transform.
+
+    ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
+    """
+    names = _names(card)
+    if card.name == "INCLUDE":
+        yield from ((name, card.transform, ()) for name, _ in names)
+    elif first := next(names, None):
+        name, rows = first
+        transform, problems = _transform(card, rows)
+        yield name, transform.inside(card.transform), problems
+
+
+def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
+    """Yield each file name and the rows after it.
+
+    A name that ends with blank and plus continues on the next line; parameters in it are replaced.
+    """
+    waiting = list(card.rows)
+    while waiting:
+        first = waiting.pop(0)
+        if first.blank:
+            continue
+        text = first.text.rstrip()
+        while text.endswith(_CONTINUED) and waiting:
+            text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
+        yield (
+            first.field(0)._replace(text=card.scope.text(text.strip().strip('"'))),
+            waiting,
+        )
+
+
+def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
+    """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank and a factor of 0 mean no change."""
+    positions = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
+    offsets = [
+        card.integer(rows[row], position) if row < len(rows) else None
+        for row, position in positions
+    ]
+    if len(rows) > 2:
+        factors = [card.real(rows[2], at, 1.0) for at in range(_FACTORS)]
+    else:
+        factors = []
+    factor = factors[_OF_TIME] if factors else None
+    node, part, material, set_, other_id = (
+        value.value if value else 0 for value in offsets
+    )
+    time = (factor.value if factor else 0.0) or 1.0
+    problems = tuple(
+        (value.field, value.problem)
+        for value in (*offsets, factor)
+        if value and value.problem
+    )
+    scaled = any(value.value not in (0.0, 1.0) for value in factors)
+    transform_id = card.integer(rows[3], 0) if len(rows) > 3 else None
+    # An unreadable transformation may move nodes.
+    moved = transform_id is not None and (
+        bool(transform_id.problem) or transform_id.value != 0
+    )
+    return Transform(
+        node, part, material, set_, other_id, time, scaled, moved
+    ), problems
+
+
+def _folder(file: str) -> Path:
+    """Return the folder of a file."""
+    from pathlib import Path  # not above: only decks with includes need it
+
+    return Path(file).parent
+
+
+def _portable(name: str) -> str:
+    """Return a file name with forward slashes."""
+    return name.replace("\\", "/")
 
 
 @dataclass(eq=False, repr=False)
 class Deck:
-    """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
+    """A deck as read: its ``cards`` that matter, ``disabled`` cards (*COMMENT), encrypted blocks and includes.
 
-    ``problems`` are numbers of includes that could not be read; ``ends`` the last block of each file that has no *END,
-    and whether that file is the main one.  ``restarts`` are those that go on with its run.
+    ``problems`` are unreadable numbers of includes. ``ends`` are the last blocks of files without *END, and True for
+    the main file. ``restarts`` are the restarts that continue its run.
     """
 
     path: str
@@ -178,41 +206,43 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    long: bool = False  # whether the main file ends in long format
+    long: bool = False  # True if the main file ends in long format
     restarts: dict[str, Restart] = field(default_factory=dict)  # by file
 
     @property
     def files(self) -> list[str]:
-        """Names of all files that were read, the deck itself first."""
+        """Return the names of all files that were read, the main deck first."""
         return [source.name for source in self.sources]
 
     def named(self, *names: str) -> list[Card]:
-        """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
-        found = [self._by_name[name] for name in names if name in self._by_name]
-        if len(found) < 2:
-            return [*found[0]] if found else []
-        chosen = {*chain(*found)}
+        """Return the cards whose keyword is one of ``names``, or one of these followed by ``_`` and an option."""
+        by_name = [self._by_name[name] for name in names if name in self._by_name]
+        if len(by_name) < 2:
+            return [*by_name[0]] if by_name else []
+        chosen = {*chain(*by_name)}
         return [card for card in self.cards if card in chosen]
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Cards by their names, and by what stands there before an ``_``: every rule asks for some."""
-        found: defaultdict[str, list[Card]] = defaultdict(list)
+        """Return the cards by name and by each beginning of the name before an ``_``: every rule asks for some."""
+        cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _stems(card.name):
-                found[name].append(card)
-        return found
+                cards_by_name[name].append(card)
+        return cards_by_name
 
     def silences(self, rule: str, file: str, line: int) -> bool:
-        """Whether a comment before the card that holds ``line`` of ``file`` silences ``rule``."""
+        """Return True if a comment before the card at ``line`` of ``file`` silences ``rule``."""
         cards = self._by_line[file]
-        before = bisect_right(cards, line, key=lambda card: card.line)
-        named = cards[before - 1].block.silenced if before else ()
-        return rule.startswith(tuple(name for name in named if name.startswith("D2R")))
+        count = bisect_right(cards, line, key=lambda card: card.line)
+        silenced = cards[count - 1].block.silenced if count else ()
+        return rule.startswith(
+            tuple(name for name in silenced if name.startswith("D2R"))
+        )
 
     @property
     def silencing(self) -> list[Card]:
-        """Cards before which a comment silences rules."""
+        """Return the cards with a comment before them that silences rules."""
         return [
             card
             for card in self._all
@@ -221,67 +251,67 @@ class Deck:
 
     @property
     def _all(self) -> list[Card]:
+        """Return all cards that a finding may point to."""
         return [*self.cards, *self.disabled, *self.included]
 
     @cached_property
     def _by_line(self) -> defaultdict[str, list[Card]]:
-        found: defaultdict[str, list[Card]] = defaultdict(list)
+        """Return the cards of each file, by line."""
+        cards_by_file: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self._all:
-            found[card.file].append(card)
-        for cards in found.values():
+            cards_by_file[card.file].append(card)
+        for cards in cards_by_file.values():
             cards.sort(key=lambda card: card.line)
-        return found
+        return cards_by_file
 
 
 @lru_cache(1024)  # decks use the same keywords
 def _stems(name: str) -> tuple[str, ...]:
-    """Give a name, and what stands there before an ``_``."""
+    """Return a name and each beginning of it before an ``_``."""
     return tuple(
         name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_")
     )
 
 
 def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
-    """Find the cards of a deck and of all its includes.
+    """Return the cards of a deck and of all its includes.
 
     Parameters
     ----------
     path : str
-        The main deck; messages show file names relative to it as it is given here.
+        The main deck; messages show file names relative to it as given here.
     content : bytes or SourceFile, optional
-        What the main deck holds, where it does not lie in a file, or the file where it is open already; its includes
-        are looked for beside ``path``.
+        Content of the main deck if it is not a file, or the file if it is open already; its includes are searched in
+        the folder of ``path``.
 
     Returns
     -------
     Deck
-        Cards with their places; their data lines are read from the files when they are asked for.
+        Cards with their places; their data lines are read from the files on request.
 
     Raises
     ------
     DeckError
-        If the deck itself cannot be read or is none, or includes multiply without end.
+        If the deck itself cannot be read or is not a deck, or there are too many includes.
     """
     deck = Deck(path)
     main = content if isinstance(content, SourceFile) else SourceFile(path, content)
     if next(main.blocks(), None) is None:
         if main.marks:
-            found, wanted = (
-                "only *END was found, no keyword before it",
-                "*KEYWORD and the cards",
-            )
+            problem = "only *END was found, no keyword before it"
+            expected = "*KEYWORD and the cards"
         else:
-            found = "no keyword was found"
-            wanted = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
+            problem = "no keyword was found"
+            expected = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
         raise DeckError(
-            f"{path}: {found}; {wanted} {'were' if main.marks else 'was'} expected"
+            f"{path}: {problem}; {expected} {'were' if main.marks else 'was'} expected"
         )
     _Reader(deck).read(main, _Context(deck.scope))
     return deck
 
 
 class _Context(NamedTuple):
-    """What a file inherits from the one that includes it."""
+    """What an included file inherits from the including file."""
 
     scope: Scope
     width: int = STANDARD
@@ -290,18 +320,20 @@ class _Context(NamedTuple):
 
 
 class _Reader:
+    """Reads the files of a deck into `Deck`."""
+
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        self.folders: list[Path] = []  # those of *INCLUDE_PATH, in order
-        self.sources: dict[
-            str, SourceFile
-        ] = {}  # by path: a file that is included twice is the same each time
+        self.folders: list[Path] = []  # folders of *INCLUDE_PATH, in order
+        # Files by path, so that a file included twice has one state.
+        self.sources: dict[str, SourceFile] = {}
 
     def read(self, source: SourceFile, context: _Context) -> None:
+        """Read a file and its includes."""
         self.deck.sources.append(source)
         if len(self.deck.sources) > _MOST_FILES:
-            what = f"{source.name}: more than {_MOST_FILES} includes were read"
-            raise DeckError(f"{what}; do the files include each other?")
+            problem = f"{source.name}: more than {_MOST_FILES} includes were read"
+            raise DeckError(f"{problem}; do the files include each other?")
         width = context.width
         for block in source.blocks():
             if block.end is None:
@@ -313,20 +345,30 @@ class _Reader:
             if (
                 name == "KEYWORD"
                 and "=" in block.head
-                and (found := re.search(_LONG, block.head, re.IGNORECASE))
+                and (match := re.search(_LONG, block.head, re.IGNORECASE))
             ):
-                width = LONG if found[1].upper() == "Y" else STANDARD
+                width = LONG if match[1].upper() == "Y" else STANDARD
                 if not context.chain:
                     self.deck.long = width == LONG
-            own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
+            card_width = width
+            if "+" in suffix:
+                card_width = LONG
+            elif "-" in suffix:
+                card_width = STANDARD
             self.take(
-                Card(name, block, context.scope.as_of_now(), own, context.transform),
+                Card(
+                    name,
+                    block,
+                    context.scope.as_of_now(),
+                    card_width,
+                    context.transform,
+                ),
                 context,
                 width,
             )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
-        """Keep a card, or do what it asks the reader to do."""
+        """Store a card, or do what it tells the reader."""
         if card.name.startswith("COMMENT"):
             if re.search(
                 r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",
@@ -348,6 +390,7 @@ class _Reader:
             self.deck.cards.append(card)
 
     def include(self, card: Card, context: _Context, width: int) -> None:
+        """Read the files of an include card, or record why they are not read."""
         if card.name not in _READ_INCLUDES:
             self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
@@ -366,13 +409,13 @@ class _Reader:
                 )
 
     def find(self, name: Field) -> str | None:
-        """Path of an include as messages should show it, or None.
+        """Return the path of an include as messages should show it, or None.
 
-        Readers of decks differ in whether the folder of the main deck, *INCLUDE_PATH or the folder of the including
-        file comes first; all are tried, the first that has the file counts.
+        Programs that read decks disagree whether the folder of the main deck, *INCLUDE_PATH or the folder of the
+        including file comes first. All are tried in this order, and the first file found is used.
         """
         for folder in (_folder(self.deck.path), *self.folders, _folder(name.file)):
-            # the last has the bytes taken as the file system takes them, not as Latin-1
+            # the last spelling decodes the bytes as the file system does, not as Latin-1
             for spelling in (
                 name.text,
                 _portable(name.text),
@@ -385,7 +428,10 @@ class _Reader:
 
 
 def why_unread(path: str | None, chain: Sequence[str]) -> str:
-    """Say why an include is not read, empty where it is; ``chain`` are the files that include it, by real paths."""
+    """Return why an include is not read, or an empty text.
+
+    ``chain`` are the real paths of the files that include it.
+    """
     if path is None:
         return "no such file"
     if os.path.realpath(path) in chain:
@@ -396,7 +442,7 @@ def why_unread(path: str | None, chain: Sequence[str]) -> str:
 
 
 def _keyword(head: str) -> tuple[str, str]:
-    """Name of a keyword in upper case, and its format suffixes.
+    """Return the name of a keyword in upper case, and its format suffixes.
 
     Examples
     --------
@@ -417,56 +463,35 @@ def _keyword(head: str) -> tuple[str, str]:
     return name.upper(), suffix
 
 
-_MESH: Final = (
-    r"\*(ELEMENT_|NODE\b)|"
-    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
-)
-
-
 def cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
-    """Give the last block of each file that seems to be cut, and what speaks for it.
+    """Yield the last block of each file that seems to be truncated, and the sign of it.
 
-    An include may do without *END, and the main file too unless it ends within a mesh: a mesh is written by a program,
-    which ends what it writes.  A last line without line end may lack digits of a number.
+    An include may have no *END. A main file without *END is reported if it ends within a mesh, because the program that
+    writes a mesh also writes the end. A last line without line end may lack digits of a number.
     """
-    seen = set()
+    files = set()
     for block, main in deck.ends:
-        told = _sign_of_cut(block, main=main)
-        if told and block.source.name not in seen:
-            seen.add(block.source.name)
-            yield block, f"{told}; is it cut?"
+        sign = _sign_of_cut(block, main=main)
+        if sign and block.source.name not in files:
+            files.add(block.source.name)
+            yield block, f"{sign}, so it may be truncated."
 
 
 def cure(block: Block) -> str:
-    """What to do about a file that ends with this block, of which `cuts` speaks."""
-    return f"take the whole file, or {'add that line' if block.source.ends_with_line() else 'end its last line'}"
+    """Return what to do about a file that ends with this block, which `cuts` has reported."""
+    if not block.source.ends_with_line():
+        return "use the complete file, or end its last line"
+    end_mark = "/END" if block.head.startswith("/") else "*END"
+    return f"use the complete file, or add {end_mark}"
 
 
 def holds_mesh(block: Block) -> bool:
-    """Whether a block holds nodes or elements."""
+    """Return True if a block contains nodes or elements."""
     return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
-# Keywords of Radioss that values follow, in engine files: one of them without any is cut.
-_WITH_VALUES: Final = (
-    "RUN",
-    "RBODY",
-    "DT",
-    "DTIX",
-    "STOP",
-    "INIV",
-    "SENS",
-    "TFILE",
-    "VERS",
-    "BCS",
-    "BCSR",
-    "DEL",
-    "END",
-)
-
-
 def _is_whole(block: Block) -> bool:
-    """Whether nothing that matters can be missing from a last line without line end: a comment, or no values follow."""
+    """Return True if a last line without line end lacks nothing: it is a comment, or a keyword without values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
         return True
@@ -479,7 +504,9 @@ def _is_whole(block: Block) -> bool:
 
 
 def _sign_of_cut(block: Block, *, main: bool) -> str:
-    mesh, radioss = holds_mesh(block), block.head.startswith("/")
+    """Return the sign that a file is truncated, or an empty text."""
+    mesh = holds_mesh(block)
+    radioss = block.head.startswith("/")
     if not block.source.ends_with_line() and not _is_whole(block):
         return f"the file ends within a line of {'its mesh' if mesh else block.head.strip()}"
     if main and mesh:

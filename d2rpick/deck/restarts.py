@@ -1,7 +1,7 @@
-"""Small restarts of LS-DYNA as legs of a run: their cards switch when the run before them ends.
+"""Join small restart decks of LS-DYNA to a run: their cards switch at the end of the run before them.
 
-A small restart has no parts of its own.  Its *RIGID_DEFORMABLE cards have no time: they act when it begins, at the
-ENDTIM of the run before.  Source: the vendor's keyword data as published in its Python library.
+A small restart has no parts. Its *RIGID_DEFORMABLE cards have no time: they act when the restart begins, at the ENDTIM
+of the run before. Source: the vendor's keyword data as published in its Python library.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Value
 
 _KEYWORD: Final = "RIGID_DEFORMABLE"
-_LARGEST: Final = 1 << 20  # bytes of a small restart
+_LARGEST: Final = 1 << 20  # largest size of a small restart [bytes]
 
 
 def is_restart(path: str) -> bool:
-    """Whether a file is a small restart that switches parts."""
+    """Return True if a file is a small restart that switches parts."""
     try:
         if not os.path.isfile(path) or os.path.getsize(path) > _LARGEST:  # noqa: PTH113, PTH202  start-up
             return False
@@ -33,14 +33,14 @@ def is_restart(path: str) -> bool:
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # what is wrong is said when it is checked
+        return False  # the check reports the error
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
 def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
-    """Give a run with its restarts as one deck, in which the cards of these have a time.
+    """Return a run with its restarts as one deck, in which the cards of the restarts have a time.
 
-    Without an end of each run, after that of the one before, their times stay unknown.
+    The times stay unknown unless each run has an end later than the one before.
 
     Raises
     ------
@@ -53,8 +53,10 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     )
     ends = [_find_end(deck) for deck in (main, *legs)]
     known_ends = [end.value for end in ends if end]
-    # the end of the last run is that of no other: it may be unknown
-    timed = all(ends[:-1]) and all(one < other for one, other in pairwise(known_ends))
+    # no restart begins at the end of the last run, so that end may be unknown
+    timed = all(ends[:-1]) and all(
+        end_time < next_end_time for end_time, next_end_time in pairwise(known_ends)
+    )
     run = Deck(main.path, scope=main.scope, long=main.long)
     for deck, end in zip((main, *legs), [None, *ends[:-1]], strict=True):
         for name in (
@@ -74,9 +76,9 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
 
 
 def _find_end(deck: Deck) -> Value[float] | None:
-    """Give the ENDTIM of a deck; None for none above 0."""
+    """Return the ENDTIM of a deck; None if it is not positive."""
     rows = [
         (card, card.rows[0]) for card in deck.named("CONTROL_TERMINATION") if card.rows
     ]
-    found = rows[-1][0].real(rows[-1][1], 0) if rows else None
-    return found if found and not found.problem and found.value > 0 else None
+    end = rows[-1][0].real(rows[-1][1], 0) if rows else None
+    return end if end and not end.problem and end.value > 0 else None

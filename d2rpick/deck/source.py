@@ -1,4 +1,4 @@
-"""A deck file: where its keywords stand, found without a look at each line of its mesh, and the lines between two."""
+"""Read a deck file: find its keywords without looking at each line of the mesh, and return the lines between them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,26 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import OnDisk
 
 
-_SEARCHED: Final = (
-    3 << 18
-)  # bytes looked at together: they stay in the cache, always in the same place
-_HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
-_ALONE: Final = 4  # pieces that one thread searches before another one would have begun
-_LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts
+# Bytes searched together: the buffer is reused and stays in the processor's cache.
+_SEARCHED: Final = 3 << 18
+_HELPERS: Final = 1  # additional threads: bytes are copied in parallel, but only one thread searches at a time
+_ALONE: Final = 4  # pieces that one thread searches before a second one has started
+_LOOKBACK: Final = 32  # bytes before a piece, for blanks before its first mark and for a mark on the border
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-_ANCHOR: Final = _PGP.index(
-    b"G"
-)  # a letter that mesh data never holds: looking for it alone costs nothing
-BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8
+# Offset of a letter that mesh data never contains, so that the search for it is fast.
+_ANCHOR: Final = _PGP.index(b"G")
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
+
+_PIECE: Final = 4 << 20  # bytes of whole lines that are processed together
+# Line ends are counted in this fraction of a piece, which stays in the processor's cache.
+_COUNTED: Final = 16
+_GZIP: Final = b"\x1f\x8b\x08"
+_FIRST: Final = 1 << 16  # bytes that are searched for the first line end
+_HEAD: Final = 1024  # bytes of a keyword line that are read
+_BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
+_SILENCE: Final = (
+    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled on use
+)
 
 
 def find_marks(
@@ -41,9 +50,9 @@ def find_marks(
     alone: int = _ALONE,
     helpers: int = _HELPERS,
 ) -> Sequence[int]:
-    """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending.
+    """Return the offsets of each ``*`` at the beginning of a line (after blanks) and of encrypted blocks, ascending.
 
-    A file of more than ``alone`` pieces of so many bytes is searched by ``helpers`` threads beside this one.
+    A file of more than ``alone`` pieces of ``piece`` bytes is searched by ``helpers`` additional threads.
     """
     search = _Search(file, piece)
     try:
@@ -56,37 +65,33 @@ def find_marks(
 
 
 class _Search:
-    """A search of a file by several threads, each of which takes the next piece that waits."""
+    """A search of a file by several threads, each of which takes the next piece."""
 
     def __init__(self, file: Held | OnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
-        self._first = (
-            len(BYTE_ORDER_MARK)
-            if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK
-            else 0
-        )
+        if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK:
+            self._first = len(BYTE_ORDER_MARK)
+        else:
+            self._first = 0
         self.pieces = range(self._first, file.size, piece)
         self._room: Callable[[Iterable[int]], MutableSequence[int]] = (
             list if len(self.pieces) == 1 else _compact
         )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
-        self._helping: list[
-            _thread.LockType
-        ] = []  # each is released by its thread in the end
+        # Locks of the helping threads; each thread releases its lock when it ends.
+        self._helping: list[_thread.LockType] = []
 
     def call_for_help(self) -> None:
-        """Have a thread begin beside this one, which does not wait until it runs."""
+        """Start an additional thread without waiting for it."""
         helping = _thread.allocate_lock()
         helping.acquire()
-        with suppress(
-            RuntimeError
-        ):  # there may be no more threads: then there is no help
+        with suppress(RuntimeError):  # no further thread available: search without help
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
     def _help(self, helping: _thread.LockType) -> None:
-        """Search beside others; the pieces of a thread with which something goes wrong are left to `result`."""
+        """Search in an additional thread; if an error occurs, its pieces are left to `result`."""
         try:
             with suppress(DeckError, OSError, MemoryError):
                 self.go_on()
@@ -94,35 +99,36 @@ class _Search:
             helping.release()
 
     def go_on(self) -> None:
-        """Search what waits, all of it in one buffer: fresh memory costs more than what is put into it."""
-        found: dict[int, Sequence[int]] = {}
+        """Search the remaining pieces in one buffer: new memory costs more than copying into it."""
+        marks_by_piece: dict[int, Sequence[int]] = {}
         piece = bytearray(_LOOKBACK + min(self._piece, self._file.size))
         with self._file.opened() as fill:
             while (begin := next(self._waiting, None)) is not None:
                 low = max(self._first, begin - _LOOKBACK)
                 size = fill(piece, low, min(begin + self._piece, self._file.size))
-                places = _starred(piece, begin - low, size) + _encrypted(
+                offsets = _starred(piece, begin - low, size) + _encrypted(
                     piece, begin - low, size
                 )
-                found[begin] = (
-                    self._room([low + place for place in sorted(places)])
-                    if places
-                    else ()
-                )
+                if offsets:
+                    marks_by_piece[begin] = self._room(
+                        [low + offset for offset in sorted(offsets)]
+                    )
+                else:
+                    marks_by_piece[begin] = ()
         self._found |= (
-            found  # not before: only now it is sure that the file did not change
+            marks_by_piece  # only now it is certain that the file has not changed
         )
 
     def stop(self) -> None:
-        """Let nothing wait, so that no other thread goes on where this one was interrupted, and wait for those."""
+        """Leave no pieces to the other threads, and wait until these have ended."""
         self._waiting = iter(())
         for helping in self._helping:
             helping.acquire()
 
     def result(self) -> Sequence[int]:
-        """All that was found; what a helper left is searched here, where an error is heard."""
-        if left := [begin for begin in self.pieces if begin not in self._found]:
-            self._waiting = iter(left)
+        """Return all marks; pieces that a helper left are searched here, where errors are raised."""
+        if remaining := [begin for begin in self.pieces if begin not in self._found]:
+            self._waiting = iter(remaining)
             self.go_on()
         marks = self._room(())
         for begin in self.pieces:
@@ -130,64 +136,62 @@ class _Search:
         return marks
 
 
-def _compact(places: Iterable[int]) -> MutableSequence[int]:
+def _compact(offsets: Iterable[int]) -> MutableSequence[int]:
+    """Return offsets as an array of 64-bit integers."""
     from array import (
         array,
-    )  # not above: most files are small, and a list of few is as good
+    )  # not above: small files use a list
 
-    return array("q", places)
+    return array("q", offsets)
 
 
 def _starred(piece: bytearray, first: int, end: int) -> list[int]:
-    found, at = [], piece.find(b"*", first, end)
+    """Return the offsets of each ``*`` that begins a line."""
+    offsets = []
+    at = piece.find(b"*", first, end)
     while at >= 0:
-        before = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
-        if before.endswith(b"\n") or (not before and at < _LOOKBACK):
-            found.append(at)
+        blanks = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
+        if blanks.endswith(b"\n") or (not blanks and at < _LOOKBACK):
+            offsets.append(at)
         at = _below(piece, b"*", at, end)
-    return found
+    return offsets
 
 
 def _below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Place of the next such letter below the line of ``at``: one line may have many, and begins once."""
+    """Return the next occurrence of a letter below the line of ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
 
 def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
-    # a head cut by the end of this piece is found in the next one, where all of it stands before the first byte
-    found, at = [], piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
+    # A head that continues in the next piece is found there, because that piece begins with the end of this one.
+    """Return the offsets of the heads of encrypted blocks."""
+    offsets = []
+    at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
     while at >= 0:
         start = at - _ANCHOR
-        before = bytes(piece[max(0, start - 1) : max(0, start)])
-        if start >= 0 and piece.startswith(_PGP, start, end) and before in (b"", b"\n"):
-            found.append(start)
+        preceding = bytes(piece[max(0, start - 1) : max(0, start)])
+        if (
+            start >= 0
+            and piece.startswith(_PGP, start, end)
+            and preceding in (b"", b"\n")
+        ):
+            offsets.append(start)
         at = _below(piece, b"G", at, end)
-    return found
-
-
-_PIECE: Final = 4 << 20  # bytes of whole lines that are looked at together
-_COUNTED: Final = (
-    16  # line ends are counted in this part of a piece, which stays in the cache
-)
-_GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # bytes in which the first line end is looked for
-_HEAD: Final = 1024  # longest keyword line that is looked at
-_BEFORE: Final = 4096  # how far back comments belonging to a keyword are looked for
-_SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled where it is needed
+    return offsets
 
 
 class SourceFile:
-    """One deck file, read as bytes and shown as Latin-1: all that is read of it is of one state of the file.
+    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of the same state of the file.
 
-    ``name`` is the path as messages show it; ``content`` is given for what does not lie in a file, or is open already;
-    ``piece`` bytes are looked at together.  Line numbers are counted when they are asked for: in a large deck counting
-    costs more than finding the keywords.
+    ``name`` is the path for messages. ``content`` is given if the content is not in a file or the file is open already.
+    ``piece`` bytes are processed together. Line numbers are counted on request: in a large deck counting takes longer
+    than finding the keywords.
 
     Raises
     ------
     DeckError
-        If it cannot be opened; from any method, if the file was rewritten or replaced since then.
+        If the file cannot be opened; from any method, if it has been changed since.
     """
 
     def __init__(
@@ -197,34 +201,29 @@ class SourceFile:
         piece: int = _PIECE,
     ) -> None:
         self.name, self._piece = name, piece
-        self._file = (
-            stored(name)
-            if content is None
-            else Held(content)
-            if isinstance(content, bytes)
-            else content
-        )
-        self._counted = [
-            (0, 1)
-        ]  # (offset, number of the line that holds it), ascending
+        if content is None:
+            content = stored(name)
+        elif isinstance(content, bytes):
+            content = Held(content)
+        self._file = content
+        # Offsets and the line numbers at them, ascending.
+        self._counted = [(0, 1)]
         self._longest = bound("LINE")
 
     @cached_property
     def marks(self) -> Sequence[int]:
-        """Offsets of all keywords and encrypted blocks; DeckError for a file that no reader of decks would take."""
+        """Return the offsets of all keywords and encrypted blocks; DeckError for a file that no solver can read."""
         first = self.read(0, _FIRST)
         if first.startswith(_GZIP):
-            raise DeckError(
-                f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it"
-            )
+            raise DeckError(f"{self.name}: the deck is compressed with gzip; unpack it")
         if b"\r" in first and b"\n" not in first:
             raise DeckError(
-                f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected"
+                f"{self.name}: lines end in CR alone (expected LF or CR LF); convert the line ends"
             )
         return find_marks(self._file)
 
     def blocks(self) -> Iterator[Block]:
-        """Keyword blocks and encrypted blocks in the order of the file, up to ``*END``."""
+        """Yield keyword blocks and encrypted blocks in the order of the file, up to ``*END``."""
         for start, end in zip_longest(self.marks, islice(self.marks, 1, None)):
             head = (
                 self.read(start, start + _HEAD)
@@ -237,11 +236,11 @@ class SourceFile:
             yield Block(self, start, end, head)
 
     def read(self, start: int, end: int | None = None) -> bytes:
-        """Read the bytes from ``start`` to ``end``, less where the file ends before."""
+        """Return the bytes from ``start`` to ``end``, or fewer at the end of the file."""
         return self._file.read(start, self._file.size if end is None else end)
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
-        """Read the bytes from ``start`` to ``end`` or the end of the file in pieces of whole lines."""
+        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in pieces of whole lines."""
         end = min(self._file.size, self._file.size if end is None else end)
         size = self._piece
         while start < end:
@@ -253,22 +252,23 @@ class SourceFile:
                 yield piece
                 start += len(piece)
             else:
-                size *= 2  # this line is longer
+                size *= 2  # the line is longer than a piece
 
     def text(self, start: int, end: int | None) -> str:
-        """Read the same at once, as Latin-1."""
+        """Return the bytes from ``start`` to ``end`` as Latin-1 text."""
         data = self.read(start, end)
         self._refuse_long_line(data, start)
         return data.decode("latin-1")
 
     def _refuse_long_line(self, data: bytes, start: int) -> None:
+        """Raise DeckError if a line is longer than the limit."""
         if len(data) > self._longest and (at := long_line(data, self._longest)) >= 0:
             raise DeckError(
                 f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}"
             )
 
     def sha256(self) -> str:
-        """SHA-256 of the bytes; DeckError where the file was rewritten since it was read."""
+        """Return the SHA-256 of the bytes; DeckError if the file has changed since it was read."""
         import hashlib
 
         digest = hashlib.sha256()
@@ -280,31 +280,31 @@ class SourceFile:
         return digest.hexdigest()
 
     def ends_with_line(self) -> bool:
-        """Whether the last line has its line end; an empty file has."""
+        """Return True if the last line has a line end, or the file is empty."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
     @cached_property
     def silences(self) -> bool:
-        """Whether comments may silence rules; of a large file, which is not read for that, it is not known."""
+        """Return True if comments may silence rules; always True for a large file, which is not searched for them."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
-        """Return the number of the line, from 1, that holds the byte at ``offset``."""
-        known = bisect_right(self._counted, (offset, 1 << 62)) - 1
-        position, line = self._counted[known]
-        together = -(-self._piece // _COUNTED)
-        room = bytearray(min(together, max(0, offset - position)))
+        """Return the number (from 1) of the line with the byte at ``offset``."""
+        nearest = bisect_right(self._counted, (offset, 1 << 62)) - 1
+        position, line = self._counted[nearest]
+        step = -(-self._piece // _COUNTED)
+        room = bytearray(min(step, max(0, offset - position)))
         with self._file.opened() as fill:
-            for at in range(position, offset, together):
-                line += room.count(b"\n", 0, fill(room, at, min(at + together, offset)))
+            for at in range(position, offset, step):
+                line += room.count(b"\n", 0, fill(room, at, min(at + step, offset)))
         if offset > position:
-            self._counted.insert(known + 1, (offset, line))
+            self._counted.insert(nearest + 1, (offset, line))
         return line
 
 
 @dataclass(eq=False, repr=False)
 class Block:
-    """A keyword with all lines up to the next one, or an encrypted block: a place in a file."""
+    """A keyword with all lines up to the next keyword, or an encrypted block: a place in a file."""
 
     source: SourceFile
     start: int
@@ -313,48 +313,48 @@ class Block:
 
     @property
     def encrypted(self) -> bool:
-        """Whether this is the head of an encrypted block and no keyword."""
+        """Return True if this is an encrypted block."""
         return self.head.startswith("-")
 
     @property
     def _comment(self) -> tuple[str, ...]:
-        """What begins a comment line: ``$`` in LS-DYNA's decks, ``#`` too in those of Radioss."""
+        """Return the beginnings of comment lines: ``$``, and for Radioss ``#`` too."""
         return ("$", "#") if self.head.startswith("/") else ("$",)
 
     @cached_property
     def line(self) -> int:
-        """Number of the keyword line in its file."""
+        """Return the line number of the keyword line."""
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Read the data lines, with their distance to the keyword, without comments."""
+        """Return the data lines without comments, each with its distance to the keyword line."""
         comment = self._comment
-        *lines, rest = self.source.text(self.start, self.end).split("\n")
+        *lines, last = self.source.text(self.start, self.end).split("\n")
         if (
-            rest and self.end is None
-        ):  # otherwise these are the blanks in front of the next keyword
-            lines.append(rest)
-        found = enumerate(lines[1:], start=1)
+            last and self.end is None
+        ):  # otherwise these are the blanks before the next keyword
+            lines.append(last)
+        numbered = enumerate(lines[1:], start=1)
         return [
             (distance, line.rstrip("\r"))
-            for distance, line in found
+            for distance, line in numbered
             if not line.startswith(comment)
         ]
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:
-        """Rules, or beginnings of their ids, that ``$ d2rpick: ignore`` names in the comments before the keyword.
+        """Return the rule ids, or their beginnings, in ``$ d2rpick: ignore`` comments before the keyword.
 
-        Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
+        Only words directly after the colon are read, so that a reason may follow. A word that is not an id is returned
+        too.
         """
         above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
             BYTE_ORDER_MARK
         )
-        lines = above.decode("latin-1").split("\n")[
-            :-1
-        ]  # without the blanks in front of the keyword
+        # The last element is the blanks before the keyword.
+        lines = above.decode("latin-1").split("\n")[:-1]
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):
-            if found := re.match(_SILENCE, line, re.IGNORECASE):
-                rules += re.split(r"[\s,]+", found[1].strip(" \t\r,").upper())
+            if match := re.match(_SILENCE, line, re.IGNORECASE):
+                rules += re.split(r"[\s,]+", match[1].strip(" \t\r,").upper())
         return tuple(rules)

@@ -1,9 +1,9 @@
-"""Bytes of a deck file, all of one state of it: read when they are asked for, or held in memory.
+"""Store the bytes of a deck file, all from one state of the file: in memory, or read on request.
 
-A deck is saved by an editor, or written anew by a pre-processor, while its rows are still to be read.  A small file is
-held in memory.  A big one is opened whenever some of it is wanted, so that no number of includes uses up the open files
-of a process; a file that is not as it was then is an error.  Files are not mapped into memory: where a mapped page is
-cut off, the system ends the process.
+An editor or a pre-processor may save a deck again while its rows are still to be read. A small file is kept in memory.
+A large file is opened for each read, so that many includes do not use up the open files of a process; an error is
+raised if it has changed. Files are not mapped into memory, because the system ends a process whose mapped page
+disappears.
 """
 
 from __future__ import annotations
@@ -19,20 +19,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    Filling = Callable[
-        [bytearray, int, int], int
-    ]  # puts the bytes from one place to another first, and counts them
+    # Copies the bytes between two offsets into a buffer, and returns their number.
+    Filling = Callable[[bytearray, int, int], int]
 
 
-HELD_UP_TO: Final = (
-    1 << 18
-)  # a file up to this size is held in memory: a deck may have thousands of them
-_WINDOW: Final = (
-    1 << 16
-)  # bytes read at a time where few are wanted: more will be, close to them
-_KEPT: Final = (
-    8  # windows held: the ends of a deck's large blocks are looked at again and again
-)
+# Largest file that is kept in memory [bytes]: a deck may have thousands of includes.
+HELD_UP_TO: Final = 1 << 18
+# Least number of bytes read at a time: the next request is mostly close by.
+_WINDOW: Final = 1 << 16
+# Number of cached pieces: the ends of the large blocks of a deck are read repeatedly.
+_KEPT: Final = 8
 
 
 class Held:
@@ -42,12 +38,12 @@ class Held:
         self._data, self.size = data, len(data)
 
     def read(self, begin: int, end: int) -> bytes:
-        """Bytes from ``begin`` to ``end``, less where the file ends before."""
+        """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""
         return self._data[begin:end]
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
-        """Give a function that puts bytes into a buffer."""
+        """Provide a function that copies bytes into a buffer."""
         yield self._fill
 
     def _fill(self, room: bytearray, begin: int, end: int) -> int:
@@ -57,18 +53,18 @@ class Held:
 
 
 class OnDisk:
-    """Bytes of a file that are read when they are asked for; DeckError when it is not as it was at first.
+    """Bytes of a file, read on request; DeckError if the file has changed.
 
-    ``window`` bytes are read at a time where few are wanted.
+    At least ``window`` bytes are read at a time.
     """
 
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        self._windows: dict[int, bytes] = {}  # by where they begin, the oldest first
+        self._windows: dict[int, bytes] = {}  # by their offset, the oldest first
 
     def read(self, begin: int, end: int) -> bytes:
-        """Bytes from ``begin`` to ``end``, less where the file ends before."""
+        """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""
         end = min(end, self.size)
         if begin >= end:
             return b""
@@ -86,7 +82,10 @@ class OnDisk:
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
-        """Give a function that puts bytes into a buffer; what it gave is sure when the context is left."""
+        """Provide a function that copies bytes into a buffer.
+
+        On leaving the context it is checked that the file is unchanged.
+        """
         with _opened(self._name) as file:
             yield lambda room, begin, end: self._fill(file, room, begin, end)
             if not FileState.of(file).is_as(self._state):
@@ -99,8 +98,9 @@ class OnDisk:
         return bytes(room)
 
     def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
-        done, wanted = 0, memoryview(room)[: end - begin]
-        while done < len(wanted):  # a single call may give less
+        done = 0
+        wanted = memoryview(room)[: end - begin]
+        while done < len(wanted):  # a single call may return fewer bytes
             count = _read_at(file, wanted[done:], begin + done)
             if not count:
                 raise self._changed()
@@ -108,17 +108,17 @@ class OnDisk:
         return done
 
     def _changed(self) -> DeckError:
-        found = f"{self._name}: the file was rewritten or replaced while it was read"
-        return DeckError(f"{found}; read it again when it is complete")
+        problem = f"{self._name}: the file was rewritten or replaced while it was read"
+        return DeckError(f"{problem}; read it again when it is complete")
 
 
 def stored(name: str) -> Held | OnDisk:
-    """Bytes of a file: held in memory where it is small or no regular file.
+    """Return the bytes of a file: in memory if it is small or not a regular file.
 
     Raises
     ------
     DeckError
-        If it cannot be opened, is a device, or changes all the time.
+        If it cannot be opened, is a device, or keeps changing.
     """
     with _opened(name) as file:
         state = at_rest(name, file, DeckError)
@@ -129,7 +129,7 @@ def stored(name: str) -> Held | OnDisk:
 
 
 def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
-    """Put bytes from a place on into ``room``, and count them; in one call where the system has one for that."""
+    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)
@@ -137,6 +137,7 @@ def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _opened(name: str) -> FileIO:
+    """Open a file; DeckError if that fails."""
     try:
         return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What a card has to suit in the deck that it is for: ids that are taken, constraints on the parts, the run's end."""
+"""Find what a deck requires of a card: free ids, constraints on the parts, and the name and end of its run."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from d2rpick.deck.switching import read_switching
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-_FIRST: Final = 901  # id of switch sets and part sets, where it is free
+_FIRST: Final = 901  # first id of new switch sets and part sets, if it is free
 
 
 class Suiting(NamedTuple):
-    """What the deck asks of a card; None and False where it asks nothing.
+    """Requirements of a deck on a card; None and False if there are none.
 
-    ``solver`` is whose deck it is, ``name`` and ``end`` are those of its run [time], ``swset`` are free ids of switch
-    sets, above which those of part sets are free too.  ``delete_nodal_bodies``, ``delete_node_sets``: constraints of
-    the deck, which all lie on the parts, have to be deleted while these are rigid.
+    ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
+    switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the
+    deck has such constraints, all of them on the parts, so they have to be deleted while the parts are rigid.
     """
 
     solver: str
@@ -38,7 +38,7 @@ class Suiting(NamedTuple):
 
 
 def find_suiting(path: str, parts: Collection[int]) -> Suiting:
-    """Find what a deck asks of a card that switches some parts.
+    """Return the requirements of a deck on a card that switches some parts.
 
     Raises
     ------
@@ -55,20 +55,29 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
     deck = read_deck(path)
     bodies = [*read_constraints(deck, "nodal rigid body")]
     further = [*read_constraints(deck, "extra nodes", "joint")]
-    nodal, by_set = (_lie_on(some, parts, deck) for some in (bodies, further))
+    nodal, by_set = (
+        _lie_on(constraints, parts, deck) for constraints in (bodies, further)
+    )
     return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
 
 
 def find_name_of_files(run: Run) -> str | None:
-    """Give the name that the files of a run begin with, by which the engine finds its restart; else that in /RUN."""
+    """Return the common beginning of the file names of a run, by which the engine finds its restart.
+
+    If the files have no common name, return the name in /RUN.
+    """
     if run.starter and (root := root_of(run.starter.sources[0].name)):
         return root
     return run.legs[0].name if run.legs else None
 
 
 def _find_free_ids(deck: Deck) -> tuple[int, int]:
-    """Two ids from which on no switch set and no part set of the deck has any."""
-    sets = (one.header.swset.value for one in read_switching(deck) if one.header)
+    """Return two ids above those of all switch sets and part sets of the deck."""
+    sets = (
+        switch_set.header.swset.value
+        for switch_set in read_switching(deck)
+        if switch_set.header
+    )
     highest = max((*sets, *read_parts(deck).sets), default=0)
     first = max(_FIRST, highest + 1)
     return first, first + 1
@@ -77,16 +86,20 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _lie_on(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Whether there are constraints, and each lies on these parts alone: to delete them is to delete all of a kind."""
+    """Return True if there are constraints and each lies on these parts alone, so that all of a kind may be deleted."""
     if not constraints:
         return False
     from d2rpick.deck.ls_dyna_inventory import first_parts  # loads numpy
 
     cards = element_cards(deck, searched=True)
-    rest = read_parts(deck).materials.keys() - set(parts)
-    touching, beyond = first_parts(cards, parts), first_parts(cards, rest)
+    other_parts = read_parts(deck).materials.keys() - set(parts)
+    nodes_on_parts = first_parts(cards, parts)
+    nodes_elsewhere = first_parts(cards, other_parts)
     return all(
         constraint.part in parts
-        or (constraint.nodes & touching.keys() and not constraint.nodes & beyond.keys())
+        or (
+            constraint.nodes & nodes_on_parts.keys()
+            and not constraint.nodes & nodes_elsewhere.keys()
+        )
         for constraint in constraints
     )

@@ -1,4 +1,4 @@
-"""Lines of a switch set of LS-DYNA, *DEFORMABLE_TO_RIGID_AUTOMATIC: its two first lines, and those of its parts."""
+"""Write a switch set of LS-DYNA (*DEFORMABLE_TO_RIGID_AUTOMATIC): its two header lines and its part lines."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ _COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    o
 def to_rigid(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Write the parts that become rigid, those that lead first, or the sets that they make up."""
+    """Yield the D2R lines of some parts or their sets, lead parts first."""
     yield "$#     pid       lrb     ptype"
-    for lead, some in group_by_lead(ids, printing).items():
+    for lead, members in group_by_lead(ids, printing).items():
         yield from (
             f"{name:10d}{lead:10d}{kind:>10}"
-            for name, kind in name_parts(some, part_sets)
+            for name, kind in name_parts(members, part_sets)
         )
 
 
 def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:
-    """Write the parts that become deformable, or their set."""
+    """Yield the R2D lines of some parts or their set."""
     yield "$#     pid     ptype"
     yield from (f"{name:10d}{kind:>10}" for name, kind in name_parts(ids, part_sets))
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Give the parts by their lead, those without one first, under 0."""
+    """Return the parts by their lead part; parts without a lead come first, under 0."""
     leads = _find_leads(ids, printing)
     by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):
@@ -46,7 +46,7 @@ def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]
 
 
 def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
-    """Give the lead of each part that is merged into another."""
+    """Return the lead part of each part that is merged."""
     if printing.merge is not None:
         return {part: printing.merge for part in ids if part != printing.merge}
     bodies = [[part for part in body if part in ids] for body in printing.bodies]
@@ -54,10 +54,10 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place.
+    """What a switch set waits for: its CODE, the contact, TIME3 [time], the id of its pair (``other``) and PAIRED.
 
-    ``latest``: it does not switch after that [time]; ``offset``: it switches at so large a gap before a contact.  0 for
-    none.
+    ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
+    switches. 0 stands for none.
     """
 
     code: int = 0
@@ -77,10 +77,10 @@ def header(
     waits: Waiting | None = None,
     constraints: Sequence[int] = (0, 0),
 ) -> Iterator[str]:
-    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits.
+    """Yield the header lines of a switch set: TIME1 is ``time``, or the earliest time if the set waits for a force.
 
-    ``counts`` are D2R and R2D, ``constraints`` NRBF and NCSF: 0 leaves constraints as they are, 1 deletes them and 2
-    activates them.
+    ``counts`` are D2R and R2D. ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
+    them.
     """
     waiting = waits or Waiting()
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"

@@ -1,9 +1,9 @@
-"""Switching cards of LS-DYNA field by field, and the windows in which cards of any solver make parts rigid.
+"""Read the switching cards of LS-DYNA field by field, and follow the rigid windows that cards of any solver make.
 
-The cards are *DEFORMABLE_TO_RIGID and its variants, and their restart relatives.
+The cards are *DEFORMABLE_TO_RIGID, its variants, and the restart cards *RIGID_DEFORMABLE.
 
-Columns and defaults: the vendor's keyword data as published in its Python library, and two independent
-sources; which of the D2R and R2D lines hold PTYPE in which column is a trap several writers fell into.
+Columns and defaults: the vendor's keyword data as published in its Python library, and two independent sources. PTYPE
+has different columns on D2R and R2D lines, which several writers of decks got wrong.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 
-BY_TIME, BY_SENSOR = 0, 5  # CODE
+BY_TIME, BY_SENSOR = 0, 5  # values of CODE
 _KINDS: Final[dict[str, Kind]] = {
     "DEFORMABLE_TO_RIGID": "plain",
     "DEFORMABLE_TO_RIGID_AUTOMATIC": "automatic",
@@ -36,6 +36,7 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
+# Types of the fields in the two header lines.
 _FIRST_LINE = (
     int,
     int,
@@ -45,9 +46,9 @@ _FIRST_LINE = (
     int,
     int,
     int,
-)  # how the fields of a header are read
+)
 _SECOND_LINE = (int, int, float, float, int, int, float)
-_COUNTS_FIELD = 4  # of the second line: D2R
+_COUNTS_FIELD = 4  # position of D2R in the second line
 _PTYPES: Final = {"PART", "PSET"}
 _INERTIA_ROWS: Final = (
     "the first line (PID)",
@@ -63,7 +64,7 @@ _REALS: Final = {
 
 
 class Switched(NamedTuple):
-    """One line: a part (or a part set, ``by_set``) that is made rigid or deformable."""
+    """One part line: a part, or a part set (``by_set``), that is made rigid or deformable."""
 
     part: Value[int]
     by_set: bool
@@ -72,7 +73,7 @@ class Switched(NamedTuple):
 
 
 class Header(NamedTuple):
-    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC, field by field; counts are D2R and R2D."""
+    """The two header lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; ``to_rigid`` and ``to_deformable`` are D2R and R2D."""
 
     swset: Value[int]
     code: Value[int]
@@ -93,10 +94,9 @@ class Header(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class SwitchSet:
-    """One switching card as read: its header where it has one, and its parts.
+    """One switching card as read: its header, if it has one, and its parts.
 
-    ``count_problem`` says how lines and counts differ (empty: they agree); ``problems`` are the fields
-    that could not be read, each with the reason.
+    ``count_problem`` says how lines and counts differ, or is empty. ``values`` are all its fields.
     """
 
     card: Card
@@ -105,14 +105,14 @@ class SwitchSet:
     switched: tuple[Switched, ...]
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
-    part: Value[int] | None = None  # of *DEFORMABLE_TO_RIGID_INERTIA
+    part: Value[int] | None = None  # part of *DEFORMABLE_TO_RIGID_INERTIA
     restart: Restart | None = (
         None  # in which it stands, where it is known when that begins
     )
 
     @cached_property
     def time(self) -> float | None:
-        """When it switches [time of the whole deck]; None when that is not for a clock to say."""
+        """Return the switching time [time of the whole deck]; None if no time decides."""
         if self.restart:
             return self.restart.at
         if self.kind == "plain":
@@ -129,19 +129,22 @@ class SwitchSet:
 
     @property
     def time_field(self) -> Field:
-        """TIME1, the end of the run before a restart, or the keyword of a card without either."""
+        """Return the field with the switching time, or the keyword of a card without one.
+
+        It is TIME1, or the end of the run before a restart.
+        """
         if self.restart:
             return self.restart.stop_field
         return self.header.time1.field if self.header else self.card.here
 
     @property
     def problems(self) -> Iterator[tuple[Field, str]]:
-        """Fields that say nothing usable."""
+        """Return the fields that cannot be read, with the reason."""
         return ((value.field, value.problem) for value in self.values if value.problem)
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Parameters the card uses."""
+        """Return the names of the parameters that the card uses."""
         return tuple(
             dict.fromkeys(name for value in self.values for name in value.parameters)
         )
@@ -160,7 +163,7 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
 
 
 def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
-    """Cards that look like switching cards but are none, and the keyword that was probably meant."""
+    """Yield cards that resemble switching cards but are none, with the keyword that was probably meant."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
             from difflib import get_close_matches  # start-up
@@ -170,6 +173,7 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
 
 
 def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
+    """Read a card without header."""
     restart = restart if kind == "restart" else None
     rows = card.lines
     if kind == "inertia":
@@ -180,11 +184,12 @@ def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
             for at in range(count)
         ]
         missing = _INERTIA_ROWS[len(rows) :]
-        problem = (
-            f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
-            if missing
-            else ""
-        )
+        if missing:
+            problem = (
+                f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
+            )
+        else:
+            problem = ""
         return SwitchSet(
             card, kind, None, (), (*part, *reals), problem, next(iter(part), None)
         )
@@ -197,6 +202,7 @@ def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
 
 
 def _automatic(card: Card) -> SwitchSet:
+    """Read a *DEFORMABLE_TO_RIGID_AUTOMATIC."""
     rows = list(card.rows)
     while rows and rows[-1].blank:
         rows.pop()
@@ -206,14 +212,15 @@ def _automatic(card: Card) -> SwitchSet:
     lines = rows[_HEADER_ROWS:]
     if header.to_rigid.problem or header.to_deformable.problem:
         return _with(card, "automatic", header, [])
-    rigid, deformable = header.to_rigid.value, header.to_deformable.value
+    rigid = header.to_rigid.value
+    deformable = header.to_deformable.value
     problem = ""
     if rigid < 0 or deformable < 0:
         problem = (
-            f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
+            f"D2R is {rigid} and R2D is {deformable}, expected counts of 0 or more"
         )
     elif len(lines) != rigid + deformable:
-        problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
+        problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))}"
         problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
         short = (
@@ -224,7 +231,8 @@ def _automatic(card: Card) -> SwitchSet:
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
         problem = "a line is empty where a part was expected"
-    rigid, deformable = max(rigid, 0), max(deformable, 0)
+    rigid = max(rigid, 0)
+    deformable = max(deformable, 0)
     switched = [
         _line(card, row, to_rigid=True, ptype=True)
         for row in lines[:rigid]
@@ -238,14 +246,14 @@ def _automatic(card: Card) -> SwitchSet:
 
 
 def _missing(rows: Sequence[Row]) -> str:
-    """Say which of the two first lines are missing: they are, too, where a line of a part stands in their place."""
-    both = (
+    """Return which of the two header lines are missing, also if a part line takes their place; empty if none is."""
+    both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
     if not rows:
-        return both
+        return both_missing
     if _is_of_part(rows[0]):
-        return f"{both}, {rows[0].text.strip()!r} stands in their place"
+        return f"{both_missing}, {rows[0].text.strip()!r} stands in their place"
     if len(rows) < _HEADER_ROWS:
         return "the second line (NRBF to OFFSET) is missing"
     if _is_of_part(rows[1]):
@@ -254,45 +262,51 @@ def _missing(rows: Sequence[Row]) -> str:
 
 
 def _is_of_part(row: Row) -> bool:
+    """Return True if a line has PTYPE in one of its columns."""
     return row.cell(1).upper() in _PTYPES or row.cell(2).upper() in _PTYPES
 
 
 def _lines(count: int) -> str:
-    return "1 line" if count == 1 else f"{count or 'no'} lines"
+    """Return how many part lines follow, as text."""
+    return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
 def _header(card: Card, first: Row, second: Row) -> Header:
+    """Read the two header lines."""
     values = card.numbers(first, _FIRST_LINE) + card.numbers(second, _SECOND_LINE)
-    swset, code, time1, time2, time3, entno, relsw, *others = values
+    swset, code, time1, time2, time3, entno, relsw, *further_values = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
         code = replace(
             code,
-            problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected",
+            problem=f"CODE is {code.value}, expected {BY_TIME} to {BY_SENSOR}",
             parameters=(),
         )
     if not swset.problem and swset.value <= 0:
         swset = replace(
             swset,
-            problem=f"SWSET is {swset.value}, a positive number was expected",
+            problem=f"SWSET is {swset.value}, expected a positive number",
             parameters=(),
         )
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
         time1 = replace(time1, problem=problem, parameters=())
-    swset, relsw = (_moved(one, card.transform.rest) for one in (swset, relsw))
-    return Header(swset, code, time1, time2, time3, entno, relsw, *others)
+    swset, relsw = (_moved(set_id, card.transform.rest) for set_id in (swset, relsw))
+    return Header(swset, code, time1, time2, time3, entno, relsw, *further_values)
 
 
 def _runs_over(row: Row) -> bool:
-    """Whether digits of TIME1 seem to go on as TIME2: a number of its own that fills its field has a point."""
+    """Return True if the digits of TIME1 continue in the columns of TIME2, which is then not a number of its own."""
     border = 3 * row.width
-    rest = row.text[border : border + row.width].strip()
+    next_field = row.text[border : border + row.width].strip()
     touching = (
         row.text[border - 1 : border].isdigit()
         and row.text[border : border + 1].isdigit()
     )
     return (
-        touching and "," not in row.text and "." not in rest and rest.strip("0") != ""
+        touching
+        and "," not in row.text
+        and "." not in next_field
+        and next_field.strip("0") != ""
     )
 
 
@@ -300,12 +314,11 @@ _Line = tuple[Switched, Value[str]]
 
 
 def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
-    """Part, LRB where the line has it, and PTYPE: column 21 of a D2R line, column 11 of an R2D line."""
-    kind = (
-        card.word(row, 2 if to_rigid else 1, "PART")
-        if ptype
-        else Value("PART", card.here)
-    )
+    """Read a part line: part, LRB on a D2R line, and PTYPE (column 21 of a D2R line, column 11 of an R2D line)."""
+    if ptype:
+        kind = card.word(row, 2 if to_rigid else 1, "PART")
+    else:
+        kind = Value("PART", card.here)
     if kind.value not in _PTYPES:
         kind = Value(
             "PART",
@@ -327,12 +340,10 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
 
 
 def _moved(value: Value[int], offset: int) -> Value[int]:
-    """Add the offset of the include to an id; 0 stays none."""
-    return (
-        value
-        if value.problem or not value.value or not offset
-        else replace(value, value=value.value + offset)
-    )
+    """Add the offset of the include to an id; 0 stays 0."""
+    if value.problem or not value.value or not offset:
+        return value
+    return replace(value, value=value.value + offset)
 
 
 def _with(
@@ -342,6 +353,7 @@ def _with(
     lines: Sequence[_Line],
     count_problem: str = "",
 ) -> SwitchSet:
+    """Return the switch set of a card with its part lines."""
     values: list[Value[int] | Value[float] | Value[str]] = list(header or ())
     for switched, ptype in lines:
         values += (
@@ -363,7 +375,7 @@ def _with(
 
 
 class Unit(NamedTuple):
-    """A part; or a part set or a rigid body (by its main node) whose parts cannot be known."""
+    """A part, or a part set or a rigid body (by its main node) whose parts are unknown."""
 
     id: int
     is_set: bool = False
@@ -371,17 +383,19 @@ class Unit(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """What the id is one of."""
-        return "part set" if self.is_set else "main node" if self.is_body else "part"
+        """Return the kind of the id: part, part set or main node."""
+        if self.is_set:
+            return "part set"
+        return "main node" if self.is_body else "part"
 
     @property
     def part(self) -> int | None:
-        """The part; None for a part set or rigid body whose parts cannot be known."""
+        """Return the part id; None for a part set or rigid body whose parts are unknown."""
         return None if self.is_set or self.is_body else self.id
 
 
 class Event(NamedTuple):
-    """A unit is switched by a line of a card."""
+    """A switch of one unit by a line of a card."""
 
     unit: Unit
     by: SwitchSet
@@ -389,9 +403,9 @@ class Event(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A unit is rigid from ``tr`` to ``td`` [time of the deck]; ``td`` is None when it stays rigid.
+    """A rigid window of a unit from ``tr`` to ``td`` [time of the deck]; ``td`` is None if the unit stays rigid.
 
-    ``td`` may lie before ``tr``: that is what the cards say, and a finding.
+    ``td`` may be earlier than ``tr`` if the cards say so, which a rule reports.
     """
 
     unit: Unit
@@ -402,14 +416,14 @@ class Window(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """The part; None where it cannot be known."""
+        """Return the part id; None if the parts are unknown."""
         return self.unit.part
 
 
 class Windows(NamedTuple):
-    """All windows of a deck by unit and time; ``orphans`` switch back what nothing made rigid before.
+    """All rigid windows of a deck by unit and time; ``orphans`` switch back a unit that nothing made rigid before.
 
-    ``other_rigid`` and ``other_deformable`` are switched at times that no clock tells (CODE 1-5, restarts).
+    ``other_rigid`` and ``other_deformable`` are units that are switched at unknown times (CODE 1-5, restarts).
     """
 
     windows: tuple[Window, ...]
@@ -424,13 +438,12 @@ def find_windows(
     parts: Parts,
     by_sensor: Iterable[tuple[float, Event]] = (),
 ) -> Windows:
-    """Follow every part through the cards in the order of their times.
+    """Return the windows of every part, from the cards in the order of their times.
 
-    ``by_sensor`` are switches whose times are known from elsewhere.
+    ``by_sensor`` are switches by sensors with their times, which the cards do not contain.
 
-    Part sets are resolved to their parts.  A part that is made rigid while it is rigid (a new lead) stays in
-    its window.  When a part is switched back first and made rigid later and nothing else matches, the two
-    belong to one inverted window.
+    Part sets are replaced by their parts. A part that is made rigid while it is rigid (a new lead) stays in its window.
+    If a part is switched back first and made rigid later, and nothing else matches, the two form one inverted window.
     """
     events = tuple(event for card in sets for event in _events(card, parts))
     timed: dict[Unit, list[tuple[float, Event]]] = defaultdict(list)
@@ -442,25 +455,26 @@ def find_windows(
     windows: list[Window] = []
     orphans: list[Event] = []
     for unit in sorted(timed):
-        # at equal times the way back counts as the earlier one: both at once is no window
-        found, left = follow(
+        # at equal times the switch back comes first: both at once give no window
+        unit_windows, unit_orphans = follow(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
         )
-        if left and found and found[-1].td is None:
-            td, closed = left.pop()
-            found[-1] = found[-1]._replace(td=td, closed=closed)
-        windows += found
-        orphans += [event for _, event in left]
-    other = [event for event in events if event.by.time is None]
+        if unit_orphans and unit_windows and unit_windows[-1].td is None:
+            td, closed = unit_orphans.pop()
+            unit_windows[-1] = unit_windows[-1]._replace(td=td, closed=closed)
+        windows += unit_windows
+        orphans += [event for _, event in unit_orphans]
+    untimed = [event for event in events if event.by.time is None]
     rigid, back = (
-        frozenset(one.unit for one in other if one.line.to_rigid == way)
-        for way in (True, False)
+        frozenset(event.unit for event in untimed if event.line.to_rigid == to_rigid)
+        for to_rigid in (True, False)
     )
     return Windows(tuple(windows), tuple(orphans), events, rigid, back)
 
 
 def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
+    """Yield the events of a card, one for each part."""
     for line in card.switched:
         if line.part.problem:
             continue
@@ -474,7 +488,7 @@ def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
 def follow(
     unit: Unit, events: Iterable[tuple[float, Event]]
 ) -> tuple[list[Window], list[tuple[float, Event]]]:
-    """Windows of a unit by its events and their times, in order; and the events that find it deformable already."""
+    """Return the windows of a unit from its events in order, and the events that find it deformable already."""
     windows: list[Window] = []
     orphans: list[tuple[float, Event]] = []
     opened: tuple[float, Event] | None = None

@@ -1,12 +1,12 @@
-"""Parts that must not be made rigid and deformable again, whatever their energy says, and why.
+"""Find the parts that must not be made rigid and deformable again, whatever their energy is, and say why.
 
-Material that flows through its mesh is no body.  A law that computes its stress from the deformation since the start
-keeps that start as its stress-free reference: what the part was given as a rigid body (a stress that was zeroed, or a
-motion that is not its own) is a deformation for it once it is switched back.
+Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
+has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
+a motion that is not its own) becomes a deformation when it is switched back.
 
 Source: the vendor's keyword data for ELFORM, the theory of the laws, Altair's public help for /ALE/MAT, /EULER/MAT,
-/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that came back with stress).  Not
-tried with LS-DYNA.
+/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that had stress after the switch
+back). Not tried with LS-DYNA.
 """
 
 from __future__ import annotations
@@ -22,17 +22,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.reader import Deck
 
-
-class Unswitchable(NamedTuple):
-    """Why a part must not be switched; ``flows``: its material flows through the mesh, else it keeps a reference."""
-
-    flows: bool
-    reason: str
-
-
-# ELFORM of *SECTION_SOLID.
+# Formulations (ELFORM of *SECTION_SOLID) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
-# Names and numbers of *MAT keywords; a number may have zeros in front.
+# *MAT keywords of laws with a stress-free reference, by name and number; a number may have leading zeros.
 _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
@@ -55,13 +47,23 @@ _LAWS_WITH_REFERENCE: Final = {
     ),
     *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
 }
-_TOTAL_STRAIN: Final = {10, 11, 12}  # Ismstr of solids
-_ISMSTR: Final = 1  # its place in the first line of the property
+_TOTAL_STRAIN: Final = {10, 11, 12}  # values of Ismstr of solids
+_ISMSTR: Final = 1  # field of Ismstr in the first line of the property
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
+class Unswitchable(NamedTuple):
+    """Why a part must not be switched.
+
+    ``flows``: its material flows through the mesh, else its law keeps a reference.
+    """
+
+    flows: bool
+    reason: str
+
+
 def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
-    """Find the parts of a deck that must not be switched, by their sections and materials."""
+    """Return the parts of an LS-DYNA deck that must not be switched, by part id, from their sections and materials."""
     sections = read_sections(deck)
     laws = {
         material_of(card, card.data[0], 0): card.name
@@ -70,10 +72,8 @@ def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitch
     }
     reasons: dict[int, Unswitchable] = {}
     for part, material in parts.materials.items():
-        section, law = (
-            sections.get(parts.sections.get(part, 0)),
-            laws.get(material, "").removesuffix("_TITLE"),
-        )
+        section = sections.get(parts.sections.get(part, 0))
+        law = laws.get(material, "").removesuffix("_TITLE")
         if section and section.kind == "SOLID" and section.elform in _FLOWING:
             reasons[part] = _flowing(
                 f"{_FLOWING[section.elform]}, ELFORM {section.elform}"
@@ -84,10 +84,10 @@ def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitch
 
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
-    """Find the parts of a starter deck that must not be switched, by their materials and properties."""
+    """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
     from d2rpick.deck.radioss_deck import (
         number_of,
-    )  # not above: a deck of LS-DYNA does without
+    )  # not above: only Radioss decks need it
 
     flowing = {
         number_of(card, 2): card.words[0]
@@ -112,7 +112,7 @@ def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
 
 
 def _strains(starter: Starter) -> Mapping[int, int]:
-    """Give Ismstr of the properties of solids, by their ids."""
+    """Return the Ismstr of the properties of solids, by property id."""
     from d2rpick.deck.radioss_deck import SOLIDS, below_title, number_of
 
     solids = [
@@ -128,10 +128,12 @@ def _strains(starter: Starter) -> Mapping[int, int]:
 
 
 def _flowing(how: str) -> Unswitchable:
+    """Return the reason for a part whose material flows."""
     return Unswitchable(True, f"its material flows through the mesh ({how})")
 
 
 def _with_reference(how: str) -> Unswitchable:
+    """Return the reason for a part whose law keeps a reference."""
     return Unswitchable(
         False, f"its law keeps a stress-free reference ({how}), {_GAINS}"
     )

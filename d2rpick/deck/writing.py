@@ -1,6 +1,6 @@
-"""A deck with switching cards in it: a copy in another folder, ready to be run.
+"""Write a deck with switching cards into another folder, ready to run.
 
-Or its engine files are written leg by leg, as the driver of a Radioss run decides.
+For a driven Radioss run, engine files are written leg by leg.
 """
 
 from __future__ import annotations
@@ -38,10 +38,14 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import PrintedCard
 
+# Engine keywords that a later leg must not repeat: /INIV would set the velocities again.
 _ONCE = {
     "INIV",
     "END",
-}  # engine keywords that a later leg must not repeat: velocities are set at its start again
+}
+
+_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart file only at its end
+_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
 
 
 def write_deck(
@@ -49,20 +53,20 @@ def write_deck(
 ) -> list[str]:
     """Write a deck with printed cards into a folder.
 
-    LS-DYNA: the main file, byte for byte but for one ``*INCLUDE`` of the cards before ``*END``, the cards, and the
-    files that the deck includes from its own folder and below.  Radioss: the starter deck and its includes, and the
-    engine files of the legs, each with the further keywords of the run's only engine file.
+    LS-DYNA: the main file, unchanged except for one ``*INCLUDE`` of the cards before ``*END``, the cards, and the files
+    that the deck includes from its own folder and below. Radioss: the starter deck and its includes, and an engine file
+    for each leg, with the other keywords of the run's engine file.
 
     Parameters
     ----------
     main : str
-        The main deck, or a file of the Radioss run without switching.
+        The main deck, or a file of the Radioss reference run.
     card : PrintedCard
-        What `d2rpick.deck.printing.cards` gave for its solver.
+        Result of `d2rpick.deck.printing.cards` for its solver.
     folder : str
-        Another folder than that of the deck; made where it does not exist.
+        A folder other than that of the deck; it is created if necessary.
     overwrite : bool
-        Replace files that exist.
+        Replace existing files.
 
     Returns
     -------
@@ -72,41 +76,43 @@ def write_deck(
     Raises
     ------
     DeckError
-        If the deck switches one of these parts already, uses the id of a switch set, includes what would not be found
-        from ``folder``, or has a main file that seems to be cut; if a file exists; if the card is one for another
-        solver.
+        If the deck switches one of these parts already, uses the id of a switch set, includes a file that would not be
+        found from ``folder``, or has a main file that seems to be truncated; if a file exists; if the card is for
+        another solver.
     """
     files = dict(_radioss(main, card) if run_files(main) else _ls_dyna(main, card))
-    place = Path(folder)
+    target = Path(folder)
     try:
-        place.mkdir(parents=True, exist_ok=True)
-        if place.samefile(Path(main).parent):
+        target.mkdir(parents=True, exist_ok=True)
+        if target.samefile(Path(main).parent):
             raise DeckError(
-                f"{folder}: this is the folder of the deck; choose another one"
+                f"{folder}: this is the folder of the deck; choose another folder"
             )
         for name in files:
-            if (place / name).exists() and not overwrite:
+            if (target / name).exists() and not overwrite:
                 raise DeckError(
-                    f"{place / name}: the file exists; choose another folder or `overwrite`"
+                    f"{target / name}: the file exists; choose another folder or `overwrite`"
                 )
-            if not Path(os.path.realpath(place / name)).is_relative_to(
-                os.path.realpath(place)
+            if not Path(os.path.realpath(target / name)).is_relative_to(
+                os.path.realpath(target)
             ):
                 raise DeckError(
-                    f"{place / name}: leads out of {folder}, by a link or its name; choose another folder"
+                    f"{target / name}: lies outside {folder}, because of a link or its name; choose another folder"
                 )
         for name, content in files.items():
-            (place / name).parent.mkdir(parents=True, exist_ok=True)
-            write_whole(place / name, content)
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(target / name, content)
     except OSError as error:
         raise DeckError(
             f"{error.filename or folder}: cannot be written ({error.strerror})"
         ) from None
-    return [str(place / name) for name in files]
+    return [str(target / name) for name in files]
 
 
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    deck, source = read_deck(main), SourceFile("the card", card.text.encode())
+    """Yield name and content of each file of an LS-DYNA deck with cards."""
+    deck = read_deck(main)
+    source = SourceFile("the card", card.text.encode())
     if (
         len(card.files) != 1
         or not source.marks
@@ -115,19 +121,18 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         raise DeckError(
             f"{main}: an LS-DYNA deck, but the cards are for another solver"
         )
-    for block, told in cuts(
+    for block, sign in cuts(
         deck
-    ):  # what is added would hide it, and end a number that is cut
+    ):  # the added lines would hide it, and complete a truncated number
         if block.source is deck.sources[0]:
             raise DeckError(
-                f"{deck.path}: {told} The cards behind it would hide that: {cure(block)}"
+                f"{deck.path}: {sign} The added cards would hide this: {cure(block)}"
             )
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
-        text = text.replace(
-            "_AUTOMATIC\n", "_AUTOMATIC-\n"
-        )  # the minus keeps its fields 10 columns wide
+        # The suffix - keeps the fields of the card 10 columns wide.
+        text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
     yield (
         Path(main).name,
         with_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks()),
@@ -137,29 +142,36 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError where the deck switches a part of the printed cards, or has one of their switch sets."""
-    sets, mine = read_switching(deck), read_switching(printed)
-    parts = {line.part.value for one in mine for line in one.switched}
+    """Raise DeckError if the deck switches a part of the printed cards, or uses one of their switch sets."""
+    sets = read_switching(deck)
+    printed_sets = read_switching(printed)
+    parts = {
+        line.part.value for switch_set in printed_sets for line in switch_set.switched
+    }
     for event in find_windows(sets, read_parts(deck)).events:
         if event.unit.is_set or event.unit.id in parts:
-            place = event.by.card
-            what = f"{event.unit.kind} {event.unit.id}"
+            card = event.by.card
+            switched_unit = f"{event.unit.kind} {event.unit.id}"
             raise DeckError(
-                f"{place.at}: the deck switches {what} already; remove this card first"
+                f"{card.at}: the deck switches {switched_unit} already; remove this card first"
             )
-    ids = {one.header.swset.value for one in mine if one.header}
-    for one in sets:
-        if one.header and one.header.swset.value in ids:
-            place = one.card
-            found = f"{place.at}: switch set {one.header.swset.value} is one of the cards to be added"
-            raise DeckError(f"{found}; print them with other ids")
+    ids = {
+        switch_set.header.swset.value
+        for switch_set in printed_sets
+        if switch_set.header
+    }
+    for switch_set in sets:
+        if switch_set.header and switch_set.header.swset.value in ids:
+            card = switch_set.card
+            problem = f"{card.at}: the deck has switch set {switch_set.header.swset.value} of the added cards already"
+            raise DeckError(f"{problem}; print them with other ids")
 
 
-def with_cards(main: SourceFile, text: str, found: Iterable[Block]) -> bytes:
-    """Insert cards into the bytes of a main file, whose blocks were found: before its end mark, else at its end."""
+def with_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
+    """Insert cards into the bytes of a main file, before its end mark or at its end; ``file_blocks`` are its blocks."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
-    *_, last = found
+    *_, last = file_blocks
     at = len(content) if last.end is None else content.rfind(b"\n", 0, last.end) + 1
     return content[:at] + text.encode().replace(b"\n", newline) + content[at:]
 
@@ -167,23 +179,24 @@ def with_cards(main: SourceFile, text: str, found: Iterable[Block]) -> bytes:
 def copies(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
-    """Files below the folder of the deck, by their relative names; others must be named by an absolute path."""
+    """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
         if not relative.startswith(os.pardir):
             if relative in taken:
                 raise DeckError(
-                    f"{file}: the deck includes a file with the name of the cards, {relative!r}; rename it"
+                    f"{file}: the deck includes a file with the name of the card file, {relative!r}; rename it"
                 )
             yield relative, source.read(0)
         elif os.path.normpath(file) != file or not Path(file).is_absolute():
             raise DeckError(
-                f"{file}: included from outside the folder of the deck by a relative path; copy it there"
+                f"{file}: the deck includes it by a relative path from outside its folder; copy it into the folder"
             )
 
 
 def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each file of a Radioss run with cards."""
     run = read_run(main)
     printed = [
         leg
@@ -193,16 +206,15 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     if not printed:
         raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
     if run.starter is None or not run.legs:
-        found = "starter deck" if run.starter is None else "engine file"
+        missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
-            f"{main}: the run has no {found}; its starter deck and an engine file were expected"
+            f"{main}: the run has no {missing}, expected a starter deck and an engine file"
         )
     leg = run.legs[0]
     _refuse_unlike(run.legs)
     starter = run.starter.sources[0].name
-    root = (
-        root_of(starter) or leg.name
-    )  # the engine looks for a restart that begins like its own file
+    # The engine looks for a restart file whose name begins like its own.
+    root = root_of(starter) or leg.name
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
     left_out = {body.id: body.node.value for body in replaced(run, card.starter)}
@@ -212,22 +224,26 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     main_name = f"{root}_0000.rad"
     yield main_name, _edited(starter, main_text, card.sensors, left_out)
     further = list(blocks(leg.run.block.source))
-    names = [f"{root}_{mine.number:04d}.rad" for mine in printed]
-    for name, text, mine in zip(names, card.files.values(), printed, strict=True):
-        kept = (text_of(block) for block in further if repeated(keyword(block), mine))
-        named = {
-            node.value for _, _, ids in mine.switched for node in ids
+    names = [f"{root}_{printed_leg.number:04d}.rad" for printed_leg in printed]
+    for name, text, printed_leg in zip(
+        names, card.files.values(), printed, strict=True
+    ):
+        repeated_blocks = (
+            text_of(block) for block in further if repeated(keyword(block), printed_leg)
+        )
+        switched_nodes = {
+            node.value for _, _, ids in printed_leg.switched for node in ids
         } | card.sensors.keys()
-        named.update(left_out.values())
-        others = [
-            node for node in kept_off(run.legs) if node not in named
-        ]  # else they would be rigid from time 0
-        lines = (
-            listed(others) if mine.cap is None else off(others)
-        )  # its text ends with the bodies that it puts off
+        switched_nodes.update(left_out.values())
+        off_nodes = [
+            node for node in kept_off(run.legs) if node not in switched_nodes
+        ]  # otherwise they would be rigid from time 0
+        # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
+        lines = listed(off_nodes) if printed_leg.cap is None else off(off_nodes)
         yield (
             name,
-            (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept),
+            (text + "".join(f"{line}\n" for line in lines)).encode()
+            + b"".join(repeated_blocks),
         )
     for name, content in copies(run.starter.sources[1:], starter, {main_name, *names}):
         yield name, _edited(name, content, card.sensors, left_out)
@@ -236,14 +252,14 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 def _edited(
     name: str, content: bytes, sensors: Mapping[int, int], left_out: Collection[int]
 ) -> bytes:
-    """Give a file of the starter deck with sensors, and without rigid bodies that are ``left_out``, by their ids."""
+    """Return a file of the starter deck with sensors and without the rigid bodies ``left_out`` (by id)."""
     return _with_sensors(
         SourceFile(name, _without(SourceFile(name, content), left_out)), sensors
     )
 
 
 def _without(source: SourceFile, bodies: Collection[int]) -> bytes:
-    """Give a file of the starter deck without some rigid bodies, by their ids."""
+    """Return a file of the starter deck without some rigid bodies, by their ids."""
     content = source.read(0)
     for block in reversed([*blocks(source)]):
         if (
@@ -256,11 +272,17 @@ def _without(source: SourceFile, bodies: Collection[int]) -> bytes:
 
 
 def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
-    """Let bodies be switched by sensors, in a file of the starter deck: ``sensors`` by main node.
+    """Return a file of the starter deck in which sensors switch bodies; ``sensors`` by main node.
 
-    The version of its /BEGIN becomes one that knows when a sensor stops.  DeckError where a body has a sensor already.
+    Its /BEGIN gets a version in which time sensors have an end.
+
+    Raises
+    ------
+    DeckError
+        If a body has a sensor already.
     """
-    content, edits = source.read(0), dict[int, tuple[int, bytes]]()
+    content = source.read(0)
+    edits = dict[int, tuple[int, bytes]]()
     for block in blocks(source) if sensors else ():
         if keyword(block)[:1] in {("BEGIN",), ("RBODY",)}:
             edits.update(_edit(block, sensors))
@@ -273,19 +295,19 @@ def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
 def _edit(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Give the bytes of the line that changes: where it begins, where it ends, and its text."""
+    """Yield the changed line as its offset, its end and its new bytes."""
     card = card_of(block)
     for row in below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
         at = block.start + sum(len(line) + 1 for line in lines[: row.distance])
         text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
-        first, second = (card.integer(row, place).value for place in (0, 1))
+        first, second = (card.integer(row, column).value for column in (0, 1))
         if card.words[0] == "BEGIN":
             new = f"{max(first, STOPS_SINCE):10d}{text[10:]}"
         elif first in sensors:
             if second:
                 raise DeckError(
-                    f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove it first"
+                    f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove the sensor first"
                 )
             new = f"{text[:10]}{sensors[first]:10d}{text[20:]}"
         else:
@@ -294,7 +316,7 @@ def _edit(
 
 
 def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
-    """Raise DeckError where sensors of a card have the ids of others, or there is no body for them."""
+    """Raise DeckError if the deck has a sensor with an id of the card, or lacks a body for a sensor."""
     added = Starter(blocks=[*blocks(SourceFile("the card", card.starter.encode()))])
     for number in sorted(added.sensors.keys() & starter.sensors.keys()):
         raise DeckError(
@@ -303,12 +325,12 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
     mains = {body.node.value for body in (*starter.bodies, *added.bodies)}
     if unknown := sorted(card.sensors.keys() - mains):
         raise DeckError(
-            f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; name main nodes of bodies"
+            f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; give main nodes of rigid bodies"
         )
 
 
 def _refuse_unlike(legs: Sequence[Leg]) -> None:
-    """Raise DeckError if a further leg has keywords that the first one has not, so that no leg can stand for both."""
+    """Raise DeckError if a later leg has keywords that the first leg lacks, so that no leg can represent both."""
     first = {text_of(block) for block in blocks(legs[0].run.block.source)}
     for leg in legs[1:]:
         for block in blocks(leg.run.block.source):
@@ -318,28 +340,32 @@ def _refuse_unlike(legs: Sequence[Leg]) -> None:
                 and words[:1] != ("END",)
                 and text_of(block) not in first
             ):
-                found = f"{leg.run.block.source.name}: /{'/'.join(words)} is not in the first engine file"
+                problem = f"{leg.run.block.source.name}: /{'/'.join(words)} is not in the first engine file"
                 raise DeckError(
-                    f"{found}; legs between switches repeat that one: write its keywords alike, or one leg"
+                    f"{problem}, which every written engine file repeats; give all engine files the same keywords"
                 )
 
 
 def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:
+    """Raise DeckError if the cards are for another run, or the run switches their bodies already."""
     if printed[0].name not in (leg.name, root):
         raise DeckError(
-            f"the cards are for run {printed[0].name!r}, the run is {leg.name!r}; print it with that name"
+            f"the cards are for run {printed[0].name!r}, but this is run {leg.name!r}; print them with this name"
         )
-    nodes = {
-        node.value for one in printed for _, _, ids in one.switched for node in ids
-    }
+    nodes: set[int] = set()
+    for printed_leg in printed:
+        for _, _, ids in printed_leg.switched:
+            nodes.update(node.value for node in ids)
     for card, rigid, ids in leg.switched:
-        if rigid and (known := nodes & {node.value for node in ids}):
-            found = f"{card.at}: the run switches main node {min(known)} already"
-            raise DeckError(f"{found}; remove it from this /RBODY/ON first")
+        if rigid and (common_nodes := nodes & {node.value for node in ids}):
+            problem = (
+                f"{card.at}: the run switches main node {min(common_nodes)} already"
+            )
+            raise DeckError(f"{problem}; remove it from this /RBODY/ON first")
 
 
 def repeated(words: tuple[str, ...], leg: Leg | EngineFile) -> bool:
-    """Whether a leg repeats a keyword of the run's engine file."""
+    """Return True if a leg repeats a keyword of the engine file of the run."""
     if (
         not words
         or words[0] == "RUN"
@@ -352,22 +378,20 @@ def repeated(words: tuple[str, ...], leg: Leg | EngineFile) -> bool:
 
 
 def text_of(block: Block) -> bytes:
-    """Give the lines of a block, each with its end."""
+    """Return the lines of a block, with a line end after each."""
     content = block.source.read(block.start, block.end)
     return content if content.endswith(b"\n") else content + b"\n"
 
 
 # Legs that are decided while the run is computed.
 
-_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart at its end alone
-_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
-
 
 class DrivenDeck(NamedTuple):
-    """A run to be driven: its name and end, whom it switches, what is copied, and the keywords of each leg.
+    """A run to be driven: name, end, switched parts, copied files, and the keywords of each leg.
 
-    ``nodes`` are the main nodes of the rigid bodies of ``parts``, ``others`` those of bodies that stay off.
-    ``interval`` is that of the time history, ``second`` the length of a second, None where no unit is named [time].
+    ``nodes`` are the main nodes of the rigid bodies of ``parts``, ``others`` are main nodes of bodies that stay off.
+    ``interval`` is the output interval of the time history. ``second`` is the length of a second in the time unit of
+    the run; None if the deck names no unit [time].
     """
 
     name: str
@@ -384,18 +408,20 @@ class DrivenDeck(NamedTuple):
     def leg(
         self, number: int, until: float, cap: float | None, *, frozen: bool = False
     ) -> bytes:
-        """Write the engine file of a leg, rigid where a step ``cap`` is given.
+        """Return the engine file of a leg; the bodies are rigid if a time-step limit ``cap`` is given.
 
-        ``frozen``: the parts are rigid there already; OpenRadioss counts the energy of what is switched on twice once
-        more.
+        ``frozen``: the bodies are rigid already, and must not be activated again, as OpenRadioss would add their energy
+        twice.
         """
         file = EngineFile(number, until, cap)
         lines = engine_lines(file, self.name, () if frozen else self.nodes, self.others)
-        kept = [text for words, text in self.further if repeated(words, file)]
-        more = ["/MON/ON"] * (not any(words[0] == "MON" for words, _ in self.further))
-        return "".join(f"{line}\n" for line in (*lines, *more)).encode() + b"".join(
-            kept
+        repeated_texts = [text for words, text in self.further if repeated(words, file)]
+        added_lines = ["/MON/ON"] * (
+            not any(words[0] == "MON" for words, _ in self.further)
         )
+        return "".join(
+            f"{line}\n" for line in (*lines, *added_lines)
+        ).encode() + b"".join(repeated_texts)
 
 
 def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
@@ -404,32 +430,32 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     Parameters
     ----------
     path : str
-        Its starter deck or an engine file; of several engine files the first says what to write, the last when to end.
+        Its starter deck or an engine file; of several engine files the first defines the output, the last the end.
     parts : collection of int
-        Parts to be switched; without any, those of the bodies that the engine file puts off.
+        Parts to switch; default: the parts of the bodies that the first engine file deactivates.
 
     Raises
     ------
     DeckError
-        If it is no Radioss run with a starter deck and an engine file that says how often the time history is
-        written, or the parts cannot become rigid bodies.
+        If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
+        history, or the parts cannot become rigid bodies.
     """
     from d2rpick.deck.radioss_bodies import bodies_for  # not above: loads numpy
 
     run = read_run(path)
     if run.starter is None or not run.legs:
-        found = "starter deck" if run.starter is None else "engine file"
+        missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
-            f"{path}: the run has no {found}; its starter deck and an engine file were expected"
+            f"{path}: the run has no {missing}, expected a starter deck and an engine file"
         )
     leg = run.legs[0]
     chosen = tuple(sorted(parts)) or parts_off(run)
     if not chosen:
         raise DeckError(
-            f"{path}: the engine file puts no rigid body off; name the parts to be switched with --part"
+            f"{path}: the engine file deactivates no rigid body; give the parts to switch with --part"
         )
     bodies = bodies_for(path, chosen)
-    others = tuple(node for node in kept_off([leg]) if node not in bodies.nodes)
+    off_nodes = tuple(node for node in kept_off([leg]) if node not in bodies.nodes)
     source = run.starter.sources[0]
     main = f"{leg.name}_0000.rad"
     content = with_cards(source, bodies.cards, blocks(source))
@@ -443,21 +469,22 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         if (words := keyword(block)) and words[0] not in _NOT_REPEATED
     )
     return DrivenDeck(
-        leg.name, _end(run.legs[-1]), chosen, bodies.nodes, others, _interval(leg), _second(run), files, further,
+        leg.name, _end(run.legs[-1]), chosen, bodies.nodes, off_nodes, _interval(leg), _second(run), files, further,
         bodies.notes,
     )  # fmt: skip
 
 
 def _end(leg: Leg) -> float:
+    """Return the end of the run [time]."""
     if leg.stop.problem or not leg.stop.value > 0:
         raise DeckError(
-            f"{leg.run.at}: the end of the run is {leg.stop.value:g}, a time above 0 was expected"
+            f"{leg.run.at}: the end of the run is {leg.stop.value:g}, expected a time above 0"
         )
     return leg.stop.value
 
 
 def _interval(leg: Leg) -> float:
-    """Interval of the time history, which shows whether anything touches [time]."""
+    """Return the output interval of the time history, which has to show contacts [time]."""
     for block in blocks(leg.run.block.source):
         card = card_of(block)
         if (
@@ -467,14 +494,14 @@ def _interval(leg: Leg) -> float:
         ):
             return values[0].value
     raise DeckError(
-        f"{leg.run.at}: no /TFILE in the engine file; add one, some hundred states for a flight"
+        f"{leg.run.at}: no /TFILE in the engine file; add one that writes some 100 states per flight"
     )
 
 
 def _second(run: Run) -> float | None:
-    """Length of a second in the units in which the deck is computed [time]; None where it names none."""
+    """Return the length of a second in the time unit of the deck [time]; None if it names none."""
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())
-    return (
-        _IN_A_SECOND.get(rows[3].text[40:60].strip().lower()) if len(rows) > 3 else None
-    )
+    if len(rows) > 3:
+        return _IN_A_SECOND.get(rows[3].text[40:60].strip().lower())
+    return None

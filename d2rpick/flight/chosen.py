@@ -47,7 +47,8 @@ def find_flight(
         first, last, parts, end_seen, damping, gravity = seen.flight
         if described and seen.source in BY_ENERGIES and isnan(gravity):
             gravity = _load_beside(history, described._replace(start=first, end=last))
-        end, by_oscillator = last if end_seen else None, described is not None
+        end = last if end_seen else None
+        by_oscillator = described is not None
         return Flight(
             first,
             end,
@@ -120,9 +121,9 @@ def begun_at(
     if flight.end is not None and after >= flight.end:
         ended = f"the {spoken(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
-    doubts, shows_start = (
-        flight.doubts,
-        flight.source != "oscillator",
+    doubts = flight.doubts
+    shows_start = (
+        flight.source != "oscillator"
     )  # an oscillator is searched from `after` on, so its start shows nothing
     if shows_start and after < flight.start - same_within(
         history, *flight.within(history.time)
@@ -182,11 +183,10 @@ def _load_beside(history: History, described: Described) -> float:
     """Return NaN if the energies in a window change by more than the damping of the vibration explains, else 0."""
     from d2rpick.flight.work import taken_by_damping
 
-    taken = (
-        None
-        if history.balance is None
-        else taken_by_damping(history.balance, *described)
-    )
+    if history.balance is None:
+        taken = None
+    else:
+        taken = taken_by_damping(history.balance, *described)
     return nan if taken is False else 0.0
 
 
@@ -195,7 +195,8 @@ def _fed(history: History, start: float, end: float) -> str | None:
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
     """
-    balance, energy = history.balance, history.mean_energy(start, end)
+    balance = history.balance
+    energy = history.mean_energy(start, end)
     if balance is None or energy is None or balance.kinetic_and_internal is None:
         return None
     turns = int(np.count_nonzero((history.turns > start) & (history.turns < end)))

@@ -51,10 +51,8 @@ class Touches(NamedTuple):
         telling = telling if whole is None else _from_outside(telling, whole)
         if not telling:
             return None
-        start, end = (
-            max(force.time[0] for force in telling),
-            min(force.time[-1] for force in telling),
-        )
+        start = max(force.time[0] for force in telling)
+        end = min(force.time[-1] for force in telling)
         every = union(*(force.time for force in telling))
         time = every[(every >= start) & (every <= end)]
         if time.size < FEWEST:

@@ -57,9 +57,11 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start)
     members = _find_members(momenta, longest.parts)
-    time, momentum = momenta.time, momenta.of(members)
+    time = momenta.time
+    momentum = momenta.of(members)
     flight = window(time, longest.start, longest.end)
-    first, last = flight.start + _EDGE, flight.stop - 1 - _EDGE
+    first = flight.start + _EDGE
+    last = flight.stop - 1 - _EDGE
     if last - first < _FEWEST:
         return None
     gravity = (momentum[last] - momentum[first]) / (time[last] - time[first])
@@ -112,7 +114,8 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
     ContactTimes or None
         None where there are too few states, or where forces are asked for of which only the changes are known.
     """
-    time, acts = force.time, force.acts
+    time = force.time
+    acts = force.acts
     if time.size < _FEWEST:
         return None
     steps = np.diff(time)
@@ -132,9 +135,11 @@ def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, fl
 
     A force that acts in the first interval, or in the last one, is taken to act from its start, or to its end.
     """
-    start, end = float(time[first]), float(time[stop])
+    start = float(time[first])
+    end = float(time[stop])
     most = _OF_ONE_INTERVAL * (end - start)
-    later, earlier = float(time[first + 1] - start) / 2, float(end - time[stop - 1]) / 2
+    later = float(time[first + 1] - start) / 2
+    earlier = float(end - time[stop - 1]) / 2
     begins = start if first == 0 else start + min(later, most)
     ends = end if stop == time.size - 1 else end - min(earlier, most)
     return begins, ends

@@ -72,7 +72,8 @@ class Flight(NamedTuple):
 
     def within(self, time: Samples) -> tuple[float, float]:
         """Return the flight's window, with the ends of a record at times (n,) in place of unknown ones [time]."""
-        first, last = float(time[0]), float(time[-1])
+        first = float(time[0])
+        last = float(time[-1])
         return (
             first if self.start is None else self.start,
             last if self.end is None else self.end,
@@ -155,14 +156,13 @@ def _of_middle(
 ) -> FreeFlight | None:
     """Return the flight around a time as a td in its middle would get it, so that listed flights equal those in use."""
     flight = around(moment)
-    of_middle = (
-        _holding(time, around, (flight.start + flight.end) / 2) if flight else None
-    )
-    return (
-        of_middle
-        if of_middle and of_middle.start <= moment <= of_middle.end
-        else flight
-    )
+    if flight:
+        of_middle = _holding(time, around, (flight.start + flight.end) / 2)
+    else:
+        of_middle = None
+    if of_middle and of_middle.start <= moment <= of_middle.end:
+        return of_middle
+    return flight
 
 
 class Seen(NamedTuple):
@@ -189,11 +189,9 @@ def seen_flight(history: History, td: float) -> Seen:
     if held is None:
         return _seen(history, td)
     seen = None if history.parts else _seen(history, td)
-    return (
-        seen
-        if seen and seen.flight and seen.flight.parts
-        else Seen(refusal=held, held=True)
-    )
+    if seen and seen.flight and seen.flight.parts:
+        return seen
+    return Seen(refusal=held, held=True)
 
 
 def _seen(history: History, td: float) -> Seen:
@@ -235,7 +233,8 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Find all flights that the best source shows and no other denies, with their sources, in ascending order."""
     asked = witnesses(history)
     for place, witness in enumerate(asked):
-        kept, flights = [], witness.flights()
+        kept = []
+        flights = witness.flights()
         for flight in flights:
             middle = (flight.start + flight.end) / 2
             may_deny = (
@@ -280,12 +279,11 @@ def _witnesses(history: History) -> Iterator[Witness]:
         around = partial(_first, history, momenta)
         decisive = any(momentum.tells(one) for one in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
-    forces, whole = (
-        history.evidence.forces,
-        next((one for one in history.momenta if one.parts is None), None),
-    )
+    forces = history.evidence.forces
+    whole = next((one for one in history.momenta if one.parts is None), None)
     touches = Touches.of(forces, whole) if forces else None
-    balance, is_better_known = history.balance, bool(history.momenta)
+    balance = history.balance
+    is_better_known = bool(history.momenta)
     if touches is not None:
         by_forces = Witness.of(
             "contact-force",
@@ -320,11 +318,9 @@ def _first(
     for one in momenta:
         found = flight_around(one, td, history.balance)
         if found:
-            return (
-                found
-                if one.parts is not None or one.flying
-                else _keeping_level(history, found, td, one)
-            )
+            if one.parts is not None or one.flying:
+                return found
+            return _keeping_level(history, found, td, one)
     return None
 
 
@@ -349,11 +345,8 @@ def _by_energies(
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
             return None  # without gravity nothing feeds the energies
-        found = (
-            found
-            if found and moves_as_a_whole(history.balance, found.start, found.end)
-            else None
-        )
+        if not (found and moves_as_a_whole(history.balance, found.start, found.end)):
+            found = None
     return unheld(history.surroundings, found, history.parts, td)
 
 
@@ -362,7 +355,8 @@ def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | No
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
-    found, balance = touches.flight_around(td), history.balance
+    found = touches.flight_around(td)
+    balance = history.balance
     if (
         found
         and found.start <= touches.time[0]
@@ -388,13 +382,11 @@ def _keeping_level(
     """
     if flight is None:
         return None
-    balance, damped, time, energy, unseen = (
-        history.balance,
-        None,
-        history.time,
-        history.energy,
-        0.0,
-    )
+    balance = history.balance
+    damped = None
+    time = history.time
+    energy = history.energy
+    unseen = 0.0
     if (
         balance
         and balance.kinetic_and_internal is not None
@@ -403,11 +395,10 @@ def _keeping_level(
         from d2rpick.flight.work import lowered_by_damping
 
         sums, unseen = lowered_by_damping(balance, flight, momenta)
-        damped = (
-            np.stack([np.interp(time, balance.time, one) for one in sums])
-            if sums
-            else None
-        )
+        if sums:
+            damped = np.stack([np.interp(time, balance.time, one) for one in sums])
+        else:
+            damped = None
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
@@ -450,7 +441,9 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
     refusal = _driven(history, source, best)
     if refusal:
         return Seen(refusal=refusal)
-    start, end, end_seen = best.start, best.end, best.end_seen
+    start = best.start
+    end = best.end
+    end_seen = best.end_seen
     doubts = []
     room = same_within(history, start, end)
     for other, flight in found[1:]:
@@ -465,7 +458,8 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
                 f"the flight lasts from {one}, from {two}; the later start and the earlier end count"
             )
         if flight.end < end:
-            end, end_seen = flight.end, flight.end_seen
+            end = flight.end
+            end_seen = flight.end_seen
         start = max(start, flight.start)
     return Seen(
         best._replace(start=start, end=end, end_seen=end_seen),
@@ -501,10 +495,8 @@ def _is_subset(history: History, flight: FreeFlight) -> bool:
     momenta = next((one for one in history.momenta if one.parts is not None), None)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False
-    members, moves = (
-        {part.id for part in flight.parts},
-        np.ptp(momenta.values, axis=0).any(axis=1),
-    )
+    members = {part.id for part in flight.parts}
+    moves = np.ptp(momenta.values, axis=0).any(axis=1)
     return any(
         part.id not in members
         for part, one in zip(momenta.parts, moves, strict=True)

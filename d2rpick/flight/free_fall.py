@@ -74,7 +74,8 @@ class Laws:
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
         """Prepare the laws for the parts in the columns ``members``; ``balance`` helps where their mass is unknown."""
-        time, momentum = momenta.time, momenta.of(members)
+        time = momenta.time
+        momentum = momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
         self.balance, self.velocity = balance, momenta.velocity
         self.gravities = momenta.surroundings.gravity_on(
@@ -147,7 +148,8 @@ class Laws:
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Return the window around ``td`` under a usual acceleration of gravity, in which a load may fade."""
-        time, momentum = self.fit.time, self.fit.momentum
+        time = self.fit.time
+        momentum = self.fit.momentum
         first, last = self._around(td)
         if last - first < FEWEST or not self.mass > 0:
             return None, None
@@ -163,11 +165,8 @@ class Laws:
             if window is None:
                 enough = self._enough if across else TOLERANCE
                 window = self._lasting(law, td, enough)
-                window = (
-                    window
-                    if window and (across or self._fades_out(window, weight))
-                    else None
-                )
+                if not (window and (across or self._fades_out(window, weight))):
+                    window = None
             if window and self._slowed(window, weight):
                 return None, None
             found.append((window, float(np.linalg.norm(weight)) / self.mass))
@@ -187,10 +186,8 @@ class Laws:
         """Yield weights (3,) along an axis that show across a load of one direction, which bends only along it."""
         if last - first < FEWEST or not self.mass > 0:
             return
-        time, momentum = (
-            self.fit.time[first : last + 1],
-            self.fit.momentum[first : last + 1],
-        )
+        time = self.fit.time[first : last + 1]
+        momentum = self.fit.momentum[first : last + 1]
         rest = bent(time, momentum)
         along = np.linalg.svd(rest, full_matrices=False)[2][0]
         across = np.eye(along.size) - np.outer(along, along)
@@ -218,11 +215,10 @@ class Laws:
         )
         size = float(np.linalg.norm(slope))
         if size > 0:
-            direction = (
-                np.round(slope / size)
-                if np.abs(slope / size).max() > _ALONG_AXIS
-                else slope / size
-            )
+            if np.abs(slope / size).max() > _ALONG_AXIS:
+                direction = np.round(slope / size)
+            else:
+                direction = slope / size
             yield from (
                 direction * (self.mass * gravity)
                 for gravity in _gravities_near(size, self.gravities)
@@ -247,10 +243,8 @@ class Laws:
         """
         start, end = self.fit.time[[*window]].tolist()
         vector = self.fit.gravity(*window)
-        force, mass = (
-            float(np.linalg.norm(vector)),
-            self.mass if self.mass > 0 else float("nan"),
-        )
+        force = float(np.linalg.norm(vector))
+        mass = self.mass if self.mass > 0 else float("nan")
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
             return None if self._carried else 0.0
         if self._is_gravity(
@@ -281,7 +275,8 @@ class Laws:
         At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
         energy swings.
         """
-        balance, squares = self.balance, np.sum(self.fit.momentum**2, axis=1)
+        balance = self.balance
+        squares = np.sum(self.fit.momentum**2, axis=1)
         if (
             balance is None
             or balance.kinetic is None
@@ -311,7 +306,8 @@ class Laws:
         must act along an axis, and in a straight motion with its value in m, mm, s or ms.
         """
         size = float(np.linalg.norm(force))
-        along, momentum = force / size, self.fit.momentum[[*window]]
+        along = force / size
+        momentum = self.fit.momentum[[*window]]
         forward = momentum @ along
         if self.gravities is not None or (forward >= 0).any():
             return False
@@ -455,8 +451,10 @@ class FreeFall(Law):
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """Return the deviations of momentum and impulse from straight lines, and the alpha >= 0 that relates them."""
         states = slice(first, last + 1)
-        rest, half = bent(self.time[states], self._both[states]), self.momentum.shape[1]
-        p, impulse = rest[:, :half], rest[:, half:]
+        rest = bent(self.time[states], self._both[states])
+        half = self.momentum.shape[1]
+        p = rest[:, :half]
+        impulse = rest[:, half:]
         power = float((impulse * impulse).sum())
         return (
             p,

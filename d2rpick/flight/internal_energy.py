@@ -40,6 +40,25 @@ _KNOWN, _TURNED = 3 / 4, 4
 # Below this share of the largest energy, an energy is round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
 
+# Widening of the band of a flight's last quarter, by this share of its width, that contains all energies before it.
+_RESERVE: Final = 0.5
+# The means of the last two quarters differ by less than this share of the band. A steady drift differs by 1, a
+# vibration that shows 3/4 of a period in each quarter by 0.3.
+_DRIFT: Final = 0.35
+# A slow vibration has at least this many swings by half of the range, and ranges and means of both halves that agree to
+# this share; a crash ends after one swing.
+_SWINGS: Final = 4
+_ALIKE: Final = 0.75
+# An energy that falls below 5 % of its peaks is that of one vibration, which is at rest at the peaks. Beside a
+# permanent deformation a swing of 0.1 % counts as none.
+_TO_ZERO, _HARDLY = 0.05, 1e-3
+# A body yields in its first swing if its energy rises by 90 % of the way to its later level, and is within 10 % of its
+# minimum for no longer than it takes to rise from there (a harmonic swing: 0.7 of that).  Bodies of the model that hit
+# each other later in the flight leave the energy at its minimum for longer.
+_FLAT, _MOST_FLAT = 0.1, 1.0
+# The motion gives that energy: the sum of both rises by no more than this share of it.  It may fall, by damping.
+_NOT_FROM_MOTION: Final = 0.1
+
 
 class QuietTime(NamedTuple):
     """A window in which the energy shows no load; ``end`` is None if no next contact is seen [time].
@@ -54,7 +73,8 @@ class QuietTime(NamedTuple):
 
 def quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
-    start, least = float(history.time[0]), round_off(history)
+    start = float(history.time[0])
+    least = round_off(history)
     before = history.between(start, td)[1]
     fallen = (
         least > 0
@@ -92,10 +112,8 @@ def landing_after(history: History, start: float) -> float | None:
     if time.size < FEWEST:
         return None
     known = np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
-    top, bottom = (
-        np.maximum.accumulate(energy)[known],
-        np.minimum.accumulate(energy)[known],
-    )
+    top = np.maximum.accumulate(energy)[known]
+    bottom = np.minimum.accumulate(energy)[known]
     turns = np.searchsorted(history.turns, time[known]) - np.searchsorted(
         history.turns, start
     )
@@ -183,11 +201,9 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
     after = inside.stop - inside.start  # the first mean whose states all lie after td
     low, high = _widened(means[: after - width + 1], 1.0)
     off = np.flatnonzero((means[after:] < low) | (means[after:] > high))
-    return (
-        float(history.time[inside.stop + int(off[0]) + width // 2])
-        if off.size
-        else None
-    )
+    if off.size:
+        return float(history.time[inside.stop + int(off[0]) + width // 2])
+    return None
 
 
 def _widened(values: Samples, share: float) -> tuple[float, float]:
@@ -199,11 +215,10 @@ def _widened(values: Samples, share: float) -> tuple[float, float]:
 def round_off(history: History) -> float:
     """Return the energy below which an internal energy is round-off beside the energies of the run [energy]."""
     balance = history.balance
-    terms = (
-        (balance.internal, balance.kinetic, balance.external_work, balance.total)
-        if balance
-        else ()
-    )
+    terms: list[Samples | None] = []
+    if balance:
+        terms += [balance.internal, balance.kinetic]
+        terms += [balance.external_work, balance.total]
     return history.known.once(
         "round-off", lambda: _ROUND_OFF * largest(history.energy, *terms)
     )
@@ -215,20 +230,6 @@ def largest(*terms: Samples | None) -> float:
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
     )
-
-
-# Widening of the band of a flight's last quarter, by this share of its width, that contains all energies before it.
-_RESERVE: Final = 0.5
-# The means of the last two quarters differ by less than this share of the band. A steady drift differs by 1, a
-# vibration that shows 3/4 of a period in each quarter by 0.3.
-_DRIFT: Final = 0.35
-# A slow vibration has at least this many swings by half of the range, and ranges and means of both halves that agree to
-# this share; a crash ends after one swing.
-_SWINGS: Final = 4
-_ALIKE: Final = 0.75
-# An energy that falls below 5 % of its peaks is that of one vibration, which is at rest at the peaks. Beside a
-# permanent deformation a swing of 0.1 % counts as none.
-_TO_ZERO, _HARDLY = 0.05, 1e-3
 
 
 def settled_from(
@@ -253,27 +254,19 @@ def settled_from(
     """
     inside = window(time, start, end)
     least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
-    first, last = inside.start, inside.stop
+    first = inside.start
+    last = inside.stop
     while last - first >= FEWEST:
-        lost = (
-            np.full(last - first, np.inf)
-            if damped is None
-            else _still_lost(damped[:, first:last]) + unseen
-        )
+        if damped is None:
+            lost = np.full(last - first, np.inf)
+        else:
+            lost = _still_lost(damped[:, first:last]) + unseen
         states = energy[first:last], lost, least
         kept = 0 if _swings(*states) else _kept_from(*states)
         if kept is not None:
             return start if first + kept == inside.start else float(time[first + kept])
         first += max(1, (last - first) // 4)
     return None
-
-
-# A body yields in its first swing if its energy rises by 90 % of the way to its later level, and is within 10 % of its
-# minimum for no longer than it takes to rise from there (a harmonic swing: 0.7 of that).  Bodies of the model that hit
-# each other later in the flight leave the energy at its minimum for longer.
-_FLAT, _MOST_FLAT = 0.1, 1.0
-# The motion gives that energy: the sum of both rises by no more than this share of it.  It may fall, by damping.
-_NOT_FROM_MOTION: Final = 0.1
 
 
 def rises_as_it_yields(
@@ -296,8 +289,10 @@ def rises_as_it_yields(
     start, settled, end : float
         Start and end of the flight, and the time in it from which the energy keeps its level [time].
     """
-    rising, level = window(time, start, settled), window(time, settled, end)
-    before, kept = energy[rising], energy[level]
+    rising = window(time, start, settled)
+    level = window(time, settled, end)
+    before = energy[rising]
+    kept = energy[level]
     if before.size < 2 or not kept.size:
         return False
     lowest = float(before.min())
@@ -316,7 +311,8 @@ def rises_as_it_yields(
     flat = first_swing <= lowest + _FLAT * rise
     if not flat.any():
         return False
-    last_flat, first_flat = int(np.flatnonzero(flat)[-1]), int(np.argmax(flat))
+    last_flat = int(np.flatnonzero(flat)[-1])
+    first_flat = int(np.argmax(flat))
     rise_time = times[-1] - times[last_flat]
     return bool(times[last_flat] - times[first_flat] <= _MOST_FLAT * rise_time)
 
@@ -333,8 +329,10 @@ def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """
-    half, last = energy.size // 2, 3 * energy.size // 4
-    low, high = float(energy[last:].min()), float(energy[last:].max())
+    half = energy.size // 2
+    last = 3 * energy.size // 4
+    low = float(energy[last:].min())
+    high = float(energy[last:].max())
     width = max(high - low, least)
     drift = float(energy[last:].mean() - energy[half:last].mean())
     if abs(drift) > _DRIFT * width + (
@@ -367,13 +365,21 @@ def _swings(energy: Samples, lost: Samples, least: float) -> bool:
 def _large_swings(energy: Samples, least: float) -> int:
     """Count how often an energy turns after a change of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
-    turns, low, high, rising = 0, energy[0], energy[0], None
+    turns = 0
+    low = energy[0]
+    high = energy[0]
+    rising = None
     for value in [*energy[extrema].tolist(), float(energy[-1])]:
-        low, high = min(low, value), max(high, value)
+        low = min(low, value)
+        high = max(high, value)
         if rising is not True and value - low >= least:
-            turns, rising, high = turns + 1, True, value
+            turns = turns + 1
+            rising = True
+            high = value
         elif rising is not False and high - value >= least:
-            turns, rising, low = turns + 1, False, value
+            turns = turns + 1
+            rising = False
+            low = value
     return turns
 
 
@@ -386,9 +392,12 @@ def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:
         or not balance.time[inside].size
     ):
         return True
-    kinetic, internal = balance.kinetic[inside], balance.internal[inside]
-    top, bottom = float(internal.max()), float(internal.min())
-    least = (
-        _TO_ZERO * top if bottom <= _TO_ZERO * top else max(top - bottom, _HARDLY * top)
-    )
+    kinetic = balance.kinetic[inside]
+    internal = balance.internal[inside]
+    top = float(internal.max())
+    bottom = float(internal.min())
+    if bottom <= _TO_ZERO * top:
+        least = _TO_ZERO * top
+    else:
+        least = max(top - bottom, _HARDLY * top)
     return float(kinetic[int(np.argmax(internal))]) > least

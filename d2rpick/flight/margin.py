@@ -66,15 +66,12 @@ def margin_before_contact(
         return Margin(given, "given")
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
-    share, spread = (
-        SHARE * (flight.end - flight.start),
-        landing_moves(history, flight, place),
-    )
-    kept = (
-        Margin(share, "flight", spread)
-        if spread is None or spread <= share
-        else Margin(spread, "landing", spread)
-    )
+    share = SHARE * (flight.end - flight.start)
+    spread = landing_moves(history, flight, place)
+    if spread is None or spread <= share:
+        kept = Margin(share, "flight", spread)
+    else:
+        kept = Margin(spread, "landing", spread)
     if grazes(history, flight, kept.time):
         grazing = "force"
     elif changes_momentum_little(history, flight):
@@ -95,7 +92,8 @@ def landing_moves(
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground.  None if neither error is known.
     """
-    spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
+    spread = landing_spread(history, flight)
+    speed = _closing_speed(history, flight)
     if place is None or speed is None:
         return spread
     out_of_place = place / speed if speed > 0 else float("inf")
@@ -110,10 +108,12 @@ def grazing_moves(
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
     """
-    spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
-    amplitude = (
-        None if spread is None or speed is None or np.isinf(spread) else spread * speed
-    )
+    spread = landing_spread(history, flight)
+    speed = _closing_speed(history, flight)
+    if spread is None or speed is None or np.isinf(spread):
+        amplitude = None
+    else:
+        amplitude = spread * speed
     if place is None and amplitude is None:
         return None
     error = (place or 0.0) + (amplitude or 0.0)
@@ -144,7 +144,8 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
     from d2rpick.flight.free_fall import FreeFall
 
     momenta, members = evidence
-    time, momentum = momenta.time, momenta.of(members)
+    time = momenta.time
+    momentum = momenta.of(members)
     inside = window(time, *flight.within(time))
     begin = int(np.searchsorted(time, flight.end, side="right")) - 1
     if time[inside].size < _FEWEST or begin + _FEWEST >= time.size:
@@ -236,7 +237,8 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     most this, or by 3 % of the flight, see tests/choice/test_windows.py. No margin covers an impact on an edge: 1 um of
     height moves the landing after it by 70 ms.
     """
-    balance, momentum = history.balance, _momentum(history, flight)
+    balance = history.balance
+    momentum = _momentum(history, flight)
     if (
         balance is None
         or balance.internal is None
@@ -255,9 +257,9 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     approach = float(balance.kinetic[inside][-1]) * _towards_ground(momentum)
     if vibration <= 0 or crossings == 0:
         return 0.0
-    return (
-        float(np.sqrt(vibration / approach) / omega) if approach > 0 else float("inf")
-    )
+    if approach > 0:
+        return float(np.sqrt(vibration / approach) / omega)
+    return float("inf")
 
 
 def energy_of_approach(history: History, flight: Flight) -> float | None:
@@ -265,7 +267,8 @@ def energy_of_approach(history: History, flight: Flight) -> float | None:
 
     None if kinetic energy or momentum are not written, or other parts move as well.
     """
-    balance, momentum = history.balance, _momentum(history, flight)
+    balance = history.balance
+    momentum = _momentum(history, flight)
     if balance is None or balance.kinetic is None or momentum is None:
         return None
     kinetic = balance.kinetic[window(balance.time, *flight.within(history.time))]
@@ -315,7 +318,8 @@ def _closing_speed(history: History, flight: Flight) -> float | None:
 
 def _towards_ground(momentum: Samples) -> float:
     """Return the share of the kinetic energy at the end of a flight that belongs to the motion along gravity [-]."""
-    last, change = momentum[-1], momentum[-1] - momentum[0]
+    last = momentum[-1]
+    change = momentum[-1] - momentum[0]
     if not change.any():
         return 1.0
     along = float(last @ change) ** 2

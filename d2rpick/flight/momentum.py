@@ -54,6 +54,9 @@ _ALL_OF_IT: Final = 1e-2
 # A body flies by itself for at least this share of the record, at a velocity that differs from the set's by this share.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
+FLYING: Final = "flying"
+ALL: Final = "all"
+
 
 def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
     """Return the momenta that may show a flight, best first: all, or only the set that was named to fly."""
@@ -101,10 +104,8 @@ def _of_its_bodies(
         alone = flight_of(momenta, (part,), td)
         if alone is None:
             return None
-        start, end_seen = (
-            max(flight.start, alone.start),
-            flight.end_seen or alone.end < flight.end,
-        )
+        start = max(flight.start, alone.start)
+        end_seen = flight.end_seen or alone.end < flight.end
         flight = flight._replace(
             start=start, end=min(flight.end, alone.end), end_seen=end_seen
         )
@@ -120,7 +121,8 @@ def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
 
 def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     """Find the parts among ``members`` that fly by themselves, see `bodies_apart`."""
-    mass, masses = momenta.mass(members), momenta.masses
+    mass = momenta.mass(members)
+    masses = momenta.masses
     if (
         not momenta.parts
         or len(members) < 2
@@ -131,10 +133,8 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
-    least, spans = (
-        _BY_ITSELF * float(momenta.time[-1] - momenta.time[0]),
-        np.gradient(momenta.time),
-    )
+    least = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0])
+    spans = np.gradient(momenta.time)
     for part in members:
         if not masses[part] > 0:
             continue
@@ -165,7 +165,8 @@ def flight_of(
     momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
     """Find the window around ``td`` in which these parts together fly freely, or None."""
-    time, momentum = momenta.time, momenta.of(members)
+    time = momenta.time
+    momentum = momenta.of(members)
     if time.size < FEWEST or not time[0] <= td <= time[-1]:
         return None
     extent = float(np.ptp(momentum, axis=0).max())
@@ -203,9 +204,10 @@ def laws_of(
     momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
 ) -> Laws:
     """Return the laws of free flight for a set of parts, made once for all td."""
-    whole = (
-        balance if momenta.parts is None or np.isnan(momenta.mass(members)) else None
-    )
+    if momenta.parts is None or np.isnan(momenta.mass(members)):
+        whole = balance
+    else:
+        whole = None
     return momenta.known.once(
         ("laws", members, whole is None), lambda: Laws(momenta, members, whole)
     )
@@ -241,11 +243,10 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     """
     parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
     change = momenta.change(parts)
-    size = (
-        change
-        if change > 2 * momenta.noise(parts)
-        else float(np.abs(momenta.values[:, list(parts)]).max())
-    )
+    if change > 2 * momenta.noise(parts):
+        size = change
+    else:
+        size = float(np.abs(momenta.values[:, list(parts)]).max())
     return size > _VISIBLE * noise
 
 
@@ -320,10 +321,6 @@ def _polished(
         total = total + sides[best] * rests[free[best]]
         members = members ^ {free[best]}
     return tuple(sorted(members - set(chosen)))
-
-
-FLYING: Final = "flying"
-ALL: Final = "all"
 
 
 def with_parts_by_number(run: Run, selection: Selection) -> Selection:
@@ -459,11 +456,10 @@ def _heaviest(
         raise FormatError(
             f"{run.name}: no momenta show which parts fly together; name the parts to be switched"
         )
-    masses = (
-        np.ones(len(run.parts))
-        if momenta.masses is None
-        else np.nan_to_num(momenta.masses)
-    )
+    if momenta.masses is None:
+        masses = np.ones(len(run.parts))
+    else:
+        masses = np.nan_to_num(momenta.masses)
     mass = dict(zip(run.parts, masses.tolist(), strict=True))
     best = max(
         found,

@@ -122,11 +122,10 @@ class Drift:
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return by how much the body is turned at td, for times tr (k,) [degrees]; NaN if unknown."""
-        turned = (
-            np.full((tr.size, 3), np.nan)
-            if self.turning is None
-            else self.turning.angles(tr, td)
-        )
+        if self.turning is None:
+            turned = np.full((tr.size, 3), np.nan)
+        else:
+            turned = self.turning.angles(tr, td)
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
@@ -167,7 +166,8 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         seen.masses,
         window(seen.momenta.time, seen.start, seen.end),
     )
-    time, mass = momenta.time[inside], masses[list(seen.members)]
+    time = momenta.time[inside]
+    mass = masses[list(seen.members)]
     if momenta.parts is None or time.size < FEWEST or not np.isfinite(mass).all():
         return None
     members = [i for i, m in zip(seen.members, mass.tolist(), strict=True) if m > 0]
@@ -192,11 +192,10 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
     against = [members[i] for i in moving]
     ids = [momenta.parts[i].id for i in against]
     part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
-    turning = (
-        turning_in_flight(seen._replace(members=members), against, placement)
-        if placement
-        else None
-    )
+    if placement:
+        turning = turning_in_flight(seen._replace(members=members), against, placement)
+    else:
+        turning = None
     place = offsets.sum(axis=1)
     slow = bool(rate.any()) and periods_of(time[::stride], place[::stride], rate) < 1
     found = Drift(time, place, path, part, doubt, turning, moving=ids, slow=slow)
@@ -250,8 +249,10 @@ def apart_in_flight(
     if seen is None or seen.momenta.parts is None:
         return ()
     members = [i for i in seen.members if seen.masses[i] > 0]
-    inside, mass = window(seen.momenta.time, seen.start, seen.end), seen.masses[members]
-    time, momentum = seen.momenta.time[inside], seen.momenta.values[inside][:, members]
+    inside = window(seen.momenta.time, seen.start, seen.end)
+    mass = seen.masses[members]
+    time = seen.momenta.time[inside]
+    momentum = seen.momenta.values[inside][:, members]
     if time.size < FEWEST or len(members) < 2:
         return ()
     whole = momentum.sum(axis=1, keepdims=True)
@@ -259,10 +260,8 @@ def apart_in_flight(
         momentum / mass[:, np.newaxis]
         - (whole - momentum) / (mass.sum() - mass)[:, np.newaxis]
     )
-    speed, path = (
-        np.linalg.norm(against.mean(axis=0), axis=1),
-        np.linalg.norm(whole[:, 0] / mass.sum(), axis=1),
-    )
+    speed = np.linalg.norm(against.mean(axis=0), axis=1)
+    path = np.linalg.norm(whole[:, 0] / mass.sum(), axis=1)
     steady = np.linalg.norm(np.ptp(against, axis=0), axis=1) <= _STEADY * speed
     far = speed * (time[-1] - time[0]) > MOST_OF_PATH * float(
         integral(time, path[:, np.newaxis])[-1, 0]
@@ -279,10 +278,8 @@ def _seen(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
     """Collect the input of a drift; None if the momenta of single parts do not show the flight."""
-    momenta, masses = (
-        next((one for one in history.momenta if one.parts is not None), None),
-        history.masses,
-    )
+    momenta = next((one for one in history.momenta if one.parts is not None), None)
+    masses = history.masses
     if (
         momenta is None
         or momenta.parts is None
@@ -292,11 +289,10 @@ def _seen(
     ):
         return None
     ids = {part.id for part in flight.parts}
-    wanted = (
-        {momenta.parts[i].id for i in momenta.chosen}
-        if parts is None
-        else {part.id for part in parts}
-    )
+    if parts is None:
+        wanted = {momenta.parts[i].id for i in momenta.chosen}
+    else:
+        wanted = {part.id for part in parts}
     flying = [
         i for i in momenta.moving if momenta.parts[i].id in ids
     ]  # a fixed ground does not fly
@@ -360,11 +356,9 @@ class Bodies:
 
     def errors(self, tr: Samples, td: float) -> Samples:
         """Return the place error of the most displaced body at td, for tr (k,) [length]; NaN outside the flight."""
-        return (
-            np.asarray(self._each(tr, td).max(axis=0))
-            if self._complete
-            else np.full(tr.shape, np.nan)
-        )
+        if self._complete:
+            return np.asarray(self._each(tr, td).max(axis=0))
+        return np.full(tr.shape, np.nan)
 
     @property
     def limit(self) -> float:
@@ -375,11 +369,10 @@ class Bodies:
 
     def worst(self, tr: float, td: float) -> Off | None:
         """Return the body that is displaced most; None outside the flight, or if an error is unknown."""
-        found = (
-            self._each(np.array([tr]), td)[:, 0]
-            if self._complete
-            else np.full(1, np.nan)
-        )
+        if self._complete:
+            found = self._each(np.array([tr]), td)[:, 0]
+        else:
+            found = np.full(1, np.nan)
         if np.isnan(found).any():
             return None
         at = int(np.argmax(found))

@@ -34,6 +34,19 @@ _ALONG_AXIS: Final = 1e-6
 # Numbers of periods that are tried: steps of 1/20 up to two periods, then 10 % more each.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
+# Number of parts tried as the moving one, by each of two criteria: what rotation, and what rest leaves unexplained.
+_TRIED: Final = 2
+# Without a further moving part the others leave at most this share of the rest with it.
+_MORE_RIGID: Final = 0.5
+# Less than this share of the parts' r^2 counts as nothing: 0.1 % of the displacements.
+_NOTHING: Final = 1e-6
+# A rotation that moves the others by 10 % of the part's motion changes its displacement by no more.
+_NOTABLE_WAY: Final = 0.1
+# A body shows no rotation if one part has more than this share of its mass.
+_MOST_OF_BODY: Final = 0.95
+# Parts below this share of the mass are not tried: they move the others too little.
+_HEAVY: Final = 0.05
+
 
 def _steady_rotation(
     time: Samples, ways: Samples, masses: Samples, least: float
@@ -65,7 +78,8 @@ def _steady_rotation(
     _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
     rate = np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
     rest = _rest(time, ways, rate, weights)
-    small, damping = _SMALL * 2 * np.pi / float(time[-1] - time[0]), 1e-3
+    small = _SMALL * 2 * np.pi / float(time[-1] - time[0])
+    damping = 1e-3
     for _ in range(_MOST_STEPS):
         changes = [
             (_rest(time, ways, rate + small * axis, weights) - rest).ravel() / small
@@ -84,7 +98,9 @@ def _steady_rotation(
             float(np.sum(rest**2)), np.finfo(float).tiny
         )
         if gain >= 0:
-            rate, rest, damping = rate + step, trial, damping / 10
+            rate = rate + step
+            rest = trial
+            damping = damping / 10
         else:
             damping *= 10
         if 0 <= gain <= _LEAST_GAIN or float(np.abs(step).max()) <= small:
@@ -100,7 +116,8 @@ def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
     """
     frame = _frame(time, rate)
     turned = ways @ frame
-    frame, turned = frame - frame.mean(axis=0), turned - turned.mean(axis=0)
+    frame = frame - frame.mean(axis=0)
+    turned = turned - turned.mean(axis=0)
     normal = np.tensordot(frame, frame, axes=((0, 2), (0, 2)))
     right = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
     arms = right @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
@@ -114,7 +131,8 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
     subtracted from each trial motion before it is compared with ``left`` (n, 3).  Infinite if none explains half of it.
     """
     wanted = (left - left.mean(axis=0)).ravel()
-    least, found = 0.5 * float(wanted @ wanted), np.inf
+    least = 0.5 * float(wanted @ wanted)
+    found = np.inf
     for periods in _PERIODS:
         phase = (
             2
@@ -141,7 +159,8 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
             )
         )
         if rest < least:
-            least, found = rest, float(periods)
+            least = rest
+            found = float(periods)
     return found
 
 
@@ -210,26 +229,13 @@ def _frame(time: Samples, rate: Samples) -> Samples:
     )
 
 
-# Number of parts tried as the moving one, by each of two criteria: what rotation, and what rest leaves unexplained.
-_TRIED: Final = 2
-# Without a further moving part the others leave at most this share of the rest with it.
-_MORE_RIGID: Final = 0.5
-# Less than this share of the parts' r^2 counts as nothing: 0.1 % of the displacements.
-_NOTHING: Final = 1e-6
-# A rotation that moves the others by 10 % of the part's motion changes its displacement by no more.
-_NOTABLE_WAY: Final = 0.1
-# A body shows no rotation if one part has more than this share of its mass.
-_MOST_OF_BODY: Final = 0.95
-# Parts below this share of the mass are not tried: they move the others too little.
-_HEAVY: Final = 0.05
-
-
 def moving_apart(
     time: Samples, ways: Samples, mass: Samples
 ) -> tuple[list[int], Samples, float]:
     """Find the parts that move against the others, the rate of these, and their rest; no parts if unknown."""
     moving: list[int] = []
-    rate, rest = np.zeros(3), np.inf
+    rate = np.zeros(3)
+    rest = np.inf
     while True:
         found = _next_apart(
             time, ways, mass, np.setdiff1d(np.arange(mass.size), moving)
@@ -257,7 +263,8 @@ def _next_apart(
     A slide of one part may look like a rotation of all; among parts alike in this, the one with the largest effect
     counts.
     """
-    about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
+    about = _about_centre(ways[:, left], mass[left])
+    masses = mass[left]
     orders = (
         np.argsort(_least_rests(time, about, masses)),
         np.argsort(_least_ways(about, masses)),

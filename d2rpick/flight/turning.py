@@ -101,12 +101,14 @@ def turning_in_flight(
     ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, the
     record does not begin with the run, or the parts of the body do not determine its orientation.
     """
-    momenta, masses = seen.momenta, seen.masses
+    momenta = seen.momenta
+    masses = seen.masses
     assert momenta.parts is not None
     every = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
     placed = {i: placement.parts.get(momenta.parts[i].id) for i in every}
     known = [one for one in placed.values() if one]
-    time, mass = momenta.time, masses[every]
+    time = momenta.time
+    mass = masses[every]
     if (
         len(known) < len(every)
         or not np.isfinite(mass).all()
@@ -121,18 +123,22 @@ def turning_in_flight(
     body = _frame_of(seen, moving, placement)
     where = (centre + velocity[0] * time[0] + since)[inside][::stride]
     at = {i: place for place, i in enumerate(every)}
-    rigid, part = [at[i] for i in seen.members], [at[i] for i in body]
+    rigid = [at[i] for i in seen.members]
+    part = [at[i] for i in body]
     where = where - _mean(where, mass)[:, np.newaxis]
     home = _mean(centre[part], mass[part])
-    shape, middle = centre[part] - home, _mean(where[:, part], mass[part])
+    shape = centre[part] - home
+    middle = _mean(where[:, part], mass[part])
     frames = _orientations(shape, where[:, part] - middle[:, np.newaxis], mass[part])
-    places, middle = where @ frames, np.einsum("ni,nij->nj", middle, frames)
+    places = where @ frames
+    middle = np.einsum("ni,nij->nj", middle, frames)
     if _bent(shape, places[:, part] - middle[:, np.newaxis], mass[part]) > _MOST_BENT:
         return None
     own = _inertia(
         np.einsum("p,pij->ij", mass, np.stack([one.spread for one in known]))
     )
-    inertia, spin = _inertia(_second(places, mass)) + own, _spin(places, mass)
+    inertia = _inertia(_second(places, mass)) + own
+    spin = _spin(places, mass)
     moving_inertia = _inertia(_second(places[:, rigid], mass[rigid]))
     time = time[inside][::stride]
     solved = _solved(
@@ -161,11 +167,9 @@ def _frame_of(
     still = [i for i in seen.members if i not in moving]
     together = placement.hanging_together([parts[i].id for i in still])
     main = [i for i in still if parts[i].id in together]
-    return (
-        main
-        if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum()
-        else still
-    )
+    if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum():
+        return main
+    return still
 
 
 def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
@@ -216,7 +220,8 @@ def _solved(
 
 def _carried(time: Samples, slope: Samples) -> Samples:
     """Return the solution (n, 3, 3) of X' = slope X that starts from the unit matrix."""
-    found, unit = [np.eye(3)], np.eye(3)
+    found = [np.eye(3)]
+    unit = np.eye(3)
     for step in _halves(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
         found.append((unit + step + step @ step / 2) @ found[-1])
     return np.stack(found)

@@ -76,7 +76,8 @@ def kinetic_energy_of(
     if kinetic is None:
         return None
     inside = slice(*np.searchsorted(kinetic.time, flight.within(history.time)).tolist())
-    time, energy = kinetic.time[inside], kinetic.values[inside]
+    time = kinetic.time[inside]
+    energy = kinetic.values[inside]
     if time.size < _FEWEST:
         return None
     since = time - time[0]

@@ -139,7 +139,8 @@ def lasting_window(
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
-    limit, own = max(TOLERANCE, enough) * extent, max(noise, ROUND_OFF * extent)
+    limit = max(TOLERANCE, enough) * extent
+    own = max(noise, ROUND_OFF * extent)
     found = _converged(
         law, at, limit, own if fades else limit, noise, enough * extent, rings=rings
     )
@@ -149,11 +150,9 @@ def lasting_window(
     first, last = _tightened(law, window, own, room)
     if first == 1 and from_start:
         first = 0  # a solver may write the first state before its first step, with velocities of half a step earlier
-    return (
-        (first, last)
-        if time[first] <= td <= time[last] and _long_enough(time, (first, last))
-        else None
-    )
+    if time[first] <= td <= time[last] and _long_enough(time, (first, last)):
+        return (first, last)
+    return None
 
 
 def _converged(
@@ -171,9 +170,12 @@ def _converged(
     The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
     returned: the misfit that the window may leave, and whether it first began with the record.
     """
-    time, room, found = law.time, limit + noise, None
+    time = law.time
+    room = limit + noise
+    found = None
     window = longest_window(law, at, room)
-    from_start, kept = window[0] == 0, None
+    from_start = window[0] == 0
+    kept = None
     while _long_enough(time, window):
         strict = _TIGHTER * limit + noise
         finer = longest_window(law, at, strict)
@@ -194,12 +196,10 @@ def _converged(
             and (kept is None or 2 * _length(time, window) >= _length(time, kept[0]))
         ):
             kept = window, room, from_start
-        window, limit, room, at = (
-            finer,
-            _TIGHTER * limit,
-            strict,
-            (finer[0] + finer[1]) // 2,
-        )
+        window = finer
+        limit = _TIGHTER * limit
+        room = strict
+        at = (finer[0] + finer[1]) // 2
         found = (window, room, from_start) if lasts else None
     return found or kept
 
@@ -281,9 +281,10 @@ def _tightened(
         own = law.misfit(first + inset, last - inset)
         room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, own - noise)
         tight = longest_window(law, (first + last) // 2, room)
-        tighter = (
-            tight if room <= loose else (max(first, tight[0]), min(last, tight[1]))
-        )
+        if room <= loose:
+            tighter = tight
+        else:
+            tighter = (max(first, tight[0]), min(last, tight[1]))
         if tighter == window:
             break
         window = tighter
@@ -322,12 +323,15 @@ def _length(time: Samples, window: tuple[int, int]) -> float:
 
 def farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
     """Walk from ``start`` towards ``limit`` in doubling steps while it fits, then halve the last step."""
-    sign, good, step = (1 if limit > start else -1), start, 1
+    sign = 1 if limit > start else -1
+    good = start
+    step = 1
     while good != limit:
         ahead = good + sign * min(step, abs(limit - good))
         if not fits(ahead):
             break
-        good, step = ahead, 2 * step
+        good = ahead
+        step = 2 * step
     while step > 1:
         step //= 2
         ahead = good + sign * min(step, abs(limit - good))
@@ -346,7 +350,8 @@ def unheld(
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None
-    start, end = max(flight.start, between[0]), min(flight.end, between[1])
+    start = max(flight.start, between[0])
+    end = min(flight.end, between[1])
     return flight._replace(
         start=start, end=end, end_seen=flight.end_seen or end < flight.end
     )

@@ -39,6 +39,9 @@ _OF_DIGITS: Final = 4
 # half the share of the kinetic energy.
 _LITTLE, _MUCH = 5e-3, 0.5
 
+# A contact energy within this many times its printed digits shows no contact at all.
+_VISIBLE = 100
+
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
     """Return the largest external work in a window that neither gravity nor damping explains [energy].
@@ -50,9 +53,11 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
     inside = window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
         return None
-    time, work = balance.time[inside], balance.external_work[inside]
+    time = balance.time[inside]
+    work = balance.external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])
-    free, most = [np.ones_like(time)], np.inf
+    free = [np.ones_like(time)]
+    most = np.inf
     if balance.velocity is None:
         free.append(elapsed)
         gravity = elapsed**2
@@ -76,11 +81,9 @@ def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
     """Return the largest factor of the integral of F v: the whole motion has at most all the kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
-    return (
-        _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min())
-        if fast.any()
-        else np.inf
-    )
+    if fast.any():
+        return _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min())
+    return np.inf
 
 
 def _rest(
@@ -151,7 +154,8 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy
     looks like it.
     """
-    time, terms = balance.time, _terms(balance)
+    time = balance.time
+    terms = _terms(balance)
     if (
         balance.velocity is not None
         or not terms
@@ -176,11 +180,10 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
         ],
     )
     window = lasting_window(exact, td, extent, noise)
-    rings = (
-        lasting_window(ringing, td, extent, noise, rings=True)
-        if window is None
-        else None
-    )
+    if window is None:
+        rings = lasting_window(ringing, td, extent, noise, rings=True)
+    else:
+        rings = None
     found = window or rings
     if found is None:
         return None
@@ -222,7 +225,8 @@ def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> 
     """
     from d2rpick.flight.free_fall import FreeFall
 
-    time, momentum = momenta.time, momenta.of((0,))
+    time = momenta.time
+    momentum = momenta.of((0,))
     inside = window(time, flight.start, flight.end)
     force = FreeFall(time[inside], momentum[inside]).gravity()
     along = momentum @ force / np.linalg.norm(force)
@@ -249,11 +253,9 @@ def taken_by_damping(
     either ("Energies that look like flight" in docs).  None if an energy is missing.
     """
     inside = window(balance.time, start, end)
-    whole, kinetic, time = (
-        balance.kinetic_and_internal,
-        balance.kinetic,
-        balance.time[inside],
-    )
+    whole = balance.kinetic_and_internal
+    kinetic = balance.kinetic
+    time = balance.time[inside]
     if whole is None or kinetic is None or not time.size:
         return None
     of_vibration = vibration(time)
@@ -272,7 +274,8 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
     force takes it than as damping does: by gravity or another load.
     """
-    whole, kinetic = balance.kinetic_and_internal, balance.kinetic
+    whole = balance.kinetic_and_internal
+    kinetic = balance.kinetic
     if whole is None or kinetic is None:
         return 0.0
     states = slice(first, last + 1)
@@ -301,7 +304,8 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
 
 def _terms(balance: Balance) -> list[Samples]:
     """Return the written energies that change by gravity and damping only, if they change at all."""
-    whole, internal = balance.kinetic_and_internal, balance.internal
+    whole = balance.kinetic_and_internal
+    internal = balance.internal
     changes = (
         whole is not None
         and internal is not None
@@ -353,10 +357,6 @@ class _Parabola(Law):
         return float(np.abs(energies - table @ factors).max()) * float(scale)
 
 
-# A contact energy within this many times its printed digits shows no contact at all.
-_VISIBLE = 100
-
-
 def shows_contacts(balance: Balance) -> bool:
     """Return True if the contact energy shows that contacts of the model were ever closed."""
     energy = balance.sliding
@@ -371,7 +371,8 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
     counts only if the external work, which shows that load, is written too.
     """
-    time, energy = balance.time, balance.sliding
+    time = balance.time
+    energy = balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))

@@ -1,8 +1,9 @@
-"""The energy balance of a run under the names that each solver gives its terms."""
+"""The energy balance of a run, from terms that each solver names differently."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import compress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
 
-# Terms of the balance, and the quantities that hold them.
+# Terms of the balance by the quantities that contain them.
 _QUANTITIES: Final[Mapping[str, str]] = {
     "kinetic": "kinetic_energy",
     "hourglass": "hourglass_energy",
@@ -36,19 +37,31 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# Abaqus' total energy is what is left of all energies without the external work: it stays as it is at the start.
+# The total energy of Abaqus is the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
-# Without one of these nothing can be said of the health.
+# Quantities of which at least one is needed to judge the health of a run.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
     "kinetic_energy",
     "frictional_contact_energy",
     "damping_energy",
 }
-# Normalised names.
+# Normalised names of the energy absorbed by rigid walls, and of the velocities of the whole model.
 _WALLS: Final = ("stonewallenergy", "rigidwallenergy")
 _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
+
+# Normalised names of the energy of springs: Radioss; glstat of LS-DYNA and its branch of a binout.  In tables the names
+# may mean anything.
+_SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
+# Below this share of the peak internal energy, springs have no energy: single precision and glstat have six digits.
+_NONE: Final = 1e-6
+# Least energy of springs [energy]: LS-DYNA prints 1e-20 for zero.
+_FLOOR: Final = 1e-15
+# Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
+_ADDS_UP: Final = 1e-3
+# Threshold between the factors 0 and 1 of parts in a sum.
+_HALF: Final = 0.5
 
 
 def balance_of(
@@ -57,10 +70,10 @@ def balance_of(
     until: float = np.inf,
     known: Balance | None = None,
 ) -> Balance | None:
-    """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
+    """Return the energy balance of the whole model, and the hourglass energies of ``parts``, up to a time [time].
 
-    ``known`` are its `terms_of`, where they were read already and all times are asked for.  None where the files have
-    nothing of it that can be judged, or leave open which columns are meant.
+    ``known`` are its `terms_of` if they were read already and all times are requested. The result is None if the
+    files contain no term by which the run can be judged, or if the columns are ambiguous.
     """
     whole = _whole(databases)
     of_parts = _hourglass_of(databases, parts, until) if parts else ()
@@ -74,9 +87,9 @@ def balance_of(
 
 
 def terms_of(databases: Sequence[Legs]) -> Balance | None:
-    """Read the balance of the whole model, be it enough to judge the health of the run or not.
+    """Return the energy balance of the whole model, even if it is not enough to judge the health of the run.
 
-    None where the files have no energy beside the internal one, or leave open which columns are meant.
+    The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
     whole = _whole(databases)
     if whole is None or {*_QUANTITIES.values()}.isdisjoint(whole.quantities):
@@ -85,10 +98,9 @@ def terms_of(databases: Sequence[Legs]) -> Balance | None:
 
 
 def momentum_of(database: Legs) -> Momenta | None:
-    """Read the momentum of the whole model, or its velocity, which is the same but for the mass; None without."""
-    if {*_MOMENTA, *_VELOCITIES}.isdisjoint(
-        database.quantities
-    ) and not _global_velocities(database):
+    """Return the momentum of the whole model, or its velocity, of an unknown mass; None if neither is written."""
+    has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
+    if not has_components and not _global_velocities(database):
         return None
     columns = if_written(lambda: _Columns(database, database.time.size))
     values = columns.velocity() if columns else None
@@ -96,9 +108,9 @@ def momentum_of(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = (columns.mass(values) if columns.momentum else 0.0) or float(
-        "nan"
-    )  # nothing moves, or it is not known
+    mass = float("nan")  # unknown, or nothing moves
+    if columns.momentum:
+        mass = columns.mass(values) or mass
     return Momenta(
         database.time,
         values,
@@ -111,68 +123,69 @@ def momentum_of(database: Legs) -> Momenta | None:
 
 
 def least_masses(momenta: Samples, kinetic: Samples) -> Samples:
-    """Least masses (k,) that have such momenta (n, k, 3) at such kinetic energies (n, k); 0 where there is none."""
+    """Return the least masses (k,) with these momenta (n, k, 3) and kinetic energies (n, k); 0 without energy."""
     squares = np.sum(momenta**2, axis=2)
-    found = np.divide(
+    masses = np.divide(
         squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0
     )
-    return np.asarray(found.max(axis=0))
+    return np.asarray(masses.max(axis=0))
 
 
 def _whole(databases: Sequence[Legs]) -> Legs | None:
+    """Return the first database of the whole model."""
     return next((database for database in databases if database.channels), None)
 
 
 def _terms(whole: Legs, until: float) -> Balance | None:
+    """Return the terms of the balance up to a time; None if the time or the columns cannot be read."""
     columns = if_written(
         lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     )
     if columns is None:
         return None
-    found = {term: columns.quantity(quantity) for term, quantity in _QUANTITIES.items()}
+    terms = {term: columns.quantity(quantity) for term, quantity in _QUANTITIES.items()}
     rotation = columns.called(ROTATION_ENERGY)
-    if rotation is not None and found["kinetic"] is not None:
-        found["kinetic"] = found["kinetic"] + rotation
+    if rotation is not None and terms["kinetic"] is not None:
+        terms["kinetic"] = terms["kinetic"] + rotation
     walls = (columns.called(name) for name in _WALLS)
-    found["wall"] = next((energy for energy in walls if energy is not None), None)
-    total, work = found["total"], found["external_work"]
-    if (
-        total is not None
-        and work is not None
-        and _LESS_WORK.issubset(map(normalised, columns.used))
-    ):
-        found["total"] = total + work
+    terms["wall"] = next((energy for energy in walls if energy is not None), None)
+    total = terms["total"]
+    work = terms["external_work"]
+    is_less_work = _LESS_WORK.issubset(map(normalised, columns.used))
+    if total is not None and work is not None and is_less_work:
+        terms["total"] = total + work
     return Balance(
         time=whole.time[: columns.states],
         internal=columns.internal(),
         velocity=columns.velocity(),
         hourglass_of_parts=(),
         precision=whole.precisions(columns.used)[1],
-        **found,
+        **terms,
     )
 
 
 def _global_velocities(database: Legs) -> dict[str, str]:
-    """Return the channels called velocities of the whole model, by their normalised names."""
+    """Return the channels with the name of a velocity of the whole model, by their normalised names."""
     names = {normalised(name): name for name in reversed(database.channels)}
     return {name: names[name] for name in _GLOBAL_VELOCITIES if name in names}
 
 
 class _Columns:
-    """Columns of a database by what they mean, the first ``states`` of them.
+    """The columns of a database by their meaning, in its first ``states`` states.
 
-    One that is absent, or not in every state, is None.
+    A column that is missing, or not in every state, is None.
     """
 
     def __init__(self, database: Legs, states: int) -> None:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        self.momentum = False  # whether the velocity that was read is a momentum
+        self.momentum = False  # True once a momentum was read as the velocity
 
     def mass(self, momenta: Samples) -> float:
-        """Give the mass of the model: as written, or the least that has these momenta, (n, 1, 3)."""
-        written, kinetic = self.quantity("mass"), self.quantity("kinetic_energy")
+        """Return the mass of the model: as written, or the least mass with these momenta, (n, 1, 3)."""
+        written = self.quantity("mass")
+        kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
             return float(median(written))
         if kinetic is None or not (kinetic > 0).any():
@@ -193,10 +206,10 @@ class _Columns:
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
-        """Give the velocity of the centre of mass, up to a factor, shape (n, 3).
+        """Return the velocity of the centre of mass, up to a factor, shape (n, 3).
 
-        A velocity that is called global is preferred, then a momentum, then any other velocity.  A planar one has two
-        of the three components.
+        A global velocity is preferred, then a momentum, then any other velocity. A planar one has two of the three
+        components.
         """
         velocities = [self.called(name) for name in _GLOBAL_VELOCITIES]
         stacked = _stack_components(velocities)
@@ -208,7 +221,7 @@ class _Columns:
         return stacked
 
     def internal(self) -> Samples | None:
-        """Give the internal energy of the whole model; beside its total, a plain one may be that of some parts."""
+        """Return the internal energy of the whole model, preferably a total: a plain one may be that of some parts."""
         for says_so in (is_total_internal_energy, is_internal_energy):
             names = [name for name in self._database.channels if says_so(name)]
             if names:
@@ -216,6 +229,7 @@ class _Columns:
         return None
 
     def _values(self, name: str) -> Samples | None:
+        """Return a column with finite numbers in all states, or None."""
         values = if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None
@@ -224,20 +238,20 @@ class _Columns:
 
 
 def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
-    """Stack components (n,) to vectors (n, 3), 0 where one is missing; None if fewer than two are there."""
-    known = [component for component in components if component is not None]
-    if len(known) < 2:
+    """Stack components (n,) to vectors (n, 3) with 0 for a missing one; return None if fewer than two are there."""
+    present = [component for component in components if component is not None]
+    if len(present) < 2:
         return None
-    still = np.zeros_like(known[0])
+    zeros = np.zeros_like(present[0])
     return np.stack(
-        [still if component is None else component for component in components], axis=1
+        [zeros if component is None else component for component in components], axis=1
     )
 
 
 def _hourglass_of(
     databases: Sequence[Legs], parts: Sequence[Part], until: float
 ) -> tuple[tuple[Part, float, float], ...]:
-    """Highest hourglass and internal energy of each part, where they are written."""
+    """Return the highest hourglass and internal energy of each part, if they are written."""
     ids = [part.id for part in parts]
     for database in databases:
         try:
@@ -247,29 +261,17 @@ def _hourglass_of(
             )
         except FormatError:
             continue
-        before = database.part_time <= until
+        until_then = database.part_time <= until
         highest = (
-            energy[before].max(axis=0, initial=0.0).tolist()
+            energy[until_then].max(axis=0, initial=0.0).tolist()
             for energy in (hourglass, internal)
         )
         return tuple(zip(parts, *highest, strict=True))
     return ()
 
 
-# Radioss; glstat of LS-DYNA and its branch of a binout.  In a table the names may mean anything.
-_SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Below this share of the peak internal energy springs have none: single precision and glstat print six digits.
-_NONE: Final = 1e-6
-# LS-DYNA begins to count at 1e-20.
-_FLOOR: Final = 1e-15
-# The energies of the springs add up to within this share of the peak: matsum prints five digits of each.
-_ADDS_UP: Final = 1e-3
-# Factors of a sum of parts are 0 or 1.
-_HALF: Final = 0.5
-
-
 def spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Give name and values (n,) of the energy of all springs and dampers; None where there is none, or no other."""
+    """Return name and values (n,) of the energy of all springs and dampers; None if it is zero, or all energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
@@ -281,36 +283,37 @@ def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     energies = if_written(lambda: (database.channel(name), database.channel(total)))
     if energies is None or not energies[0].size or not np.isfinite(energies[0]).all():
         return None
-    found, whole = energies
-    least = max(_NONE * float(np.abs(whole).max()), _FLOOR)
-    rest = whole - found
-    told_apart = (
-        found.max() > least and rest.max() > least and rest.min() >= -least
-    )  # it is part of the whole
-    return (name, found) if told_apart else None
+    springs, whole = energies
+    threshold = max(_NONE * float(np.abs(whole).max()), _FLOOR)
+    others = whole - springs
+    is_part_of_whole = (
+        springs.max() > threshold
+        and others.max() > threshold
+        and others.min() >= -threshold
+    )
+    return (name, springs) if is_part_of_whole else None
 
 
 def springs_among(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Find the parts whose energies add up to that of all springs and dampers; none where no choice of them does.
+    """Return the parts whose energies add up to the energy of all springs and dampers; () if no set of parts does.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """
-    named = next(
-        ((one.time, found[1]) for one in databases if (found := spring_energy(one))),
-        None,
+    candidates = ((legs, spring_energy(legs)) for legs in databases)
+    database, springs = next(
+        ((legs, energy) for legs, energy in candidates if energy), (None, None)
     )
-    if named is None or not time.size > len(parts) > 0:
+    if database is None or springs is None or not time.size > len(parts) > 0:
         return ()
-    inside = (time >= named[0][0]) & (time <= named[0][-1])
-    wanted, table = np.interp(time[inside], *named), energies[inside]
+    inside = (time >= database.time[0]) & (time <= database.time[-1])
+    wanted = np.interp(time[inside], database.time, springs[1])
+    table = energies[inside]
     if not wanted.any() or not np.isfinite(table).all():
         return ()
-    chosen = np.linalg.lstsq(table, wanted, rcond=None)[0] > _HALF
-    if (
-        np.abs(table[:, chosen].sum(axis=1) - wanted).max()
-        > _ADDS_UP * np.abs(wanted).max()
-    ):
+    is_chosen = np.linalg.lstsq(table, wanted, rcond=None)[0] > _HALF
+    misfit = np.abs(table[:, is_chosen].sum(axis=1) - wanted).max()
+    if misfit > _ADDS_UP * np.abs(wanted).max():
         return ()
-    return tuple(part for part, one in zip(parts, chosen.tolist(), strict=True) if one)
+    return tuple(compress(parts, is_chosen.tolist()))

@@ -1,7 +1,7 @@
-"""Forces of contacts and rigid walls, as far as the files of a run tell them, and between which states they act.
+"""Forces of contacts and rigid walls in the files of a run, and the states between which they act.
 
-A solver writes a force that is exactly zero where nothing touches.  Forces are written as they are at each state, by
-LS-DYNA, or as their impulses since the start, by Radioss: these do not change where no force acts, and miss none.
+A solver writes exactly zero if nothing touches. LS-DYNA writes forces at each state; Radioss writes their impulses
+since the start, which do not change while no force acts, and miss no force.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# A force, or a change of an impulse, below this share of the largest is none: single precision keeps seven digits.
+# A force, or a change of an impulse, below this share of the largest is zero: single precision has seven digits.
 _NOTHING: Final = 1e-6
 
 
 class ContactForce(NamedTuple):
-    """What a contact or a rigid wall of this ``name`` does, over ``time`` (n,) [time].
+    """The force of a contact or rigid wall of this ``name`` over ``time`` (n,) [time].
 
-    ``impulses`` of shape (n, 3) are those since the state before, 0 for the first one; NaN where they are not known
-    [momentum].  ``acts`` (n,) tells whether a force is seen between a state and the one before.
+    ``impulses`` of shape (n, 3) are those since the state before, 0 for the first state; NaN if unknown [momentum].
+    ``acts`` (n,) is True if a force acts between a state and the one before.
     """
 
     name: str
@@ -38,10 +38,10 @@ class ContactForce(NamedTuple):
 
     @classmethod
     def of_forces(cls, name: str, time: Samples, forces: Samples) -> ContactForce:
-        """Take from forces at the states, of shape (n, 3) [force]."""
-        seen = _is_something(forces)
-        acts = seen.copy()
-        acts[1:] |= seen[:-1]
+        """Make a contact force from forces at the states, of shape (n, 3) [force]."""
+        is_nonzero = _is_something(forces)
+        acts = is_nonzero.copy()
+        acts[1:] |= is_nonzero[:-1]
         acts[:1] = False
         means = (forces[1:] + forces[:-1]) / 2
         impulses = np.zeros_like(forces)
@@ -50,14 +50,14 @@ class ContactForce(NamedTuple):
 
     @classmethod
     def of_impulses(cls, name: str, time: Samples, impulses: Samples) -> ContactForce:
-        """Take from impulses since the start, of shape (n, 3) [momentum]."""
+        """Make a contact force from impulses since the start, of shape (n, 3) [momentum]."""
         changes = np.zeros_like(impulses)
         changes[1:] = np.diff(impulses, axis=0)
         return cls(name, time, changes, _is_something(changes))
 
     @classmethod
     def of_changes(cls, name: str, time: Samples, values: Samples) -> ContactForce:
-        """Take from columns (n, k) of which nobody knows whether they are forces or impulses: both change as it acts.
+        """Make a contact force from columns (n, k) that may be forces or impulses: both change while the force acts.
 
         A force that stays at one value is zero, since a contact lets parts vibrate.
         """
@@ -67,15 +67,18 @@ class ContactForce(NamedTuple):
 
     @property
     def times(self) -> tuple[tuple[float, float], ...]:
-        """Times (start, end) in which it acts, ascending: from the last state without a force to the next one."""
+        """Intervals (start, end) in which the force acts: from the last state without a force to the next one."""
         return tuple(
-            (float(self.time[max(one.start - 1, 0)]), float(self.time[one.stop - 1]))
-            for one in stretches(self.acts)
+            (
+                float(self.time[max(interval.start - 1, 0)]),
+                float(self.time[interval.stop - 1]),
+            )
+            for interval in stretches(self.acts)
         )
 
     @property
     def tells(self) -> bool:
-        """Whether it acts at some times and not at others."""
+        """True if the force acts at some times and not at others."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
@@ -90,9 +93,9 @@ def find_force(
 
 
 def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactForce:
-    """Join what legs of a run tell of one contact; ``keep`` are the states that count, of all legs together.
+    """Join the forces of one contact in the legs of a run; ``keep`` are the valid states of all legs together.
 
-    Between two legs a force is taken to act where it does just before or behind.
+    Between two legs the force acts if it acts just before or after.
     """
     if len(pieces) == 1 and keep.all():
         return pieces[0]
@@ -103,12 +106,12 @@ def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactFo
     begins = np.zeros(time.size, np.bool_)
     begins[np.cumsum([0, *(piece.time.size for piece in pieces[:-1])])] = True
     whole = ContactForce(pieces[0].name, time[keep], impulses[keep], acts[keep])
-    for place in np.flatnonzero(begins[keep])[1:].tolist():
-        whole.acts[place] = whole.acts[place - 1 : place + 2].any()
+    for state in np.flatnonzero(begins[keep])[1:].tolist():
+        whole.acts[state] = whole.acts[state - 1 : state + 2].any()
     return whole
 
 
 def _is_something(values: Samples) -> NDArray[np.bool_]:
-    """Whether any of the values of a state (n, k) is more than round-off beside the largest of all."""
+    """Return True for each state whose values (n, k) are more than round-off compared with the largest of all."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

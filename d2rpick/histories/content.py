@@ -1,9 +1,8 @@
-"""The bytes of one file as they were when it was opened, whatever becomes of the file meanwhile.
+"""The bytes of one file as they were when it was opened, even if the file changes later.
 
-A running solver appends to its files, and one that is started again cuts them and writes them anew.  Bytes behind the
-size seen at opening do not count.  A file that was cut or written anew while it was read is an error: its size and
-times then and afterwards show that.  Files are not mapped into memory: where a mapped page is cut off, the system ends
-the process.
+A running solver appends to its files, and a restarted one cuts them and writes them anew. Bytes after the size at
+opening are ignored. If a file is cut or rewritten while it is read, its size and times show it, which is an error.
+Files are not mapped into memory: if a mapped page is cut off, the system kills the process.
 """
 
 from __future__ import annotations
@@ -27,15 +26,14 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # a file up to this size is held in memory
+_HELD: Final = 1 << 24  # bytes; a file up to this size is held in memory
 _LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
-_END: Final = (
-    1 << 12
-)  # bytes at both ends of what counts, by which a file that has grown is known again
+# Bytes at both ends of the content by which a file is recognised after it has grown.
+_END: Final = 1 << 12
 
 
 class Content:
-    """Bytes held in memory."""
+    """The bytes of a file, held in memory."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -50,44 +48,44 @@ class Content:
         return self._data[where]
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
+        """Return the address of the first ``wanted`` from ``begin`` on, -1 if there is none."""
         return self._data.find(wanted, begin)
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
+        """Return the address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 if there is none."""
         return self._data.rfind(wanted, begin, end)
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Bytes from one address to another, shape (end - begin,)."""
+        """Return the bytes from one address to another, shape (end - begin,)."""
         return np.frombuffer(self._data, np.uint8)[begin:end]
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Bytes at many addresses, ``width`` of each, shape (n, width)."""
+        """Return ``width`` bytes at each of many addresses, shape (n, width)."""
         return _gathered(self.view(0, len(self)), addresses, width)
 
-    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
-        """Fill each row of ``room`` (n, width) with the bytes at every ``stride``; what begins behind the last one.
+    def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
+        """Fill the rows of ``room`` (n, width) with bytes at ``begin`` and every ``stride`` after it.
 
-        ``begin`` is where the first row begins; of the ``rest`` so many bytes are given, less where the file ends.
+        Return the ``rest`` bytes after the last stride, fewer if the file ends before.
         """
         end = begin + len(room) * stride
         if len(room):
             room[:] = self.fields(
                 np.arange(begin, end, stride, dtype=np.int64), room.shape[1]
             )
-        return self[end : end + rest]
+        return self[end : end + size_after]
 
     def check(self) -> None:
-        """Nothing to be done: what is held does not change."""
+        """Do nothing: bytes in memory do not change."""
 
 
 def content_of(data: bytes | Content) -> Content:
-    """Content of bytes, whether they are held in memory or not."""
+    """Return the content of bytes, whether they are in memory or on disk."""
     return Content(data) if isinstance(data, bytes) else data
 
 
 class OnDisk(Content):
-    """Bytes of a file that are read when they are asked for.
+    """The bytes of a file that are read from disk at each request.
 
     Parameters
     ----------
@@ -99,24 +97,20 @@ class OnDisk(Content):
         Its state at rest.
     """
 
-    # How many bytes are read at a time.
-    block = (
-        1 << 19
-    )  # where many are wanted, a power of 2: they stay in the cache meanwhile
-    gap = (
-        1 << 13
-    )  # between two that are read together: a call of the system costs more than these
-    window = 1 << 16  # where few are wanted: more will be, mostly behind them
+    # Numbers of bytes that are read together.
+    block = 1 << 19  # of many bytes; a power of 2, which stays in the cache
+    # between two fields read together: a system call costs more than these
+    gap = 1 << 13
+    # of few bytes: further requests are mostly for the bytes after them
+    window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
-        from threading import Lock, local  # not above: most files are small
+        from threading import Lock, local  # imported here: most files are small
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
-        self._lock, self._own = (
-            Lock(),
-            local(),
-        )  # of each thread: its buffer and its window
+        self._lock = Lock()
+        self._own = local()  # of each thread: its buffer and its window
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 
@@ -144,46 +138,47 @@ class OnDisk(Content):
         if begin < end and (begin < first or end > first + len(window)):
             if end - begin > self.window:
                 return self.view(begin, end).tobytes()
-            # who goes backwards will want more before it
+            # a search backwards will need the bytes before
             first = begin if begin >= first else max(0, end - self.window)
             window = self.view(first, min(first + self.window, self._size)).tobytes()
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, self.gap):
-            found = self[at : at + self.gap + len(wanted) - 1].find(wanted)
-            if found >= 0:
-                return at + found
+        """Return the address of the first ``wanted`` from ``begin`` on, -1 if there is none."""
+        for start in range(begin, self._size, self.gap):
+            piece = self[start : start + self.gap + len(wanted) - 1]
+            index = piece.find(wanted)
+            if index >= 0:
+                return start + index
         return -1
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
+        """Return the address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 if there is none."""
         for stop in range(end, begin, -self.gap):
             first = max(begin, stop - self.gap)
-            found = self[first:stop].rfind(wanted)
-            if found >= 0:
-                return first + found
+            index = self[first:stop].rfind(wanted)
+            if index >= 0:
+                return first + index
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Bytes from one address to another, shape (end - begin,); valid up to the next call in this thread."""
+        """Return the bytes between two addresses, shape (end - begin,), valid until the next call in this thread."""
         data = self._room(end - begin)
         self._fill(data.data, begin)
         return data
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Bytes at many addresses, ``width`` of each, shape (n, width); to be trusted after a `check`."""
+        """Return ``width`` bytes at each of many addresses, shape (n, width); valid only after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):
             order = np.argsort(addresses, kind="stable")
-            found = np.empty((addresses.size, width), np.uint8)
-            found[order] = self.fields(addresses[order], width)
-            return found
+            fields = np.empty((addresses.size, width), np.uint8)
+            fields[order] = self.fields(addresses[order], width)
+            return fields
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
+        """Return an array for ``size`` bytes; few bytes share a buffer, since new memory costs more than reading."""
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -192,14 +187,12 @@ class OnDisk(Content):
         return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
-        """Read what lies close together in one piece, and what lies alone by itself."""
-        found = np.empty((addresses.size, width), np.uint8)
+        """Read fields at ascending addresses; fields that are close together are read in one piece."""
+        fields = np.empty((addresses.size, width), np.uint8)
+        if not addresses.size:
+            return fields
         apart = (np.diff(addresses) > self.gap) | (np.diff(addresses & -self.block) > 0)
-        firsts = (
-            np.flatnonzero(np.append(True, apart))
-            if addresses.size
-            else np.empty(0, np.int64)
-        )
+        firsts = np.flatnonzero(np.append(True, apart))
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
         for first, end in zip(
@@ -207,16 +200,17 @@ class OnDisk(Content):
         ):
             low = int(addresses[first])
             near = self.view(low, int(addresses[end - 1]) + width)
-            found[first:end] = _gathered(near, addresses[first:end] - low, width)
-        alone, room = firsts[~several], found.reshape(-1).data
-        for place, address in zip(
+            fields[first:end] = _gathered(near, addresses[first:end] - low, width)
+        alone = firsts[~several]
+        room = fields.reshape(-1).data
+        for start, address in zip(
             (alone * width).tolist(), addresses[alone].tolist(), strict=True
         ):
-            self._fill(room[place : place + width], address)
-        return found
+            self._fill(room[start : start + width], address)
+        return fields
 
     def sha256(self) -> str:
-        """SHA-256 of the bytes, of which those that were used are the same as then; ChangedError where they are not."""
+        """Return the SHA-256 of the bytes; raise ChangedError if they are not those that were read before."""
         if not self._digest:
             import hashlib
 
@@ -230,60 +224,61 @@ class OnDisk(Content):
         return self._digest
 
     def _fill(self, room: memoryview, begin: int) -> None:
-        """Read as many bytes as there is room."""
+        """Fill ``room`` with the bytes from ``begin`` on."""
         with self._lock:
             self._fill_from(self._file, room, begin)
 
     def _fill_from(self, file: FileIO, room: memoryview, begin: int) -> None:
+        """Fill ``room`` with the bytes of an open file from ``begin`` on."""
         file.seek(begin)
         done = file.readinto(room)
-        while done < len(room):  # a single call gives 2 GB at most
-            more = file.readinto(room[done:])
-            if not more:
+        while done < len(room):  # a single call reads 2 GB at most
+            count = file.readinto(room[done:])
+            if not count:
                 raise self._shortened()
-            done += more
+            done += count
 
     def _shortened(self) -> ChangedError:
-        found = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
+        """Return the error for a file that became shorter."""
+        problem = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
         return ChangedError(
-            f"{found}; is a solver writing it anew? Read it again when it has"
+            f"{problem}; is a solver writing it anew? Read it again when it has"
         )
 
     def check(self) -> None:
-        """Make sure that what was read so far is all of one state of the file; ChangedError where it is not."""
+        """Raise ChangedError unless all that was read so far belongs to one state of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # a write gives its time first and its size last: it may be under way
+            # a write sets its time first and its size last: it may be in progress
             settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        untouched = (
-            now.size > self._size or now.modified == self._state.modified
-        )  # it has grown, or got another name
+        # true if the file has grown, or has another name
+        untouched = now.size > self._size or now.modified == self._state.modified
         if not untouched or self._read_ends() != self._ends:
-            found = f"{self._name}: the file was rewritten while it was read"
-            raise ChangedError(f"{found}; read it again when it is complete")
+            problem = f"{self._name}: the file was rewritten while it was read"
+            raise ChangedError(f"{problem}; read it again when it is complete")
 
     def check_ends(self, ends: tuple[bytes, bytes]) -> None:
-        """Make sure that the file is still the one that had these ends; ChangedError where it is not."""
+        """Raise ChangedError unless the file still has these first and last bytes."""
         self._ends = ends
         self.check()
 
     def _read_ends(self) -> tuple[bytes, bytes]:
-        """First and last bytes of what counts."""
+        """Return the first and last bytes of the content."""
         length = min(_END, self._size)
-        return self.view(0, length).tobytes(), self.view(
-            self._size - length, self._size
-        ).tobytes()
+        first = self.view(0, length).tobytes()
+        last = self.view(self._size - length, self._size).tobytes()
+        return first, last
 
 
 class Scattered(OnDisk):
-    """Bytes of a file of which little is read, here and there.
+    """The bytes of a file of which little is read, at scattered addresses.
 
-    It is opened for each reading: a run may have written more such files than a process may have open.
+    The file is opened for each reading: a run may have written more such files than a process may have open.
     """
 
     window = 1 << 12
@@ -293,13 +288,14 @@ class Scattered(OnDisk):
         self._digest = ""
 
     @cached_property
-    def _own(self) -> local:  # type: ignore[override]  # few files are read but for the heads of their states
+    def _own(self) -> local:  # type: ignore[override]
+        """Window of each thread; made at the first use, since of most files only the states are read."""
         from threading import local
 
         return local()
 
     def __del__(self) -> None:
-        """Nothing to be closed."""
+        """Do nothing: no file is open."""
 
     def __bytes__(self) -> bytes:
         data = self.view(0, self._size).tobytes()
@@ -307,7 +303,7 @@ class Scattered(OnDisk):
         return data
 
     def check(self) -> None:
-        """Make sure that the file has at most grown since; ChangedError where it has not."""
+        """Raise ChangedError unless the file is unchanged or has only grown."""
         try:
             now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  many files
         except OSError:
@@ -321,30 +317,30 @@ class Scattered(OnDisk):
         with FileIO(self._name) as file:
             self._fill_from(file, room, begin)
 
-    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
-        """The same, for which the file is opened once."""
+    def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
+        """Fill the rows as `Content.fill_rows`; the file is opened once."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
-            for row, place in zip(room, range(begin, end, stride), strict=True):
-                self._fill_from(file, row.data, place)
+            for row, address in zip(room, range(begin, end, stride), strict=True):
+                self._fill_from(file, row.data, address)
             file.seek(end)
-            return file.read(max(0, min(rest, self._size - end)))
+            return file.read(max(0, min(size_after, self._size - end)))
 
 
 def scattered(names: Sequence[str]) -> list[Scattered]:
-    """Give the contents of files of which little is read, each at rest.
+    """Return the contents of files of which little is read, once they are not being written.
 
     Raises
     ------
     FormatError
-        If one changes all the time.
+        If a file changes all the time.
     """
     states = settled_states(names, FormatError)
     return [Scattered(name, state) for name, state in zip(names, states, strict=True)]
 
 
 def stored(name: str) -> bytes | OnDisk:
-    """Content of a file: as bytes where it is small or no regular file.
+    """Return the content of a file, as bytes if it is small or not a regular file.
 
     Raises
     ------
@@ -360,7 +356,7 @@ def stored(name: str) -> bytes | OnDisk:
 
 
 def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
-    """Open a file again in a copy of what was read of it.
+    """Open a file again for a copy of its content in another process.
 
     Raises
     ------
@@ -382,13 +378,14 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
 
 
 def line_at(data: Content, address: int) -> int:
-    """Number of the line at an address, from 1."""
+    """Return the number of the line at an address, counted from 1."""
     pieces = (data[at : min(at + _LINES, address)] for at in range(0, address, _LINES))
     return 1 + sum(piece.count(b"\n") for piece in pieces)
 
 
 def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:
-    # every address seen as the start of a field: fetching is then plain indexing
+    """Return ``width`` bytes at each address, shape (n, width)."""
+    # a view with a field at every address, so that fetching is plain indexing
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

@@ -1,4 +1,4 @@
-"""Times as people read and type them: in six digits, which are typed again, and perhaps in another unit."""
+"""Times as a user reads and types them: with six digits, perhaps in another unit."""
 
 from __future__ import annotations
 
@@ -12,13 +12,21 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-_DIGITS: Final = 6
-# No file has more digits of a time, and a double has some to spare.
+_DIGITS: Final = 6  # significant digits of a printed time
+# Significant digits of a sum of times: more than files have, fewer than those of a double.
 _EXACT: Final = 12
+
+# Shares of a record in which a time is rarely meant.  A number in the first 1 % is assumed to be in another unit.
+_NEVER_MEANT: Final = 0.01
+# If a smaller unit would lead to the first 5 %, the record was more likely cut before the time.
+_HARDLY_MEANT: Final = 0.05
+# A td with fewer states before it is rarely meant: they show no period, and hardly any time is saved.  That a thousand
+# times its value is in the record too takes at least a thousand states, or a td before the second one.
+_FIRST_STATES: Final = 10
 
 
 def as_read(time: float) -> float:
-    """Give the time that is typed again where one was read.
+    """Return the time that a user types after reading this one.
 
     Examples
     --------
@@ -29,7 +37,7 @@ def as_read(time: float) -> float:
 
 
 def first_as_read(time: float) -> float:
-    """Give the time itself, or the one that is read for it where that lies before.
+    """Return the time itself, or its printed form if that is earlier.
 
     Examples
     --------
@@ -40,7 +48,7 @@ def first_as_read(time: float) -> float:
 
 
 def sum_as_read(time: float, further: float) -> float:
-    """Add two times that were read without the digits that only a sum of doubles has.
+    """Add two printed times, without the digits that only a sum of doubles has.
 
     Examples
     --------
@@ -51,19 +59,19 @@ def sum_as_read(time: float, further: float) -> float:
 
 
 def not_before(time: float) -> float:
-    """Give the first time in six digits that is not before this one.
+    """Return the first time with six digits that is not before this one.
 
     Examples
     --------
     >>> not_before(0.1000520661), not_before(0.25)
     (0.100053, 0.25)
     """
-    read = as_read(time)
-    return read if read >= time else _next(read)
+    printed = as_read(time)
+    return printed if printed >= time else _next(printed)
 
 
 def not_after(time: float) -> float:
-    """Give the last time in six digits that is not after this one.
+    """Return the last time with six digits that is not after this one.
 
     Examples
     --------
@@ -74,42 +82,37 @@ def not_after(time: float) -> float:
 
 
 def window_as_read(start: float, end: float) -> str:
-    """Write a window so that every time from the one to the other, as they are read, lies in it.
-
-    One that is too short for that is written in full.
+    """Format a window so that every printed time between both ends is inside; an interval too short for that in full.
 
     Examples
     --------
     >>> window_as_read(0.08800000000000001, 0.3108), window_as_read(0.10005206, 0.10005208)
     ('0.0880001 to 0.3108', '0.10005206 to 0.10005208')
     """
-    low, high = not_before(start), not_after(end)
-    return (
-        f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}"
-        if low <= high
-        else f"{float(start)!r} to {float(end)!r}"
-    )
+    low = not_before(start)
+    high = not_after(end)
+    if low > high:
+        return f"{float(start)!r} to {float(end)!r}"
+    return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}"
 
 
 def told_apart(numbers: Sequence[float]) -> list[str]:
-    """Write numbers in six digits, or in as many as tell those apart that differ.
+    """Format numbers with six digits, or with as many as make different numbers look different.
 
     Examples
     --------
     >>> told_apart([0.42, 0.0, 0.15]), told_apart([0.42, 0.4199999])
     (['0.42', '0', '0.15'], ['0.42', '0.4199999'])
     """
-    texts = (
-        [f"{number:.{digits}g}" for number in numbers] for digits in range(_DIGITS, 17)
-    )
-    return next(
-        (found for found in texts if len({*found}) == len({*numbers})),
-        [repr(float(n)) for n in numbers],
-    )
+    for digits in range(_DIGITS, 17):
+        texts = [f"{number:.{digits}g}" for number in numbers]
+        if len({*texts}) == len({*numbers}):
+            return texts
+    return [repr(float(number)) for number in numbers]
 
 
 def above(value: float, limit: float) -> str:
-    """Write a value that is above a limit in three digits, or in as many as show that it is.
+    """Format a value above a limit with three digits, or with as many as show that it is above.
 
     Examples
     --------
@@ -120,36 +123,30 @@ def above(value: float, limit: float) -> str:
     return next((text for text in texts if float(text) > limit), repr(float(value)))
 
 
-def _next(read: float) -> float:
-    """Go on by a unit of the last digit that is read."""
-    mantissa, _, exponent = f"{read:.{_DIGITS - 1}e}".partition("e")
+def _next(printed: float) -> float:
+    """Return the next number with six digits."""
+    mantissa, _, exponent = f"{printed:.{_DIGITS - 1}e}".partition("e")
     return float(f"{int(mantissa.replace('.', '')) + 1}e{int(exponent) - _DIGITS + 1}")
 
 
-# Nobody means a time in this first share of a record: a number that lies there in another unit was given in this one.
-_NEVER_MEANT: Final = 0.01
-# Nor in the first share of a record that a smaller unit would lead to: more likely the record was cut before that time.
-_HARDLY_MEANT: Final = 0.05
-# Nor a td that has fewer states before it: no period is seen in them, and hardly anything would be saved.  That its
-# thousandfold lies in the record too takes at least a thousand states, or a td before the second one.
-_FIRST_STATES: Final = 10
-
-
 def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Ask whether an argument that misses a ``record`` (n,) was given in a smaller unit, in which it lies in it.
+    """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit, or an empty text.
 
-    One that misses the record by less than its length does so in the record's own unit.
+    The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
+    than its length is assumed to be in the unit of the record.
     """
-    first, last = float(record[0]), float(record[-1])
+    first = float(record[0])
+    last = float(record[-1])
     if (
         any(first <= time <= last for time in times if time)
         or times[-1] < 2 * last - first
     ):
         return ""
-    least = max(first, 0.0) + _HARDLY_MEANT * (last - first)
+    earliest = max(first, 0.0) + _HARDLY_MEANT * (last - first)
     for unit, size in (("ms", 1e-3), ("us", 1e-6)):
         values = _scaled(times, size)
-        if least <= values[-1] and all(first <= value <= last for value in values):
+        is_inside = all(first <= value <= last for value in values)
+        if earliest <= values[-1] and is_inside:
             return _question(unit, argument, values)
     return ""
 
@@ -157,7 +154,7 @@ def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> s
 def in_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Ask whether an argument among the first states of a ``record`` (n,) was given in s, and that is in ms or us."""
+    """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s."""
     values = in_the_record(record, times, unit)
     return _question("s", argument, values) if values else ""
 
@@ -165,10 +162,10 @@ def in_larger_unit(
 def in_the_record(
     record: Samples, times: Sequence[float], unit: str = ""
 ) -> list[float]:
-    """Turn times among the first ten states of a ``record`` (n,) from s into the ms or us of the record.
+    """Convert times among the first ten states of a ``record`` (n,) from s to the ms or us of the record.
 
-    Where neither the thousandfold nor the millionfold is a time of the record that somebody may mean, into nothing.
-    ``unit`` is that of the record, where its file names it.  The start of the record is in any unit what it is.
+    Return an empty list if neither 1000 times nor 1,000,000 times their value is a time of the record that a user may
+    mean. ``unit`` is the unit of the record if its file names it. The start of the record is the same in any unit.
 
     Examples
     --------
@@ -177,7 +174,8 @@ def in_the_record(
     >>> in_the_record(record, [0.064]), in_the_record(record, [0.64]), in_the_record(record, [0.0])
     ([64.0], [], [])
     """
-    first, last = float(record[0]), float(record[-1])
+    first = float(record[0])
+    last = float(record[-1])
     early = float(record[min(_FIRST_STATES, record.size) - 1])
     if (
         unit == "s"
@@ -185,21 +183,21 @@ def in_the_record(
         or not all(first <= time <= early for time in times)
     ):
         return []
-    least = min(early, first + _NEVER_MEANT * (last - first))
-    for size in (
-        1e6,
-        1e3,
-    ):  # where both fit, the smaller one is no time of the record that anybody means
+    earliest = min(early, first + _NEVER_MEANT * (last - first))
+    # us first: if both units fit, the value in ms is too early in the record to be meant
+    for size in (1e6, 1e3):
         values = _scaled(times, size)
-        if least <= values[-1] <= last:
+        if earliest <= values[-1] <= last:
             return values
     return []
 
 
 def _scaled(times: Sequence[float], size: float) -> list[float]:
+    """Multiply times by the size of a unit, without the digits that only a product of doubles has."""
     return [float(f"{time * size:.12g}") for time in times]
 
 
 def _question(unit: str, argument: str, values: Sequence[float]) -> str:
-    shown = " ".join(f"{value:g}" for value in values)
-    return f"; was it meant in {unit}? Then give `{argument}` {shown}, in the unit of the record"
+    """Return the question whether an argument was meant in a unit, with the values to give instead."""
+    numbers = " ".join(f"{value:g}" for value in values)
+    return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

@@ -1,8 +1,8 @@
-"""LS-DYNA's ASCII databases rcforc (contacts) and rwforc (rigid walls): forces, beside the other files of a run.
+"""LS-DYNA's ASCII databases rcforc (contacts) and rwforc (rigid walls) with forces only.
 
-A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases call
-the sides SURFA and SURFB.  A line of rwforc is the time, the number of a wall, and its normal force and that along each
-axis.  Titles are in the legend.  A line that is cut is left out, as that of a run that is still writing.
+A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases
+call the sides SURFA and SURFB. A line of rwforc is the time, the number of a wall, its normal force and the force
+along each axis. Titles are in the legend. A cut line is left out, for instance in a run that is still writing.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
-# Patterns are compiled where they are needed: start-up.
+# Patterns are compiled at their first use, for start-up.
 _CONTACT_LINE: Final = (
     rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
     + rb" +[xyz] *".join([_NUMBER] * 4)
@@ -37,11 +37,11 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-_HEAD: Final = 1 << 16  # bytes in which the legend ends
+_HEAD: Final = 1 << 16  # bytes that contain the whole legend
 
 
 class _Rows(NamedTuple):
-    """Forces of all lines: id (n,), time (n,) and force (n, 3) of each."""
+    """The forces of all lines: id (n,), time (n,) and force (n, 3)."""
 
     ids: Samples
     time: Samples
@@ -49,45 +49,48 @@ class _Rows(NamedTuple):
 
 
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is an rcforc or rwforc; never raises."""
+    """Return True if a file with these first bytes is an rcforc or rwforc; never raises."""
     return re.search(_SIDE, head) is not None or re.search(_WALL_HEAD, head) is not None
 
 
 def forces_of(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Give the forces of some files, those of one contact in several files as the legs of a run.
+    """Return the forces of some files; several files with the same contact are legs of a run.
 
     Raises
     ------
     FormatError
         If a file has no line that can be read.
     """
-    found: dict[str, list[ContactForce]] = {}
+    pieces_of: dict[str, list[ContactForce]] = {}
     for source in sources:
         for force in _of_file(source):
-            found.setdefault(force.name, []).append(force)
+            pieces_of.setdefault(force.name, []).append(force)
     ordered = (
         sorted(pieces, key=lambda piece: float(piece.time[0]))
-        for pieces in found.values()
+        for pieces in pieces_of.values()
     )
     return tuple(_newest(pieces) for pieces in ordered)
 
 
 def _newest(pieces: Sequence[ContactForce]) -> ContactForce:
+    """Join the legs of one contact; where they overlap the newer one is used."""
     return joined(
         pieces, newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
 
 
 def _of_file(source: Source) -> Iterator[ContactForce]:
+    """Yield the forces of one file; raise FormatError if there are none."""
     data = bytes(source.data)
     is_wall = re.search(_WALL_HEAD, data[:_HEAD]) is not None
     rows = _wall_rows(data) if is_wall else _contact_rows(data)
     if not rows.time.size:
-        found = f"{source.name}: no forces of {'rigid walls' if is_wall else 'contacts'} can be read in it"
+        listed, name = ("rigid walls", "rwforc") if is_wall else ("contacts", "rcforc")
         raise FormatError(
-            f"{found}; is it a whole {'rwforc' if is_wall else 'rcforc'} of LS-DYNA?"
+            f"{source.name}: no forces of {listed} can be read in it; is it a whole {name} of LS-DYNA?"
         )
-    kind, titles = "rigid wall" if is_wall else "contact", _titles(data[:_HEAD])
+    kind = "rigid wall" if is_wall else "contact"
+    titles = _titles(data[:_HEAD])
     for id_ in dict.fromkeys(rows.ids.astype(int).tolist()):
         mine = rows.ids == id_
         title = titles.get(id_, "")
@@ -98,34 +101,31 @@ def _of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Take of the lines of one time the one with the largest force: the sides of a contact have the same or none."""
+    """Return the line with the largest force at each time: sides of a contact have the same force, or one has none."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
 
 
 def _contact_rows(data: bytes) -> _Rows:
-    found = (
-        np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
-        .astype(np.float64)
-        .reshape(-1, 5)
-    )
-    return _Rows(found[:, 0], found[:, 1], found[:, 2:])
+    """Read the lines of an rcforc."""
+    lines = np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
+    numbers = lines.astype(np.float64).reshape(-1, 5)
+    return _Rows(numbers[:, 0], numbers[:, 1], numbers[:, 2:])
 
 
 def _wall_rows(data: bytes) -> _Rows:
-    found = (
-        np.array(re.findall(_WALL_LINE, data), dtype="S32")
-        .astype(np.float64)
-        .reshape(-1, 6)
-    )
-    forces = found[:, 3:]
-    without = ~forces.any(axis=1)
-    forces[without, 0] = found[without, 2]  # of a wall that has its normal force alone
-    return _Rows(found[:, 1], found[:, 0], forces)
+    """Read the lines of an rwforc; a wall without components gets its normal force as the first one."""
+    lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
+    numbers = lines.astype(np.float64).reshape(-1, 6)
+    forces = numbers[:, 3:]
+    without_components = ~forces.any(axis=1)
+    forces[without_components, 0] = numbers[without_components, 2]
+    return _Rows(numbers[:, 1], numbers[:, 0], forces)
 
 
 def _titles(head: bytes) -> dict[int, str]:
+    """Return the titles in the legend by number."""
     legend = re.search(_LEGEND, head)
     entries = re.findall(_ENTRY, legend[0]) if legend else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}

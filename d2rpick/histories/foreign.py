@@ -1,4 +1,4 @@
-"""Files that lie in the folder of a run and are no energy history: what each is, and what to name instead.
+"""Files in the folder of a run that are not an energy history: what each file is, and what to name instead.
 
 Sources: the magic numbers of the formats; ISO/TS 13499 (ISO-MME); the universal file format of SDRC, dataset 58; the
 ASCII databases, d3hsp and messag of LS-DYNA; listings of Radioss; the status file of Abaqus.
@@ -13,15 +13,6 @@ from typing import Final
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 
-
-class ForeignFormat(NamedTuple):
-    """A format that holds no energy history: ``pattern`` matches the head of its files, from their first byte on."""
-
-    pattern: bytes
-    name: str
-    cure: str
-
-
 _NAME_DATABASE: Final = "name the glstat, matsum or binout of the run"
 _NAME_TIME_HISTORY: Final = "name the T01 of the run"
 _SAVE_SHEET: Final = "save the sheet as csv, with a line of headings"
@@ -29,8 +20,65 @@ _FROM_FRAME: Final = (
     "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
+# ASCII databases of LS-DYNA without internal energy of the model or its parts, by their file name and by words that
+# only they contain.
+_DYNA_DATABASES: Final = (
+    ("nodout", rb"n o d a l   p r i n t   o u t"),
+    ("elout", rb"e l e m e n t   s t r e s s"),
+    ("rbdout", rb"r i g i d   b o d y   m o t i o n"),
+    ("jntforc", rb"j o i n t   f o r c e   o u t p u t"),
+    ("nodfor", rb"n o d a l   f o r c e   g r o u p"),
+    ("bndout", rb"n o d a l   f o r c e/e n e r g y"),
+    ("spcforc", rb"single point constraint forces"),
+    ("sleout", rb"contact interface energy output|interface energies"),
+    ("rcforc", rb"\n *(?:slave|master|surfa|surfb) +\d+ +time"),
+    ("rwforc", rb"normal-force"),
+    ("secforc", rb"section#|\n +total-force"),
+    ("deforc", rb"spring/damper"),
+    ("abstat", rb"airbag/cv"),
+    ("swforc", rb"spotweld|constraint #"),
+    *(
+        (name, b"")
+        for name in (
+            "ncforc",
+            "gceout",
+            "sbtout",
+            "ssstat",
+            "sphout",
+            "trhist",
+            "disbout",
+            "dbfsi",
+            "curvout",
+        )
+    ),
+    *(
+        (name, b"")
+        for name in (
+            "defgeo",
+            "dcfail",
+            "tprint",
+            "atdb",
+            "pllyout",
+            "prtube",
+            "cpmfor",
+            "massout",
+        )
+    ),
+)
+_DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
+# A keyword at the start of a line: of LS-DYNA, or of a starter or engine file of Radioss.
+_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
-# Known by their first bytes; the more special one of two comes first.  Expressions are compiled when they are needed.
+
+class ForeignFormat(NamedTuple):
+    """A format without an energy history: ``pattern`` matches the first bytes of its files."""
+
+    pattern: bytes
+    name: str
+    cure: str
+
+
+# Formats recognised by their first bytes, special ones before general ones.
 _BINARY_FORMATS: Final = (
     ForeignFormat(
         rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
@@ -89,7 +137,7 @@ _BINARY_FORMATS: Final = (
     ),
 )
 
-# Known by what stands in their first lines.
+# Formats recognised by their first lines.
 _TEXT_FORMATS: Final = (
     ForeignFormat(
         rb"(?:Data format edition number|(?:Test object number|Name of the channel|Channel code)\s*:).*",
@@ -101,7 +149,7 @@ _TEXT_FORMATS: Final = (
     ),
     ForeignFormat(
         rb"\s*Abaqus/(?:Explicit|Standard).*?INCREMENT",
-        "a status file of Abaqus (.sta), which holds no internal energy",
+        "a status file of Abaqus (.sta), which has no internal energy",
         "write an XY report of ALLIE, ALLKE and ALLWK from the odb",
     ),
     ForeignFormat(
@@ -131,81 +179,37 @@ _TEXT_FORMATS: Final = (
     ForeignFormat(rb"ISO-10303|solid \w+\s*\n\s*facet", "a geometry", _EXPORT),
 )
 
-# ASCII databases of LS-DYNA that hold no internal energy of the model or its parts, by their file name and by words
-# that only they contain.
-_DYNA_DATABASES: Final = (
-    ("nodout", rb"n o d a l   p r i n t   o u t"),
-    ("elout", rb"e l e m e n t   s t r e s s"),
-    ("rbdout", rb"r i g i d   b o d y   m o t i o n"),
-    ("jntforc", rb"j o i n t   f o r c e   o u t p u t"),
-    ("nodfor", rb"n o d a l   f o r c e   g r o u p"),
-    ("bndout", rb"n o d a l   f o r c e/e n e r g y"),
-    ("spcforc", rb"single point constraint forces"),
-    ("sleout", rb"contact interface energy output|interface energies"),
-    ("rcforc", rb"\n *(?:slave|master|surfa|surfb) +\d+ +time"),
-    ("rwforc", rb"normal-force"),
-    ("secforc", rb"section#|\n +total-force"),
-    ("deforc", rb"spring/damper"),
-    ("abstat", rb"airbag/cv"),
-    ("swforc", rb"spotweld|constraint #"),
-    *(
-        (name, b"")
-        for name in (
-            "ncforc",
-            "gceout",
-            "sbtout",
-            "ssstat",
-            "sphout",
-            "trhist",
-            "disbout",
-            "dbfsi",
-            "curvout",
-        )
-    ),
-    *(
-        (name, b"")
-        for name in (
-            "defgeo",
-            "dcfail",
-            "tprint",
-            "atdb",
-            "pllyout",
-            "prtube",
-            "cpmfor",
-            "massout",
-        )
-    ),
-)
-_DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# A keyword of LS-DYNA at the start of a line, or of Radioss: of a starter or of an engine file.
-_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
-
 
 def refuse_foreign(source: str, head: bytes) -> None:
-    """Raise FormatError for a file of a known format that is no energy history.
+    """Raise FormatError for a file of a known format without an energy history.
 
     Parameters
     ----------
     source : str
-        Name of the file, which tells the ASCII databases of LS-DYNA apart where their content does not.
+        Name of the file, which identifies an ASCII database of LS-DYNA if its content does not.
     head : bytes
-        The beginning of the file.
+        The first bytes of the file.
     """
     _refuse(source, head, _BINARY_FORMATS)
     if b"\0" in head:
         return
     if _is_deck(head):
-        found = f"{source}: this is a deck, an energy history was expected"
-        raise FormatError(f"{found}; name the glstat, matsum, binout or T01 of its run")
+        raise FormatError(
+            f"{source}: this is a deck, an energy history was expected; "
+            "name the glstat, matsum, binout or T01 of its run"
+        )
     _refuse(source, head, _TEXT_FORMATS)
     if re.search(_DYNA_HEAD, head):
         name = _name_dyna_database(source, head)
         which = f"the {name}" if name else "an ASCII database"
-        found = f"{source}: this is {which} of LS-DYNA, which holds no internal energy of the model or its parts"
-        raise FormatError(f"{found}; {_NAME_DATABASE}")
+        raise FormatError(
+            f"{source}: this is {which} of LS-DYNA, which has no internal energy of the model or its parts; "
+            f"{_NAME_DATABASE}"
+        )
 
 
 def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> None:
+    """Raise FormatError if a file has one of these formats."""
     for foreign in formats:
         if re.match(foreign.pattern, head, re.DOTALL):
             raise FormatError(
@@ -223,7 +227,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
 
 
 def _is_deck(head: bytes) -> bool:
-    """Whether a deck begins, behind comments only."""
+    """Return True if a deck begins here, perhaps after comments."""
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
     first = next(
         (line for line in lines if line.strip() and not line.lstrip().startswith(b"$")),

@@ -1,4 +1,4 @@
-"""What is read of one run: its internal energy over time, checked, its momenta, and how finely they were printed."""
+"""The data of one run: its internal energy over time, checked; its momenta; the precision of the printed numbers."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
-# in quotes: numpy.typing costs start-up
+# in quotes, since importing numpy.typing slows start-up
 Samples: TypeAlias = "NDArray[np.float64]"
 _Found = TypeVar("_Found")
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Beyond, squares of energies are no numbers any more; no unit system comes near.
+# Above, squares of energies overflow a double; no system of units leads to such energies.
 LARGEST_ENERGY: Final = 1e150
-# Parts slower than this share of the fastest stand still: single precision leaves them a speed.
+# Parts slower than this share of the fastest one are at rest: single precision leaves them a small speed.
 _STILL: Final = 1e-6
-# Times whose energies are looked up together: what is needed for more would take a multiple of the record's memory.
+# Number of times whose energies are interpolated together, so that the work arrays stay small.
 _TOGETHER: Final = 1 << 14
 
 
 class Precision(NamedTuple):
-    """How finely the numbers of a column were written.
+    """The precision of the printed numbers of a column.
 
-    ``digits`` significant digits (17 restores every double), or, when ``decimals`` is given, a fixed
-    number of places behind the point.
+    ``digits`` are the significant digits (17 restore every double); if ``decimals`` is given, the numbers have this
+    fixed number of decimals instead.
     """
 
     digits: int = 17
     decimals: int | None = None
 
     def quantum(self, value: float) -> float:
-        """Distance between neighbouring printable numbers around ``value`` [unit of value].
+        """Return the distance between adjacent printable numbers around ``value`` [unit of value].
 
         Examples
         --------
@@ -63,7 +63,7 @@ class Precision(NamedTuple):
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
 
     def quanta(self, values: Samples) -> Samples:
-        """The same around each of ``values``."""
+        """Return the distance between adjacent printable numbers around each of ``values``, in their shape."""
         if self.decimals is not None:
             return np.full(values.shape, 10.0**-self.decimals)
         sizes = np.abs(values)
@@ -75,7 +75,7 @@ class Precision(NamedTuple):
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
-        """What printed digits leave open in values, half a quantum of the largest [unit of the values]."""
+        """Return the rounding error of printed values: half the quantum of the largest one [unit of the values]."""
         return self.quantum(float(np.abs(values).max())) / 2
 
 
@@ -83,30 +83,30 @@ EXACT = Precision()
 
 
 class Memory:
-    """What was found in a record, each made once: the same few things are asked for often."""
+    """Results computed for a record, each only once."""
 
     def __init__(self) -> None:
         self._found: dict[Hashable, Any] = {}
 
     def once(self, key: Hashable, make: Callable[[], _Found]) -> _Found:
-        """Make what is not known yet by this key."""
+        """Return the result stored under ``key``; compute it with ``make`` at the first request."""
         if key not in self._found:
             self._found[key] = make()
-        found: _Found = self._found[key]
-        return found
+        result: _Found = self._found[key]
+        return result
 
     def __reduce__(self) -> tuple[type[Memory], tuple[()]]:
-        return Memory, ()  # in another process all is found anew
+        return Memory, ()  # a copy in another process starts empty
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
-    """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
+    """Momenta of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); the whole model if ``parts`` is None.
 
-    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to switch, ``flying``
-    those of the set that is known to fly together, if it is.  ``masses`` of shape (parts,), NaN where unknown; None
-    where none are [mass].  ``velocity``: velocities stand for the momenta, of a mass that is not known.
-    ``surroundings`` act from outside.  ``known``: what was found of sets of parts: the same few are asked for often.
+    ``precision`` is the one of the printed numbers. ``chosen`` are the indices of the parts to switch, ``flying``
+    those of the parts known to fly together, if any. ``masses`` has shape (parts,), NaN if unknown; None if no mass
+    is known [mass]. ``velocity`` is True if the values are velocities, of an unknown mass. ``surroundings`` are the
+    forces from outside. ``known`` stores results for sets of parts, since the same few sets are requested often.
     """
 
     time: Samples
@@ -123,26 +123,26 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Give the same momenta with other parts to switch; what was found of them stays ``known``."""
-        made = replace(self, chosen=chosen, flying=flying)
-        object.__setattr__(made, "known", self.known)
-        return made
+        """Return the same momenta with other parts to switch; stored results are kept."""
+        copy = replace(self, chosen=chosen, flying=flying)
+        object.__setattr__(copy, "known", self.known)
+        return copy
 
     def of(self, members: Sequence[int]) -> Samples:
-        """Sum over the parts with these indices, shape (n, 3), read-only."""
+        """Return the sum over the parts with these indices, shape (n, 3), read-only."""
         return self.known.once(
             ("sum", *members), lambda: frozen(self.values[:, list(members)].sum(axis=1))
         )
 
     def noise(self, members: Sequence[int]) -> float:
-        """What the printed digits of these parts leave open in their sum [momentum]."""
+        """Return the rounding error of the sum of these printed momenta [momentum]."""
         largest = np.abs(np.stack(self._bounds))[:, list(members)].max(
             axis=(0, 2), initial=0.0
         )
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Mass of those of the parts with these indices that ever move, NaN where one is unknown [mass]."""
+        """Return the mass of the moving parts among these indices, NaN if one is unknown [mass]."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -153,18 +153,18 @@ class Momenta:
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
-        """Largest range that a component of one of these parts has over the record [momentum]."""
+        """Return the largest range of a momentum component of one of these parts over the record [momentum]."""
         lowest, highest = self._bounds
         return float((highest - lowest)[list(members)].max())
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether nothing ever has any momentum."""
+        """True if all momenta are zero at all times."""
         return not self.values.any()
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the parts whose components are not all the same number."""
+        """Indices of the parts whose momentum components are not all one constant number."""
         lowest, highest = self._bounds
         return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
 
@@ -175,7 +175,7 @@ class Momenta:
 
 
 class Track(NamedTuple):
-    """Values over time: ``time`` of shape (n,), ``values`` of shape (n, 3) for a momentum or the place of a part."""
+    """A vector over time: ``time`` of shape (n,), ``values`` of shape (n, 3), such as a momentum or a position."""
 
     time: Samples
     values: Samples
@@ -183,13 +183,14 @@ class Track(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
+    """Energies of the whole model at ``time``, arrays of shape (n,); None for terms that the files do not contain.
 
-    ``sliding`` is the energy of contacts, ``friction`` its share by friction, ``damping`` and ``wall`` what damping and
-    rigid walls have taken, ``external_work`` that of all loads, ``total`` the sum that the solver keeps, ``ratio`` that
-    sum over initial energy and external work, ``eroded`` that of deleted elements.  ``artificial`` is what Abaqus
-    spends against hourglassing, a part of ``internal``; ``hourglass`` is beside it.  ``velocity`` (n, 3) is that of the
-    centre of mass, up to a factor, ``hourglass_of_parts`` their highest hourglass and internal energy.
+    ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
+    damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
+    ``ratio`` that total over initial energy plus external work, ``eroded`` the energy of eroded elements.
+    ``artificial`` is the energy of Abaqus against hourglassing, which ``internal`` contains; ``hourglass`` is not
+    part of it. ``velocity`` (n, 3) is that of the centre of mass, up to a factor. ``hourglass_of_parts`` are the
+    highest hourglass and internal energy of each part.
     """
 
     time: Samples
@@ -212,7 +213,7 @@ class Balance:
 
     @cached_property
     def kinetic_and_internal(self) -> Samples | None:
-        """Kinetic and internal energy together, with that of hourglassing, of shape (n,); None where one is unknown."""
+        """Sum of kinetic, internal and hourglass energy, shape (n,); None if one of the first two is unknown."""
         if self.kinetic is None or self.internal is None:
             return None
         return (
@@ -223,26 +224,25 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Energy (n,) spent against hourglassing, be it a part of the internal energy or beside it; None if unknown."""
+        """Energy (n,) spent against hourglassing, whether the internal energy contains it or not; None if unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
     def worked(self) -> Samples | None:
-        """External work (n,); None where it is not written, or none is ever done."""
-        return (
-            None
-            if self.external_work is None or not np.ptp(self.external_work)
-            else self.external_work
-        )
+        """External work (n,); None if it is not written, or always zero."""
+        if self.external_work is None or not np.ptp(self.external_work):
+            return None
+        return self.external_work
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """What tells when the parts fly, beside their energy.
+    """The evidence of when the parts fly, apart from their energy.
 
-    ``momenta`` of the parts, then of the whole model, as far as they are written.  ``balance``: energies of the whole
-    model; None where none are written beside the internal energy.  ``masses`` of the parts whose momenta are known, in
-    their order, NaN where unknown; None where none are.  ``forces`` of contacts and rigid walls.
+    ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
+    energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
+    known momenta, in their order, NaN if unknown; None if no mass is known. ``forces`` are those of contacts and
+    rigid walls.
     """
 
     momenta: tuple[Momenta, ...] = ()
@@ -250,12 +250,12 @@ class Given:
     masses: Samples | None = None
     forces: tuple[ContactForce, ...] = ()
 
-    def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  what files hold is read below
-        """Internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if they are not written."""
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002
+        """Return internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if not written."""
         return None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Kinetic energy of some parts together, or of the model, ``values`` (n,) [energy]; None if not written."""
+        """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if not written."""
         balance = self.balance
         if parts is not None or balance is None or balance.kinetic is None:
             return None
@@ -267,16 +267,16 @@ NO_EVIDENCE = Given()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class History:
-    """Internal energy of the parts to switch, over time, in the run's own consistent units.
+    """The internal energy of the parts to switch over time, in the consistent units of the run.
 
-    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.  Anything else
-    raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what in them was taken for the
-    energy, ``parts`` whose energy it is, None for the whole model; ``springs`` are those of them whose energy is left
-    out; ``energy_format`` is that of the file which holds it.  ``complete`` is False when a file stopped inside a
-    state; ``notes`` say what was left out; ``files`` were read.  Where the energy is a sum, ``part_names`` (k,) and
-    ``part_energies`` (n, k) are its terms that are not always zero.  ``time_unit`` is given only where the file names
-    it.  ``evidence`` tells when parts fly freely; that of a file is read when it is first asked for.  ``surroundings``
-    act on them from outside.
+    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly. Anything else
+    raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
+    energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
+    energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
+    ends within a state; ``notes`` are for the user; ``files`` were read. If the energy is a sum, ``part_names`` (k,)
+    and ``part_energies`` (n, k) are its terms that are not always zero. ``time_unit`` is empty unless the file names
+    it. ``evidence`` shows when parts fly freely; the evidence of a file is read at the first request.
+    ``surroundings`` are the forces from outside.
     """
 
     time: Samples
@@ -300,17 +300,19 @@ class History:
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
-        time, energy = frozen(self.time), frozen(self.energy)
+        time = frozen(self.time)
+        energy = frozen(self.energy)
         where = ", ".join(self.source)
         if time.ndim != 1 or time.shape != energy.shape:
-            found = f"{where}: time has shape {time.shape}, energy {energy.shape}"
-            raise HistoryError(f"{found}; one of each per state expected")
+            shapes = f"{where}: time has shape {time.shape}, energy {energy.shape}"
+            raise HistoryError(f"{shapes}; one of each per state expected")
         for name, values in (("time", time), ("energy", energy)):
-            known = np.isfinite(values)
-            if not known.all():
-                bad = int(known.argmin())
-                found = f"{where}: {name} of state {bad + 1} is {values[bad]}"
-                raise HistoryError(f"{found}, a finite number was expected")
+            is_finite = np.isfinite(values)
+            if not is_finite.all():
+                bad = int(is_finite.argmin())
+                raise HistoryError(
+                    f"{where}: {name} of state {bad + 1} is {values[bad]}, a finite number was expected"
+                )
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(
@@ -318,9 +320,12 @@ class History:
             )
         if self.part_energies is not None:
             terms = frozen(self.part_energies)
-            if terms.shape != (time.size, len(self.part_names)):
-                found = f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, ({time.size}"
-                raise HistoryError(f"{found}, {len(self.part_names)}) was expected")
+            expected = (time.size, len(self.part_names))
+            if terms.shape != expected:
+                raise HistoryError(
+                    f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
+                    f"{expected} was expected"
+                )
             object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
@@ -332,7 +337,7 @@ class History:
 
     @property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are known, NaN where unknown; None where none are known [mass]."""
+        """Masses of the parts whose momenta are known, NaN if unknown; None if no mass is known [mass]."""
         return self.evidence.masses
 
     @property
@@ -342,7 +347,7 @@ class History:
 
     @cached_property
     def step(self) -> float:
-        """Largest output interval [time]: how coarsely the record samples its vibration."""
+        """Largest output interval [time], which limits the vibration that the record resolves."""
         return float(np.max(np.diff(self.time)))
 
     @property
@@ -352,117 +357,112 @@ class History:
 
     @cached_property
     def peaks(self) -> Samples:
-        """Those of them at which it peaks [time]."""
+        """Times of the states at which the energy peaks, ascending [time]."""
         return np.asarray(self.turns[self._turns[1]])
 
     @cached_property
     def _turns(self) -> tuple[Samples, NDArray[np.bool_]]:
-        places, are_peaks = find_turns(self.energy)
-        return self.time[places], are_peaks
+        """Times at which the energy turns, and which of them are peaks."""
+        indices, are_peaks = find_turns(self.energy)
+        return self.time[indices], are_peaks
 
     @property
     def left_beside(self) -> str:
-        """Words on later legs of the run that lie beside its files and were not named; none where none do."""
-        from d2rpick.histories.source import (
-            later_legs,
-        )  # not above: pathlib costs start-up
+        """A question on later legs of the run in the same folder that were not named; empty if there are none."""
+        # imported here since pathlib slows start-up
+        from d2rpick.histories.source import later_legs
 
         legs = later_legs(self.source)
-        return (
-            f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too"
-            if legs
-            else ""
-        )
+        if not legs:
+            return ""
+        return f"; in the same folder is {', '.join(legs)}, a later leg of the run? Name it too"
 
     def check(self, *times: float, argument: str = "") -> None:
-        """Raise RangeError unless all times of an ``argument`` lie in the record."""
-        low, high = self.time[0], self.time[-1]
+        """Raise RangeError unless all times of an ``argument`` are in the record."""
+        low = self.time[0]
+        high = self.time[-1]
         if all(low <= time <= high for time in times):
             return
         from d2rpick.histories.digits import in_smaller_unit
 
-        more = self.left_beside if max(times) > high else ""
-        more = more or (in_smaller_unit(self.time, times, argument) if argument else "")
-        *asked, first, last = told_apart((*times, low, high))
-        what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"
-        found = "reaches" if any(low <= time <= high for time in times) else "lies"
-        more = (
-            ", where the file is cut" if max(times) > high and not self.complete else ""
-        ) + more
+        is_late = max(times) > high
+        hint = self.left_beside if is_late else ""
+        if not hint and argument:
+            hint = in_smaller_unit(self.time, times, argument)
+        if is_late and not self.complete:
+            hint = f", where the file is cut{hint}"
+        *values, first, last = told_apart((*times, low, high))
+        subject = f"`{argument}`" if argument else "time"
+        verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
-            f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}"
+            f"{', '.join(self.source)}: {subject} {' '.join(values)} {verb} outside the record, "
+            f"{first} to {last}{hint}"
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError where times of an ``argument`` that lie in the record look to be in another unit than it."""
-        if times[-1] * 1e3 > self.time[-1]:  # as nearly always
+        """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
+        if times[-1] * 1e3 > self.time[-1]:  # the usual case
             return
         from d2rpick.histories.digits import in_larger_unit
 
         meant = in_larger_unit(self.time, times, argument, self.time_unit)
         if meant:
-            *asked, first, last = told_apart((*times, self.time[0], self.time[-1]))
-            where = f"`{argument}` {' '.join(asked)} lies within the first ten states of the record"
+            *values, first, last = told_apart((*times, self.time[0], self.time[-1]))
+            problem = f"`{argument}` {' '.join(values)} lies within the first ten states of the record"
             raise RangeError(
-                f"{', '.join(self.source)}: {where}, {first} to {last}{meant}"
+                f"{', '.join(self.source)}: {problem}, {first} to {last}{meant}"
             )
 
     def energy_at(self, time: float, argument: str = "") -> float:
-        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
+        """Return the energy at ``time``, linear between the states; RangeError names ``argument`` outside of them."""
         self.check(time, argument=argument)
-        before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        cell = slice(
-            before, before + 2
-        )  # of whole arrays that are read-only, numpy would make copies
+        index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
+        cell = slice(index, index + 2)  # numpy would copy whole read-only arrays
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
-        """Energies at many times within the record, linear between the states, of their shape."""
+        """Return the energies at many times within the record, linear between the states, in the shape of the times."""
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
-        before = np.clip(
-            np.searchsorted(self.time, times, side="right") - 1,
-            0,
-            max(self.time.size - 2, 0),
-        )
-        after = np.minimum(before + 1, self.time.size - 1)
-        (t0, e0), (t1, e1) = (
-            (self.time[at], self.energy[at]) for at in (before, after)
-        )
+        last_index = self.time.size - 1
+        states_before = np.searchsorted(self.time, times, side="right") - 1
+        start = np.clip(states_before, 0, max(last_index - 1, 0))
+        end = np.minimum(start + 1, last_index)
+        t0 = self.time[start]
+        e0 = self.energy[start]
+        t1 = self.time[end]
+        e1 = self.energy[end]
         slope = np.divide(
             e1 - e0, t1 - t0, out=np.zeros(np.shape(times)), where=t1 > t0
         )
         return np.where(times >= t1, e1, slope * (times - t0) + e0)
 
     def mean_energy(self, start: float, end: float) -> float | None:
-        """Mean energy of the states in a window; None where there is none [energy]."""
+        """Return the mean energy of the states in a window; None if there is no state [energy]."""
         energy = self.between(start, end)[1]
         return float(energy.mean()) if energy.size else None
 
     def between(self, start: float, end: float) -> tuple[Samples, Samples]:
-        """Times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
+        """Return times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
         inside = window(self.time, start, end)
         return self.time[inside], self.energy[inside]
 
 
 def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Give some states of a record alone: of all its arrays of as many rows as it has times, but masses of parts."""
-    names, size = (
-        {one.name for one in fields(record) if one.init} - {"masses"},
-        record.time.size,
-    )
-    values = {name: getattr(record, name) for name in names}
-    rows = {
-        name: one[states]
-        for name, one in values.items()
-        if isinstance(one, np.ndarray) and len(one) == size
-    }
+    """Return a record with some of its states only: of all its arrays with one row per time, except masses of parts."""
+    size = record.time.size
+    rows = {}
+    for record_field in fields(record):
+        values = getattr(record, record_field.name)
+        is_initial = record_field.init and record_field.name != "masses"
+        if is_initial and isinstance(values, np.ndarray) and len(values) == size:
+            rows[record_field.name] = values[states]
     return replace(record, **rows)  # type: ignore[arg-type]
 
 
 def frozen(values: ArrayLike) -> Samples:
-    """Copy what could change, or holds more in memory than itself."""
+    """Return values as a read-only array of doubles, copied unless they are such an array, not part of another."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

@@ -1,4 +1,4 @@
-"""Tables with a row for each time and part, which are no history of one energy: how they are recognised and refused."""
+"""Tables with a row for each time and part, which are not a history of one energy, are recognised and refused."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# An energy belongs to several parts if it varies so many times as much from row to row as from time to time, for each
-# row of a time: times that are printed coarsely leave it the same variation, noise one for each row.
+# An energy belongs to several parts if, per row of a time, its variation from row to row is this many times that from
+# time to time: coarsely printed times leave one energy the same variation, noise leaves it one for each row.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 
 
 def is_of_several_parts(time: Samples, energy: Samples) -> bool:
-    """Return True if an energy (n,) jumps to and fro between rows of the same time (n,), as that of several parts."""
+    """Return True if an energy (n,) jumps between rows of the same time (n,), as energies of several parts do."""
     rows = count_rows_per_time(time)
     if rows == 1:
         return False
@@ -59,9 +59,8 @@ def refuse_rows_of_parts(
     source : str
         Name of the file, for the message.
     time, energy : array of shape (n,)
-        Times in the order of the rows [time], and what is taken as the energy [energy].
-    columns : mapping
-        The first rows of the columns that may tell the parts apart, by name.
+        Times in the order of the rows [time], and the values used as the energy [energy].
+        The first rows of the columns that may identify the parts, by name.
     """
     rows = count_rows_per_time(time)
     if not 1 < rows <= _MOST_PARTS:
@@ -69,12 +68,12 @@ def refuse_rows_of_parts(
     parts = find_part_column(columns, rows)
     if parts is None and not is_of_several_parts(time, energy):
         return
-    found = f"{source}: each time stands {rows} times with different energies, one row for each time was expected"
+    problem = f"{source}: each time stands {rows} times with different energies, one row for each time was expected"
     if parts is None:
-        raise FormatError(f"{found}; give the rows of one part")
+        raise FormatError(f"{problem}; give the rows of one part")
     values = listing(
         [str(value) for value in dict.fromkeys(columns[parts][:rows])], most=6
     )
     raise FormatError(
-        f"{found}; column {parts!r} tells the parts apart ({values}): give the rows of one part"
+        f"{problem}; column {parts!r} tells the parts apart ({values}): give the rows of one part"
     )

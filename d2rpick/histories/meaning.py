@@ -1,8 +1,8 @@
-"""What a column, a curve or a dataset holds, by its name: one matcher for tables, curves, HDF5 and solver databases.
+"""The quantity that a column, curve or dataset contains, recognised by its name in tables, HDF5 and solver databases.
 
-A name is cut into words, without its unit.  The phrases of `d2rpick.histories.names` are searched among these words,
-the longest first.  Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
-any other word the column holds the quantity of something else, such as a part ("Kinetic energy of the door").
+A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are searched among these words,
+the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
+any other word the column contains the quantity of something else, such as a part ("Kinetic energy of the door").
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match: the quantity and nothing else; with words for the whole model; with words for something else.
+# Ranks of a match: the quantity only; with words for the whole model; with words for something else.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -42,46 +42,45 @@ _WHOLE_MODEL_WORDS: Final = frozenset(
 _ENERGY_WORDS: Final = frozenset(
     {"energy", "energies", "energie", "energien", "energia", "energias", "energi", "energii", "energiya", "en"}
 )  # fmt: skip
-# Words around a time that leave it the time of the states; "wall", "cpu" and "step" do not.
+# Words that may be added to the name of a time of states; "wall", "cpu" and "step" may not.
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
-_NUMBERING: Final = re.compile(
-    r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+"
-)  # "2. Kinetic energy", "Curve 2: KE"
+# "2. Kinetic energy", "Curve 2: KE"
+_NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
 _SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
-# The dataset of a quantity whose name is that of the group around it: H5MD and others.
+# Last steps of a path whose quantity is named by the group: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-_STEPS_BESIDE: Final = frozenset(
-    {"step", "steps", "count", "error", "index", "cycle"}
-)  # datasets beside the values
+# Datasets next to the values that are no quantities.
+_STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
-# Letters with accents, which files lose and keep as they like.
+# Letters with accents, which files often lose.
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
 _LONGEST_PHRASE: Final = 5  # words
 
-# Words that make something else of an internal energy of something: KE in capitals only, as "make" has it too.
+# Words that make an internal energy something else; KE in capitals only, since "make" contains it too.
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-ROTATION_ENERGY: Final = (
-    "rotationenergy"  # normalised: Radioss writes it beside the kinetic energy
-)
-# What else names an energy: identifiers of Abaqus, and "energy" in other languages without spaces.
+# Normalised name of a term that Radioss writes in addition to the kinetic energy.
+ROTATION_ENERGY: Final = "rotationenergy"
+# Other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
 
+_MOST_NAMED: Final = 6  # energies listed in one note
+
 
 class Meaning(NamedTuple):
-    """What a name says: the key of a quantity, by which of the ranks it was found, and the words for something else."""
+    """The meaning of a name: a quantity, the rank of the match, and the words for something else."""
 
     quantity: str
     rank: int
@@ -89,20 +88,20 @@ class Meaning(NamedTuple):
 
 
 def _list_phrases() -> Iterator[tuple[str, str]]:
+    """Yield each name of a quantity without accents, and the quantity."""
     for quantity, names in {"internal_energy": INTERNAL_ENERGY, **QUANTITIES}.items():
         for name in names:
             yield name.translate(_PLAIN_LETTERS), quantity
 
 
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
-_MOST_NAMED: Final = 6  # energies in one note
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are looked up again and again
+@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
 def find_meaning(name: str) -> Meaning | None:
-    """Return the quantity that a name says, with its rank; None if it says none, or several.
+    """Return the quantity that a name means, with its rank; None if there is none, or several.
 
-    The name may be a path: its last step decides, if that says something.
+    The name may be a path: its last step decides, if that means something.
 
     Examples
     --------
@@ -117,9 +116,8 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_words_of("/".join(steps)))
-    if len(steps) == 1 or (
-        whole and whole.quantity == "energy_ratio"
-    ):  # "total energy / initial energy"
+    # "total energy / initial energy" is a name with a slash, not a path
+    if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
         return None
@@ -128,46 +126,44 @@ def find_meaning(name: str) -> Meaning | None:
 
 
 def _words_of(name: str) -> list[str]:
-    """Cut a name into words: small letters without accents, no unit, "totalKineticEnergy" as three words."""
-    text = (
-        _CAMEL_CASE.sub(" ", without_unit(_NUMBERING.sub("", name)))
-        .casefold()
-        .translate(_PLAIN_LETTERS)
-    )
+    """Cut a name into lower-case words without accents and unit; "totalKineticEnergy" becomes three words."""
+    text = _CAMEL_CASE.sub(" ", without_unit(_NUMBERING.sub("", name)))
+    text = text.casefold().translate(_PLAIN_LETTERS)
     return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
 
 
 def _match_words(words: Sequence[str]) -> Meaning | None:
+    """Return the meaning of the words of a name; None unless they contain exactly one quantity."""
     quantities: set[str] = set()
-    others: list[str] = []
-    rank, place = EXACT, 0
-    while place < len(words):
-        length = _phrase_length(words, place)
+    other_words: list[str] = []
+    rank, position = EXACT, 0
+    while position < len(words):
+        length = _phrase_length(words, position)
         if length:
-            quantities.add(_PHRASES["".join(words[place : place + length])])
-        elif words[place] in _WHOLE_MODEL_WORDS:
+            quantities.add(_PHRASES["".join(words[position : position + length])])
+        elif words[position] in _WHOLE_MODEL_WORDS:
             rank = max(rank, WHOLE_MODEL)
         else:
-            others.append(words[place])
+            other_words.append(words[position])
             rank = OF_SOMETHING_ELSE
-        place += length or 1
-    return (
-        Meaning(quantities.pop(), rank, tuple(others)) if len(quantities) == 1 else None
-    )
+        position += length or 1
+    if len(quantities) != 1:
+        return None
+    return Meaning(quantities.pop(), rank, tuple(other_words))
 
 
-def _phrase_length(words: Sequence[str], place: int) -> int:
-    """Return how many words from ``place`` on make the longest phrase, 0 if none does."""
-    longest = min(_LONGEST_PHRASE, len(words) - place)
+def _phrase_length(words: Sequence[str], start: int) -> int:
+    """Return the number of words of the longest phrase that begins at ``start``, 0 if there is none."""
+    longest = min(_LONGEST_PHRASE, len(words) - start)
     for length in range(longest, 0, -1):
-        if "".join(words[place : place + length]) in _PHRASES:
+        if "".join(words[start : start + length]) in _PHRASES:
             return length
     return 0
 
 
 @lru_cache(maxsize=1 << 16)
 def is_time(name: str) -> bool:
-    """Return True if a column of this name holds the times of the states.
+    """Return True if a column of this name contains the times of the states.
 
     Examples
     --------
@@ -177,48 +173,48 @@ def is_time(name: str) -> bool:
     words = _words_of(name)
     if "".join(words) in TIME_NAMES:
         return True
-    others = [word for word in words if word not in _TIME_WORDS]
-    return "".join(others) in TIME_NAMES
+    remaining = [word for word in words if word not in _TIME_WORDS]
+    return "".join(remaining) in TIME_NAMES
 
 
 def is_internal_energy(name: str) -> bool:
-    """Return True if a name says internal energy without addition."""
+    """Return True if a name means internal energy and has no other words."""
     return find_meaning(name) == Meaning("internal_energy", EXACT)
 
 
 def is_any_internal_energy(name: str) -> bool:
-    """Return True if a name says internal energy of the model, or of something else."""
+    """Return True if a name means internal energy of the model or of something else."""
     meaning = find_meaning(name)
     return meaning is not None and meaning.quantity == "internal_energy"
 
 
 def is_total_internal_energy(name: str) -> bool:
-    """Return True if a name says internal energy of the whole model in so many words: "Total internal energy"."""
+    """Return True if a name means internal energy explicitly of the whole model: "Total internal energy"."""
     meaning = find_meaning(name)
     return meaning is not None and meaning[:2] == ("internal_energy", WHOLE_MODEL)
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the places of the names that say internal energy without addition or, if there are none, with any.
+    """Return the indices of the names that mean internal energy and have no other words, or else of all that mean it.
 
-    A total is not preferred to the energies of parts: which of them is to be locked in, only the user knows.
+    A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
-    exact, others = list[int](), list[int]()
-    for place, name in enumerate(names):
+    exact = list[int]()
+    inexact = list[int]()
+    for index, name in enumerate(names):
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
+        is_other = re.search(_OTHER_QUANTITY, name)  # "dissipated internal energy"
         if meaning.rank == EXACT:
-            exact.append(place)
-        elif meaning.rank == WHOLE_MODEL or not re.search(
-            _OTHER_QUANTITY, name
-        ):  # not "dissipated internal energy"
-            others.append(place)
-    return exact or others
+            exact.append(index)
+        elif meaning.rank == WHOLE_MODEL or not is_other:
+            inexact.append(index)
+    return exact or inexact
 
 
 def quantity_of(name: str) -> str | None:
-    """Return which of `QUANTITIES` of the whole model a channel of this name holds, None for any other.
+    """Return which of `QUANTITIES` of the whole model a channel of this name contains, None for any other name.
 
     Examples
     --------
@@ -226,20 +222,16 @@ def quantity_of(name: str) -> str | None:
     ['kinetic_energy', 'x_velocity', 'z_momentum', None]
     """
     meaning = find_meaning(name)
-    if (
-        meaning is None
-        or meaning.rank == OF_SOMETHING_ELSE
-        or meaning.quantity not in QUANTITIES
-    ):
+    if meaning is None or meaning.rank == OF_SOMETHING_ELSE:
         return None
-    return meaning.quantity
+    return meaning.quantity if meaning.quantity in QUANTITIES else None
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return, for each of `QUANTITIES`, the names of the best rank that say it.
+    """Return, for each of `QUANTITIES`, the names of the best rank that mean it.
 
-    If the only internal energy is that of something else, quantities of the same thing are taken: it is what the table
-    is about.  A column that is called "total" holds the total energy if there is a kinetic energy beside it.
+    If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
+    the table. A column named "total" contains the total energy if there is a kinetic energy too.
 
     Examples
     --------
@@ -255,38 +247,37 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
         if meaning is None or meaning.quantity not in QUANTITIES:
             continue
         if meaning.rank < OF_SOMETHING_ELSE or meaning.others == subject:
-            ranked.setdefault(meaning.quantity, {}).setdefault(meaning.rank, []).append(
-                name
-            )
-    found = {
+            names_by_rank = ranked.setdefault(meaning.quantity, {})
+            names_by_rank.setdefault(meaning.rank, []).append(name)
+    quantities = {
         quantity: names_by_rank[min(names_by_rank)]
         for quantity, names_by_rank in ranked.items()
     }
-    if "kinetic_energy" in found and "total_energy" not in found:
+    if "kinetic_energy" in quantities and "total_energy" not in quantities:
         totals = [name for name in names if _is_bare_total(name)]
         if totals:
-            found["total_energy"] = totals
-    return found
+            quantities["total_energy"] = totals
+    return quantities
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words for what the only internal energy belongs to; none if there are several or no such words."""
-    places = find_internal_energies(names)
-    meaning = find_meaning(names[places[0]]) if len(places) == 1 else None
+    """Return the words for the owner of the only internal energy; () if there are several energies or no such words."""
+    indices = find_internal_energies(names)
+    meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
 
 
 def _is_bare_total(name: str) -> bool:
-    words = [
-        word for word in _words_of(name.rpartition("/")[2]) if word not in _ENERGY_WORDS
-    ]
+    """Return True if a name is "total", perhaps with a word for energy."""
+    words = _words_of(name.rpartition("/")[2])
+    words = [word for word in words if word not in _ENERGY_WORDS]
     return words == ["total"]
 
 
 def note_unused_energies(
     channels: Sequence[str], used: Collection[str]
 ) -> tuple[str, ...]:
-    """Return a note on the channels that look like energies and are not ``used``, none if there are none.
+    """Return a note on the channels that look like energies and are not ``used``; () if there are none.
 
     Examples
     --------
@@ -303,17 +294,18 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
     for name in unused:
         meaning = find_meaning(name)
         texts.append(f"{name!r} ({meaning.quantity}?)" if meaning else repr(name))
-    named = listing(texts, most=_MOST_NAMED)
+    names = listing(texts, most=_MOST_NAMED)
     if len(unused) == 1:
-        found = f"{named} looks like an energy but is not used; if it is one"
+        problem = f"{names} looks like an energy but is not used; if it is one"
     else:
-        found = f"{named} look like energies but are not used; if one is"
+        problem = f"{names} look like energies but are not used; if one is"
     return (
-        f"{found} of the whole model, name it with `channel`, as in kinetic_energy=NAME",
+        f"{problem} of the whole model, name it with `channel`, as in kinetic_energy=NAME",
     )
 
 
 def _looks_like_an_energy(name: str) -> bool:
+    """Return True if a name means an energy or work, or resembles the name of one."""
     if normalised(name) == ROTATION_ENERGY:  # added to the kinetic energy
         return False
     meaning = find_meaning(name)
@@ -323,7 +315,7 @@ def _looks_like_an_energy(name: str) -> bool:
 
 
 def note_other_quantity(channel: str) -> tuple[str, ...]:
-    """Return a note if a channel that is used as internal energy is called something else.
+    """Return a note if a channel that is used as internal energy has the name of something else.
 
     Examples
     --------
@@ -341,27 +333,22 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
-    """Raise FormatError if the only column or curve of a file is called something else than an internal energy."""
+    """Raise FormatError if the only column or curve of a file has the name of something other than internal energy."""
     word = _word_of_other_quantity(channel)
     if word:
-        found = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
-        raise FormatError(f"{found}; choose with `energy` what to take for it")
+        problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
+        raise FormatError(f"{problem}; choose with `energy` what to use instead")
 
 
 def _word_of_other_quantity(channel: str) -> str:
-    """Return what makes a name that of something else than an internal energy, or nothing."""
+    """Return the word that makes a name mean something other than internal energy, or an empty string."""
     meaning = find_meaning(channel)
-    if (
-        meaning
-        and meaning.quantity == "internal_energy"
-        and meaning.rank < OF_SOMETHING_ELSE
-    ):
+    is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE
+    if meaning and meaning.quantity == "internal_energy" and is_known:
         return ""
     word = re.search(_OTHER_QUANTITY, channel)
     if word:
         return word[0]
-    return (
-        meaning.quantity.replace("_", " ")
-        if meaning and meaning.quantity in QUANTITIES
-        else ""
-    )
+    if meaning and meaning.quantity in QUANTITIES:
+        return meaning.quantity.replace("_", " ")
+    return ""

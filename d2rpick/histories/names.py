@@ -1,4 +1,4 @@
-"""What columns, units and parts are called, and which of them the user asks for."""
+"""The names of columns, units and parts, and which of them the user selects."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _ENERGY_UNITS = frozenset(
      "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
-# A unit in brackets: symbols with prefixes, and what joins them ("kg mm^2/ms^2", "N·mm", "-").
+# A unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
 _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
 
-# Names are `normalised`, and taken whole.
+# Names are `normalised`, and compared as a whole.
 TIME_NAMES: Final = frozenset(
     {"time", "t", "times", "timewhole", "zeit", "temps", "tempo", "tiempo", "tijd", "tid", "czas", "时间", "時間",
      "시간", "время"}
@@ -40,10 +40,10 @@ INTERNAL_ENERGY: Final = frozenset(
      "внутренняяэнергия", "内部エネルギー", "内能", "내부에너지"}
 )  # fmt: skip
 
-# What else a history of the whole model holds, and what it is called: by glstat and binout of LS-DYNA, by Radioss and
-# its th_to_csv, Abaqus, Exodus, frames of lasso-python and d2rpick; in other languages.  Energies [energy], momentum
-# and velocity of the centre of mass along an axis [momentum], [velocity], and the mass of what moves [mass].
-# The artificial energy of Abaqus is a part of its internal energy; the hourglass energy of others is beside it.
+# Other quantities of the whole model by their names in glstat and binout of LS-DYNA, Radioss and its th_to_csv, Abaqus,
+# Exodus, frames of lasso-python and d2rpick, and in other languages.  Energies [energy], momentum and velocity of the
+# centre of mass along an axis [momentum], [velocity], and the mass of what moves [mass].  The artificial energy of
+# Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
         {"kineticenergy", "energykinetic", "kinetic", "ke", "allke", "kinen", "kinenergy", "energykin", "kine", "ekin",
@@ -87,9 +87,12 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
+# A number or range of part ids; a text with more digits is a title.
+_RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
+
 
 def unit_of(name: str) -> str:
-    """Return the unit a column's name ends with: in brackets, after ``in``, ``/``, ``_``, ``,`` or a blank.
+    """Return the unit at the end of a column name: in brackets, or after ``in``, ``/``, ``_``, ``,`` or a blank.
 
     Examples
     --------
@@ -108,7 +111,7 @@ def unit_of(name: str) -> str:
 
 
 def without_unit(name: str) -> str:
-    """Return a name without its unit and the word before it; a bracket that holds no unit stays.
+    """Return a name without its unit and the word before it; a bracket without a unit stays.
 
     Examples
     --------
@@ -123,12 +126,13 @@ def without_unit(name: str) -> str:
 
 
 def _drop_unit(brackets: re.Match[str]) -> str:
+    """Return a bracket, or an empty string if it contains a unit."""
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are asked for again and again
+@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
 def normalised(name: str) -> str:
-    """Reduce a name to its letters and digits, in small letters and without its unit.
+    """Reduce a name to its letters and digits, in lower case and without its unit.
 
     Examples
     --------
@@ -141,39 +145,43 @@ def normalised(name: str) -> str:
 
 
 def is_unit(cell: str) -> bool:
-    """Return True if a cell of a row of units may read like this: ``ms``, ``in mJ``, ``[J]``, ``(-)``, nothing."""
+    """Return True if a cell may belong to a row of units: ``ms``, ``in mJ``, ``[J]``, ``(-)``, or empty."""
     cell = cell.removeprefix("in ")
-    return cell.casefold() in _UNITS | {"", "-", "1"} or (
-        bool(cell) and cell[0] + cell[-1] in ("()", "[]")
-    )
+    if cell.casefold() in _UNITS | {"", "-", "1"}:
+        return True
+    return cell[:1] + cell[-1:] in ("()", "[]")
 
 
-def meant(wanted: str, known: Sequence[str]) -> list[int]:
-    """Places of the names that are meant: as it stands, in other case, or but for blanks, underscores and units."""
+def meant(wanted: str, names: Sequence[str]) -> list[int]:
+    """Return the indices of the names that ``wanted`` means: literally, else in other case, else without unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
         normalised,
     )
-    alike = (
-        [place for place, own in enumerate(known) if key(own) == key(wanted)]
-        for key in spellings
-    )
-    return next(filter(None, alike), [])
+    for spelling in spellings:
+        indices = [
+            index
+            for index, name in enumerate(names)
+            if spelling(name) == spelling(wanted)
+        ]
+        if indices:
+            return indices
+    return []
 
 
-def resolve(wanted: str, known: Sequence[str], where: str) -> str:
-    """Find the one name that is `meant`; FormatError, with near misses and what there is, when none or several are.
+def resolve(wanted: str, names: Sequence[str], where: str) -> str:
+    """Return the one name that is `meant`; raise FormatError, with similar names, if there is none or several.
 
     Examples
     --------
     >>> resolve("internal energy", ["kinetic_energy", "internal_energy"], "binout")
     'internal_energy'
     """
-    same = [known[place] for place in meant(wanted, known)]
+    same = [names[index] for index in meant(wanted, names)]
     if not same:
         raise FormatError(
-            f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}"
+            f"{where}: no {wanted!r}{near_miss(wanted, names)}; there are: {listing(names)}"
         )
     if len(same) > 1:
         raise FormatError(
@@ -183,29 +191,31 @@ def resolve(wanted: str, known: Sequence[str], where: str) -> str:
 
 
 def in_seconds(text: str) -> float | None:
-    """Read a time that is given with its unit [s]; None where it is none.
+    """Return a time given with its unit [s]; None if the text is not such a time.
 
     Examples
     --------
     >>> in_seconds("64ms"), in_seconds("0.064 s"), in_seconds("64"), in_seconds("forms")
     (0.064, 0.064, None, None)
     """
-    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|ms|us|µs)\s*", text, re.ASCII)
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|ms|us|µs)\s*", text, re.ASCII)
+    if match is None:
+        return None
     sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
-    return float(f"{float(found[1]) * sizes[found[2]]:.12g}") if found else None
+    return float(f"{float(match[1]) * sizes[match[2]]:.12g}")
 
 
-def near_miss(wanted: str, known: Sequence[str], likeness: float = 0.6) -> str:
-    """Ask for the name that was perhaps meant, or say nothing; ``likeness`` from 0 to 1 is the least that counts."""
+def near_miss(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
+    """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity."""
     import difflib
 
-    folded = {name.casefold(): name for name in known}
+    folded = {name.casefold(): name for name in names}
     close = difflib.get_close_matches(wanted.casefold(), folded, n=1, cutoff=likeness)
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 
 def plain_text(raw: bytes) -> str:
-    r"""Text of a fixed field: without padding, and with blanks for bytes that are no text.
+    r"""Return the text of a fixed field without padding; bytes that are not text become blanks.
 
     Examples
     --------
@@ -220,7 +230,7 @@ def plain_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Give the number that the name of a file has behind that of the first one of its family; None where it has none.
+    """Return the number after the name of the first file of a family in the name of a file; None if there is none.
 
     Examples
     --------
@@ -228,27 +238,24 @@ def number_in_family(name: str, first: str) -> int | None:
     (7, None)
     """
     number = name[len(first) :] if name.startswith(first) else ""
-    return (
-        int(number)
-        if 2 <= len(number) <= 9 and number.isascii() and number.isdigit()
-        else None
-    )
+    is_number = number.isascii() and number.isdigit()
+    return int(number) if is_number and 2 <= len(number) <= 9 else None
 
 
 class Part(NamedTuple):
-    """A part of the model, by the number and the title that the solver gives it."""
+    """A part of the model, with the number and the title in the files of the solver."""
 
     id: int
     title: str
 
     @property
     def name(self) -> str:
-        """What to call it: its title, or its number."""
+        """Title of the part, or its number if it has none."""
         return self.title or f"part {self.id}"
 
 
 class Namesake(Part):
-    """A part whose title another one has too, which its number tells apart."""
+    """A part whose title is not unique, so that its name contains its number."""
 
     __slots__ = ()
 
@@ -259,30 +266,26 @@ class Namesake(Part):
 
 
 def with_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
-    """Let parts of one title be told apart by number.
+    """Add the number to the names of parts with the same title.
 
     Examples
     --------
     >>> [part.name for part in with_namesakes([Part(1, "shell"), Part(2, "door"), Part(7, "shell"), Part(9, "")])]
     ['shell (1)', 'door', 'shell (7)', 'part 9']
     """
-    every = tuple(parts)
-    times = Counter(part.title for part in every if part.title)
-    return tuple(Namesake(*part) if times[part.title] > 1 else part for part in every)
-
-
-# More digits than any number of a part has are a title.
-_RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"  # compiled where it is needed
+    listed = tuple(parts)
+    counts = Counter(part.title for part in listed if part.title)
+    return tuple(Namesake(*part) if counts[part.title] > 1 else part for part in listed)
 
 
 class Selection(NamedTuple):
-    """Columns or labels by name, columns also by 1-based number; parts by number, range or title.
+    """The selected columns (by name, number or label) and parts (by number, range or title).
 
-    Nothing asked: the time and the internal energy of the whole model.  Several energies, and the energies of
-    several parts, are added.  ``flying`` are the parts that are known to fly together with these.  ``channels`` are
-    pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of the channel that holds it, where
-    this is not one of the usual names.  ``springs`` are the numbers of the parts that are springs or dampers, None
-    where the energies are to tell.
+    An empty selection is the time and the internal energy of the whole model. Several energies, and the energies of
+    several parts, are added. ``flying`` are the parts known to fly together with the selected ones. ``channels`` are
+    pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of its channel, if that is not a
+    usual name. ``springs`` are the numbers of the parts that are springs or dampers; None if they are to be found by
+    their energies.
     """
 
     time: str | None = None
@@ -294,71 +297,75 @@ class Selection(NamedTuple):
 
 
 def select_parts(
-    wanted: Sequence[str], known: Sequence[Part], where: str
+    wanted: Sequence[str], parts: Sequence[Part], where: str
 ) -> tuple[Part, ...]:
-    """Find the parts that are meant by numbers (``3``, ``3,7``), ranges (``10-19``) and titles.
+    """Return the parts selected by numbers (``3``, ``3,7``), ranges (``10-19``) and titles.
 
     Raises
     ------
     FormatError
-        If a number or title is no part's, a range holds none, or a title is that of several; ``where`` is named.
+        If no part has a number or title, a range contains none, or several parts have a title; ``where`` is named.
 
     Examples
     --------
     >>> select_parts(["roof", "2-9"], [Part(1, "roof"), Part(2, "door"), Part(7, "seat, left")], "run1")
     (Part(id=1, title='roof'), Part(id=2, title='door'), Part(id=7, title='seat, left'))
     """
-    if not known:
+    if not parts:
         raise FormatError(
             f"{where}: no parts with histories of their own; add the matsum, binout or T01 of the run"
         )
     titled: dict[str, list[Part]] = {}
-    for part in known:
+    for part in parts:
         titled.setdefault(part.title.strip().casefold(), []).append(part)
-    titled[""] = []  # is none
-    found = dict.fromkeys(
-        part for text in wanted for part in _meant(text, known, titled, where)
-    )
-    return tuple(part for part in known if part in found)
+    titled[""] = []  # an empty title selects no part
+    selected: set[Part] = set()
+    for text in wanted:
+        selected.update(_meant(text, parts, titled, where))
+    return tuple(part for part in parts if part in selected)
 
 
 def _meant(
-    text: str, known: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
+    text: str, parts: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
 ) -> Iterator[Part]:
+    """Yield the parts that a text selects: one title, or numbers, ranges and titles between commas."""
     whole = titled.get(text.strip().casefold())
-    if whole and "," in text:  # a title may hold a comma
+    if whole and "," in text:  # a title may contain a comma
         yield _only(whole, text, where)
         return
     for piece in text.split(","):
         yield from _piece(
-            piece.strip(), known, titled.get(piece.strip().casefold()), where
+            piece.strip(), parts, titled.get(piece.strip().casefold()), where
         )
 
 
 def _piece(
-    piece: str, known: Sequence[Part], titled: Sequence[Part] | None, where: str
+    piece: str, parts: Sequence[Part], titled: Sequence[Part] | None, where: str
 ) -> Sequence[Part]:
+    """Return the parts that a number, range or title selects; ``titled`` are the parts with that title."""
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
-            near = near_miss(piece, [part.title for part in known])
+            near = near_miss(piece, [part.title for part in parts])
             raise FormatError(
-                f"{where}: no part {piece!r}{near}; there are: {menu(known)}"
+                f"{where}: no part {piece!r}{near}; there are: {menu(parts)}"
             )
         return [_only(titled, piece, where)]
-    low, high = int(numbers[1]), int(numbers[2] or numbers[1])
-    inside = [part for part in known if low <= part.id <= high]
+    low = int(numbers[1])
+    high = int(numbers[2] or numbers[1])
+    inside = [part for part in parts if low <= part.id <= high]
     if titled and titled != inside:
-        found = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means {menu(inside) or 'none'}"
+        problem = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means"
         raise FormatError(
-            f"{found}; choose by a number or title that is one part's only"
+            f"{problem} {menu(inside) or 'none'}; choose by a number or title that is one part's only"
         )
     if not inside:
-        raise FormatError(f"{where}: no part {piece}; there are: {menu(known)}")
+        raise FormatError(f"{where}: no part {piece}; there are: {menu(parts)}")
     return inside
 
 
 def _only(titled: Sequence[Part], text: str, where: str) -> Part:
+    """Return the only part with a title; raise FormatError if there are several."""
     if len(titled) > 1:
         raise FormatError(
             f"{where}: {text!r} is the title of several parts, choose by number: {menu(titled)}"
@@ -367,13 +374,13 @@ def _only(titled: Sequence[Part], text: str, where: str) -> Part:
 
 
 def menu(parts: Sequence[Part]) -> str:
-    """Parts for a message: number and title."""
+    """Return number and title of some parts for a message."""
     return listing(
         [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
     )
 
 
 def asks_for_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
-    """Whether texts hold the word "recommended", and no part has it for its title."""
+    """Return True if texts contain the word "recommended", and it is not the title of a part."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

@@ -1,4 +1,4 @@
-"""From the files of a run to what they hold: the reader of each is found by its content."""
+"""Opening a run: the reader of each file is found by the content of the file."""
 
 from __future__ import annotations
 
@@ -30,30 +30,32 @@ if TYPE_CHECKING:
 
 __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
 
-# Enough of a file for its head and more than one state of the longest blocks.
+# Bytes that contain the head of a file and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# No legend of an ASCII database has more bytes.
-_LONGEST_LEGEND: Final = 1 << 24
-_DIGITS: Final = (
-    "0123456789"  # of the number of a file behind the first one of its family
-)
+_LONGEST_LEGEND: Final = 1 << 24  # bytes; the legend of an ASCII database is shorter
+_DIGITS: Final = "0123456789"  # of the number of a later file of a family
+
+# Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
+_SAME = 0.01
+# Number of parts whose energies are compared.
+_COMPARED = 50
 
 
 class Reader(Protocol):
-    """What a module has to offer to be a reader; that of a table has ``write``, too."""
+    """The functions that a module must define to be a reader; a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
-        """Whether a file that begins like this is of the reader's format; never raises."""
+        """Return True if a file with these first bytes has the format of the reader; never raises."""
 
     def open_legs(
         self, sources: Sequence[Source], selection: Selection
     ) -> Sequence[Database]:
-        """Open files of this format as the legs of one run; FormatError when one is none."""
+        """Open files of this format as the legs of one run; raise FormatError if one has another format."""
 
 
 def reader(kind: str) -> Reader:
-    """Import the reader of a format, one of `READERS`."""
+    """Import the reader of a format, a key of `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
     )
@@ -62,22 +64,22 @@ def reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> Run:
-    """Open the files of one run: of one format as its legs, of different formats as companions.
+    """Open the files of one run: files of one format are its legs, files of different formats are companions.
 
     Parameters
     ----------
     names : sequence of str
         Files, folders, globs, or ``-`` for standard input.
     selection : Selection
-        What tables need to know to be read at all: their time and energy columns.
+        What a table needs to be read: its time and energy columns.
     input_format : str
-        A key of `READERS` for all files, or ``auto``: decided by the content, never by the name.
+        A key of `READERS` for all files, or ``auto``: detected by the content, never by the name.
 
     Raises
     ------
     FormatError
-        If a file cannot be read as an energy history, companions have no time in common, or one of several files was
-        replaced while they were opened.
+        If a file cannot be read as an energy history, if companions have no time in common, or if one of several files
+        was replaced while they were opened.
     """
     return open_sources(open_files(names), selection, input_format)
 
@@ -87,15 +89,15 @@ def open_sources(
     selection: Selection = _DEFAULT,
     input_format: str = "auto",
 ) -> Run:
-    """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    with_forces = [
-        one for one in sources if input_format == "auto" and _holds_forces(one)
-    ]
-    sources = [one for one in sources if one not in with_forces]
+    """Open the files of one run from their bytes; arguments and errors as in `open_run`."""
+    with_forces = []
+    if input_format == "auto":
+        with_forces = [source for source in sources if _holds_forces(source)]
+    sources = [source for source in sources if source not in with_forces]
     if not sources and with_forces:
-        found = f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which holds forces and no internal energy"
         raise FormatError(
-            f"{found}; name the glstat, matsum or binout of the run with it"
+            f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
         )
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
@@ -103,18 +105,17 @@ def open_sources(
     opened, notes = _opened(kinds, ordered, selection)
     ordered = [kind for kind in ordered if kind in opened]
     forces, unread = _forces_of(with_forces)
-    read = [
-        *(source for kind in ordered for source in kinds[kind]),
-        *([] if unread else with_forces),
-    ]
-    used = {source.name for source in read}
+    read_sources = [source for kind in ordered for source in kinds[kind]]
+    if not unread:
+        read_sources += with_forces
+    used = {source.name for source in read_sources}
     for legs in opened.values():
         check_legs(legs)
     ordered = _with_forces_last(opened, ordered)
     databases = tuple(
         Legs(
             opened[kind],
-            cut=[one.name for one in kinds[kind] if one.cut],
+            cut=[source.name for source in kinds[kind] if source.cut],
             named=selection.channels,
             notes=left_out if kind == ordered[0] else (),
         )
@@ -122,17 +123,15 @@ def open_sources(
     )
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
-    behind = {name for kind in FAMILIES for name in _behind_firsts(kinds.get(kind, ()))}
-    every = (*sources, *with_forces)
-    named = tuple(
-        source.name
-        for source in every
-        if source.name not in behind and source.name in used
-    )
-    files = tuple(source for source in every if source.name in used)
+    later_files = set[str]()
+    for kind in FAMILIES:
+        later_files |= _behind_firsts(kinds.get(kind, ()))
+    files = tuple(source for source in (*sources, *with_forces) if source.name in used)
+    # the first file of a family stands for all its files
+    names = tuple(source.name for source in files if source.name not in later_files)
     reopen = partial(_reopen, files, selection, input_format)
     return Run(
-        named, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen
+        names, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen
     )
 
 
@@ -142,31 +141,35 @@ def _reopen(
     input_format: str,
     surroundings: Surroundings,
 ) -> Run:
+    """Open a run again with other surroundings."""
     return open_sources(sources, selection, input_format).within(surroundings)
 
 
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Sort the files of a run by their formats, and say which of those that a pattern matched are left out.
+    """Sort the files of a run by their formats; return notes on files of a pattern that are left out.
 
-    Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.  Files
-    behind the first one of a family have its format.
+    Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
+    later files of a family have the format of its first file.
 
     Raises
     ------
     FormatError
-        If a file that was named is no history, or none of a pattern is.
+        If a file that was named is no energy history, or no file of a pattern is.
     """
     formats: dict[str, str] = {}
     foreign: list[tuple[Source, FormatError]] = []
-    for source in sorted(sources, key=lambda one: one.name[-2:].isdigit()):
+    # the first file of a family comes before its later files, which end with digits
+    for source in sorted(sources, key=lambda source: source.name[-2:].isdigit()):
         first = formats.get(source.name.rstrip(_DIGITS))
         try:
-            known = first if first in FAMILIES else None
-            formats[source.name] = known or (
-                input_format if input_format != "auto" else _format(source)
-            )
+            if first in FAMILIES:
+                formats[source.name] = first
+            elif input_format != "auto":
+                formats[source.name] = input_format
+            else:
+                formats[source.name] = _format(source)
         except FormatError as error:
             if not source.by_pattern:
                 raise
@@ -181,15 +184,17 @@ def _sort_by_format(
     if input_format == "auto" and any(READERS[kind].solver for kind in kinds):
         tables = [source for source in kinds.get("csv", []) if source.by_pattern]
         notes += [
-            f"{source.name} was left out: a table beside databases of the solver; name it to use it"
+            f"{source.name} was left out: a table next to databases of the solver; name it to use it"
             for source in tables
         ]
-        named = [source for source in kinds.pop("csv", []) if source not in tables]
-        kinds |= {"csv": named} if named else {}
+        named_tables = [s for s in kinds.pop("csv", []) if s not in tables]
+        if named_tables:
+            kinds["csv"] = named_tables
     return kinds, notes
 
 
 def _left_out(source: Source, refusal: str) -> str:
+    """Return the note on a file that was left out, with the reason from its error."""
     reason = (
         refusal.removeprefix(f"{source.name}: ")
         .partition(";")[0]
@@ -201,15 +206,16 @@ def _left_out(source: Source, refusal: str) -> str:
 def _with_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Give the formats with those last that hold forces alone; FormatError where all do."""
+    """Return the formats with those last that contain forces only; raise FormatError if all do."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        opened[ordered[0]][0].branch("glstat")  # knows best what is missing
+        # the branch reports best what is missing
+        opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
 
 def _holds_forces(source: Source) -> bool:
-    """Whether a file is a listing of forces, as none of a family is of which little is read."""
+    """Return True if a file is a listing of forces; files of families are not searched for them."""
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
@@ -218,7 +224,7 @@ def _holds_forces(source: Source) -> bool:
 def _forces_of(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
-    """Read the forces of files that hold nothing else, or say why they cannot be: the run is read without them."""
+    """Read the forces of files without energies; return a note instead if they cannot be read."""
     try:
         return force_listings.forces_of(sources), ()
     except FormatError as error:
@@ -226,7 +232,7 @@ def _forces_of(
 
 
 def _behind_firsts(sources: Sequence[Source]) -> set[str]:
-    """Names of the files that are behind the first one of a family: this one stands for all."""
+    """Return the names of the later files of families, whose first file stands for all of them."""
     names = {source.name for source in sources}
     return {
         name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names
@@ -236,17 +242,16 @@ def _behind_firsts(sources: Sequence[Source]) -> set[str]:
 def _opened(
     kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
-    """Open the files by their formats, and say what was not used.
+    """Open the files by format; return the legs of each format, and notes on files that were not used.
 
-    Families of files lie beside everything that LS-DYNA writes: they count where the others leave something out, and
-    where others are there, those that cannot be read stop nothing.
+    d3plot families exist next to everything that LS-DYNA writes: they are used only if the other files leave
+    something out, and if there are other files, a family that cannot be read is not an error.
     """
     opened: dict[str, Sequence[Database]] = {}
     notes = []
     for kind in ordered:
-        if kind in FAMILIES and _hold_all(
-            [leg for legs in opened.values() for leg in legs]
-        ):
+        legs_so_far = [leg for legs in opened.values() for leg in legs]
+        if kind in FAMILIES and _hold_all(legs_so_far):
             continue
         try:
             opened[kind] = reader(kind).open_legs(kinds[kind], selection)
@@ -260,19 +265,19 @@ def _opened(
 
 
 def _hold_all(legs: Sequence[Database]) -> bool:
-    """Whether databases have histories of the whole model and of its parts."""
+    """Return True if databases have histories of the whole model and of its parts."""
     return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
-    """FormatError, with what there is, where a channel that is named for a quantity is in none of the databases."""
+    """Raise FormatError if a channel that is named for a quantity is in none of the databases."""
     for quantity, name in selection.channels:
         if not any(quantity in database.quantities for database in databases):
             databases[0].find(name)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
-    """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
+    """Raise FormatError for ``--time`` if it would be ignored: files of solvers have one time, named 'time'."""
     if (
         time is not None
         and time.strip().casefold() != "time"
@@ -284,7 +289,7 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 
 
 def _format(source: Source) -> str:
-    """Return the format of a file: a signature decides first, a text is a table only if it is nothing else."""
+    """Return the format of a file: a binary signature comes first, and a text is a table only if it is nothing else."""
     head = _head_of(source)
     is_binary = b"\0" in head
     if is_binary:
@@ -296,29 +301,31 @@ def _format(source: Source) -> str:
             return kind
     if re.search(r"(^|[/\\.])d3(plot|part|thdt)\d+$", source.name):
         first = source.name.rstrip(_DIGITS)
-        found = f"{source.name}: the first file of its family says what it holds"
         raise FormatError(
-            f"{found}; name {first}, with which all files behind it are read"
+            f"{source.name}: the first file of its family says what it holds; "
+            f"name {first}, with which all files after it are read"
         )
     if re.search(r"(^|[/\\.])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
-        what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
         raise FormatError(
-            f"{source.name}: {what}; name the glstat, matsum, d3plot or binout of the run"
+            f"{source.name}: this is a file of LS-DYNA's d3 family, which has no energies that are read; "
+            "name the glstat, matsum, d3plot or binout of the run"
         )
-    found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
-    raise FormatError(f"{found}; export the energy history as text")
+    raise FormatError(
+        f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
+        "export the energy history as text"
+    )
 
 
 def _refuse_foreign(name: str, head: bytes) -> None:
-    from d2rpick.histories.foreign import (
-        refuse_foreign,
-    )  # not above: the databases of solvers do without
+    """Raise FormatError for a file of a known format without an energy history."""
+    # imported here: databases of solvers do without
+    from d2rpick.histories.foreign import refuse_foreign
 
     refuse_foreign(name, head)
 
 
 def _head_of(source: Source) -> bytes:
-    """Return the beginning of a file, with some of what comes after the legend of an ASCII database of LS-DYNA."""
+    """Return the first bytes of a file, with some after the legend of an ASCII database of LS-DYNA."""
     head = source.data[:_HEAD]
     if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
         end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
@@ -327,96 +334,94 @@ def _head_of(source: Source) -> bytes:
     return head
 
 
-# Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.
-_SAME = 0.01
-# Parts that are compared.
-_COMPARED = 50
-
-
 def check_companions(databases: Sequence[Legs]) -> None:
-    """Refuse databases that have no time in common."""
-    for one, other in combinations(databases, 2):
-        if (
-            one.span
-            and other.span
-            and (one.span[0] > other.span[1] or other.span[0] > one.span[1])
-        ):
+    """Raise FormatError if two databases have no time in common."""
+    for first, second in combinations(databases, 2):
+        if not first.span or not second.span:
+            continue
+        if first.span[0] > second.span[1] or second.span[0] > first.span[1]:
             raise FormatError(
-                f"{one.source} and {other.source} have no time in common, files of one run were expected"
+                f"{first.source} and {second.source} have no time in common, files of one run were expected"
             )
 
 
 def check_legs(legs: Sequence[Database]) -> None:
-    """Refuse files of one format that are not of one run.
+    """Raise FormatError if files of one format belong to different runs.
 
-    All legs of a run hold the same quantities.  A restart repeats the state it begins with.  Files that begin at the
-    same time are copies, or of different runs: then all states that they share are compared.
+    All legs of a run have the same quantities. A restart repeats the state with which it begins. Files that begin at
+    the same time are copies, or of different runs: then all states at common times are compared.
     """
-    for one, other in combinations(legs, 2):
-        here, there = _held(one), _held(other)
-        if here and there and not here & there:
-            found = f"{one.source} and {other.source} have neither a column nor a part in common"
+    for first, second in combinations(legs, 2):
+        held_by_first = _held(first)
+        held_by_second = _held(second)
+        both_hold = held_by_first and held_by_second
+        if both_hold and held_by_first.isdisjoint(held_by_second):
             raise FormatError(
-                f"{found}, legs of one run were expected; give the files of one run"
+                f"{first.source} and {second.source} have neither a column nor a part in common, "
+                "legs of one run were expected; give the files of one run"
             )
         for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
             try:
-                shared = _shared(times(one), times(other))
-                values = (
-                    [
-                        columns(leg, at)
-                        for leg, at in zip((one, other), shared, strict=True)
-                    ]
-                    if shared
-                    else []
+                shared = _shared(times(first), times(second))
+                if shared is None:
+                    continue
+                are_alike = _alike(
+                    columns(first, shared[0]), columns(second, shared[1])
                 )
-            except FormatError:  # said when it is read
+            except FormatError:  # reported when the column is read
                 continue
-            if values and not _alike(*values):
-                found = f"{one.source} and {other.source} have different energies at the same times"
+            if not are_alike:
                 raise FormatError(
-                    f"{found}, legs of one run were expected; give the files of one run"
+                    f"{first.source} and {second.source} have different energies at the same times, "
+                    "legs of one run were expected; give the files of one run"
                 )
 
 
 def _held(leg: Database) -> set[str | int]:
-    """Columns and parts of a leg."""
+    """Return the columns and part ids of a leg."""
     return {*leg.channels, *(part.id for part in leg.parts)}
 
 
 def _own_times(leg: Database) -> Samples:
+    """Return the times of the whole model, shape (n,); empty if it has no columns."""
     return leg.time if leg.channels else np.empty(0)
 
 
 def _part_times(leg: Database) -> Samples:
+    """Return the times of the parts, shape (n,); empty if there are no parts."""
     return leg.part_time if leg.parts else np.empty(0)
 
 
 def _energies(leg: Database, states: Indices) -> Samples:
+    """Return the internal energy of the whole model at some states, (states,), or an array (states, 0)."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 
 
 def _part_energies(leg: Database, states: Indices) -> Samples:
+    """Return the internal energies of the compared parts at some states, shape (states, parts)."""
     ids = [part.id for part in leg.parts][:_COMPARED]
     return leg.part_channel("internal_energy", ids)[states]
 
 
-def _shared(one: Samples, other: Samples) -> tuple[Indices, Indices] | None:
-    """States at the same times: all where both begin alike, else the first of the later one; None without any."""
-    _, here, there = np.intersect1d(one, other, return_indices=True)
-    if not here.size:
+def _shared(first: Samples, second: Samples) -> tuple[Indices, Indices] | None:
+    """Return the states at common times: all if both legs begin together, else only the start of the later leg."""
+    _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
+    if not in_first.size:
         return None
-    if here[0] == there[0] == 0:
-        return here, there
-    begins = there == 0 if other[0] > one[0] else here == 0
-    return (here[begins], there[begins]) if begins.any() else None
+    if in_first[0] == in_second[0] == 0:
+        return in_first, in_second
+    begins = in_second == 0 if second[0] > first[0] else in_first == 0
+    if not begins.any():
+        return None
+    return in_first[begins], in_second[begins]
 
 
-def _alike(one: Samples, other: Samples) -> bool:
-    """Whether energies are the same up to what a restart on other processors changes; NaN is none."""
-    if one.shape != other.shape:
+def _alike(first: Samples, second: Samples) -> bool:
+    """Return True if energies differ only as after a restart on other processors; NaN is not compared."""
+    if first.shape != second.shape:
         return True
-    known = np.isfinite(one) & np.isfinite(other)
-    largest = np.maximum(np.abs(one), np.abs(other)).max(initial=0.0, where=known)
-    return bool(np.all(np.abs(one - other)[known] <= _SAME * largest))
+    are_finite = np.isfinite(first) & np.isfinite(second)
+    sizes = np.maximum(np.abs(first), np.abs(second))
+    largest = sizes.max(initial=0.0, where=are_finite)
+    return bool(np.all(np.abs(first - second)[are_finite] <= _SAME * largest))

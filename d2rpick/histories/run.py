@@ -1,4 +1,4 @@
-"""Run: all files of one run, and what of them is taken for the energy to be locked in."""
+"""All files of one run, and the energy in them that is to be locked in."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class Run:
-    """Databases of one run, one per format, those that say most of it first.
+    """The databases of one run, one for each format, the most comprehensive one first.
 
-    ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
-    ``reopen`` opens the same files again within other surroundings: so it is copied, also to another process.
-    ``notes`` say which files were not used; ``forces`` are those of files that hold nothing else.
+    ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
+    ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
+    ``notes`` are on files that were not used; ``forces`` are those of files with forces only.
     """
 
     def __init__(
@@ -56,12 +56,8 @@ class Run:
         forces: tuple[ContactForce, ...] = (),
         reopen: Callable[[Surroundings], Run] | None = None,
     ) -> None:
-        self.sources, self.databases, self.files, self.surroundings = (
-            sources,
-            databases,
-            files,
-            surroundings,
-        )
+        self.sources, self.databases, self.files = sources, databases, files
+        self.surroundings = surroundings
         self._notes, self._forces, self._reopen = notes, forces, reopen
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -72,7 +68,7 @@ class Run:
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> Run:
-        """Give the same run with what is known of its surroundings."""
+        """Return the same run with other surroundings."""
         return Run(
             self.sources,
             self.databases,
@@ -85,45 +81,46 @@ class Run:
 
     @property
     def name(self) -> str:
-        """The files, for messages."""
+        """The file names, for messages."""
         return ", ".join(self.sources)
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with histories of their own."""
+        """Parts with their own histories."""
         holder = self._with_parts()
         return holder.parts if holder else ()
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Which files were not used, and why."""
+        """Notes on files that were not used, with the reasons."""
         return self._notes
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know about the files."""
-        own = (note for database in self.databases for note in database.notes)
-        return tuple(dict.fromkeys([*self._notes, *own, *doubts(self.databases)]))
+        """Notes on the files for the user."""
+        notes = [*self._notes]
+        for database in self.databases:
+            notes += database.notes
+        return tuple(dict.fromkeys([*notes, *doubts(self.databases)]))
 
     def history(self, selection: Selection) -> History:
-        """Take the selected energy: of parts, of named channels, or by default of the whole model.
+        """Return the history of the selected energy: of parts, of channels, or by default of the whole model.
 
-        FormatError when something is not there, with what there is.
+        Raises FormatError, with what there is, if something selected is missing.
         """
         history = self._energy(selection)
         notes = (*history.notes, *self.unused_energies(selection))
-        flying = (
-            select_parts(selection.flying, self.parts, self.name)
-            if selection.flying
-            else None
-        )
+        if selection.flying:
+            flying = select_parts(selection.flying, self.parts, self.name)
+        else:
+            flying = None
         evidence = _Written(self, history.parts, flying)
         return replace(
             history, evidence=evidence, surroundings=self.surroundings, notes=notes
         )
 
     def unused_energies(self, selection: Selection) -> tuple[str, ...]:
-        """Return notes on the channels of tables that look like energies but are neither selected nor understood."""
+        """Return notes on channels of tables that look like energies but are neither selected nor recognised."""
         notes: list[str] = []
         for database in self.databases:
             if not database.named_by_people or not database.channels:
@@ -138,29 +135,30 @@ class Run:
     def momenta(
         self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
     ) -> tuple[Momenta, ...]:
-        """Give the momentum of the parts and that of the whole model, as far as they are written.
+        """Return the momenta of the parts and of the whole model, as far as they are written.
 
-        ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if they are.
+        ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
         """
-        of_parts, of_whole = self._part_momenta, self._whole_momentum
+        of_parts = self._part_momenta
+        of_whole = self._whole_momentum
         if of_parts and of_parts.parts:
             ids = [part.id for part in of_parts.parts]
             members = tuple(
                 ids.index(part.id) for part in chosen or self._free(of_parts.parts)
             )
-            known = tuple(ids.index(part.id) for part in flying) if flying else None
-            of_parts = of_parts.choosing(members, known)
-        return tuple(one for one in (of_parts, of_whole) if one)
+            together = tuple(ids.index(part.id) for part in flying) if flying else None
+            of_parts = of_parts.choosing(members, together)
+        return tuple(momenta for momenta in (of_parts, of_whole) if momenta)
 
     def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
-        """Give those of all parts that nothing holds, or all where each is held."""
+        """Return the parts without supports, or all parts if each has one."""
         return [
             part for part in parts if not self.surroundings.supports_of([part])
         ] or parts
 
     @cached_property
     def _part_momenta(self) -> Momenta | None:
-        """Momenta of all parts; None where they are not written, or not for all parts."""
+        """Momenta of all parts; None unless they are written for all parts."""
         holder = self._with_parts()
         if holder is None:
             return None
@@ -170,7 +168,7 @@ class Run:
             )
         )
         if values is None or not values.size:
-            return None  # it cannot say what flies together
+            return None  # it cannot show what flies together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
         return Momenta(
@@ -185,85 +183,72 @@ class Run:
 
     @cached_property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are written, in their order, NaN where unknown [mass].
+        """Masses of the parts whose momenta are written, in their order, NaN if unknown [mass].
 
-        As written, or momentum over velocity along the axis with most momentum; None where neither is.
+        As written, or momentum over velocity along the axis with most momentum; None if neither is written.
         """
-        momenta, holder = self._part_momenta, self._with_parts()
+        momenta = self._part_momenta
+        holder = self._with_parts()
         return self._masses(momenta.values, holder) if momenta and holder else None
 
     def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
+        """Return the masses of all parts, shape (parts,), as written or from momenta (n, parts, 3) and velocities."""
         with suppress(FormatError):
             return _median_of_some(self._of_holder("mass", holder.parts))
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
-        velocity, momentum = (
-            if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts)),
-            momenta[:, :, axis],
-        )
+        velocity = if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts))
+        momentum = momenta[:, :, axis]
         if velocity is None:
             return None
-        square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
+        square = (velocity**2).sum(axis=0)
+        product = (velocity * momentum).sum(axis=0)
         massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
-        return np.where(
-            massless,
-            0.0,
-            np.divide(
-                product, square, out=np.full(square.shape, np.nan), where=square > 0
-            ),
+        ratios = np.divide(
+            product, square, out=np.full(square.shape, np.nan), where=square > 0
         )
+        return np.where(massless, 0.0, ratios)
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
-        """Masses of the parts; of a part that writes none, the least that has its momentum at its kinetic energy."""
+        """Return the masses of the parts; for an unknown one, the least with its momentum and kinetic energy."""
         from d2rpick.histories.balance import least_masses
 
         masses = self._masses(momenta, holder)
         if masses is None or not np.isnan(masses).any():
             return masses
         kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
-        return (
-            masses
-            if kinetic is None
-            else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
-        )
+        if kinetic is None:
+            return masses
+        return np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of contacts and rigid walls, of each the first that a file tells."""
-        written = (
-            if_written(partial(forces_of, database)) or ()
-            for database in self.databases
-        )
-        named: dict[str, ContactForce] = {}
-        for force in (
-            *(force for forces in written for force in forces),
-            *self._forces,
-        ):
-            named.setdefault(force.name, force)
-        return tuple(named.values())
+        """Forces of contacts and rigid walls, each from the first file that contains it."""
+        forces_by_name: dict[str, ContactForce] = {}
+        for database in self.databases:
+            for force in if_written(partial(forces_of, database)) or ():
+                forces_by_name.setdefault(force.name, force)
+        for force in self._forces:
+            forces_by_name.setdefault(force.name, force)
+        return tuple(forces_by_name.values())
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
-        """Momentum of the whole model, or its velocity; None if not written."""
+        """Momentum of the whole model, or its velocity; None if neither is written."""
         from d2rpick.histories.balance import momentum_of
 
-        found = (
-            momentum_of(database) for database in self.databases if database.channels
-        )
-        written = next(filter(None, found), None)
-        return written and replace(written, surroundings=self.surroundings)
+        for database in self.databases:
+            momentum = momentum_of(database) if database.channels else None
+            if momentum:
+                return replace(momentum, surroundings=self.surroundings)
+        return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
-        """Give the momentum of some parts together, or of the whole model; None where it is not written."""
+        """Return the momentum of some parts together, or of the whole model; None if it is not written."""
         of_parts = parts is not None
-        found = next(
-            (
-                one
-                for one in self.momenta(parts, None)
-                if (one.parts is not None) == of_parts
-            ),
-            None,
-        )
-        return Track(found.time, found.of(found.chosen)) if found else None
+        for momenta in self.momenta(parts, None):
+            if (momenta.parts is not None) == of_parts:
+                return Track(momenta.time, momenta.of(momenta.chosen))
+        return None
 
     @property
     def part_time(self) -> Samples:
@@ -272,64 +257,61 @@ class Run:
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Parts of springs and dampers, as far as their energies tell."""
+        """Parts that are springs and dampers, as far as their energies show it."""
         from d2rpick.histories.balance import springs_among
 
         parts = self.parts
-        energies = (
-            if_written(lambda: self.part_energies(parts)) if parts else None
-        )  # not in every state
-        return (
-            ()
-            if energies is None
-            else springs_among(self.databases, parts, energies, self.part_time)
-        )
+        # None if the energies are not in every state
+        energies = if_written(lambda: self.part_energies(parts)) if parts else None
+        if energies is None:
+            return ()
+        return springs_among(self.databases, parts, energies, self.part_time)
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
-        """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
+        """Return internal energies of some parts, shape (n, parts), at the times of the parts [energy]."""
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Kinetic energies of some parts, shape (n, parts) [energy]; FormatError where they are not written."""
+        """Return kinetic energies of some parts, shape (n, parts) [energy]; FormatError if they are not written."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
-        """Give the quantities of the whole model, by their names in `QUANTITIES`, that are written at ``time`` (n,)."""
-        found: dict[str, Samples] = {}
+        """Return the quantities of the whole model written at ``time`` (n,), by their names in `QUANTITIES`."""
+        columns: dict[str, Samples] = {}
         for database in self.databases:
             if not database.channels or not np.array_equal(database.time, time):
                 continue
             for quantity in QUANTITIES:
-                if quantity in database.quantities and quantity not in found:
-                    with suppress(FormatError):  # not in every state
-                        found[quantity] = database.channel(
-                            database.quantities[quantity]
-                        )
-        return found
+                if quantity in database.quantities and quantity not in columns:
+                    with suppress(FormatError):  # it is not in every state
+                        name = database.quantities[quantity]
+                        columns[quantity] = database.channel(name)
+        return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Give the mean of the centres of some parts [length]; None where they are not written."""
-        places = if_written(
+        """Return the mean of the centres of some parts [length]; None if they are not written."""
+        components = if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
-        return (
-            None if places is None else Track(self.part_time, np.stack(places, axis=1))
-        )
+        if components is None:
+            return None
+        return Track(self.part_time, np.stack(components, axis=1))
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
+        """Return a quantity of some parts, shape (n, parts)."""
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
+        """Return the history of the selected energy, without evidence."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
-            named = selection.springs
-            springs = (
-                self.springs
-                if named is None
-                else tuple(part for part in self.parts if str(part.id) in named)
-            )
+            springs = self.springs
+            if selection.springs is not None:
+                springs = tuple(
+                    part for part in self.parts if str(part.id) in selection.springs
+                )
             return self._of_parts(chosen, springs)
         if selection.energy:
             return self._of_channels(selection.energy)
@@ -339,47 +321,47 @@ class Run:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """The database that knows parts; FormatError with what there is instead of them."""
+        """Return the database with parts; raise FormatError, with what there is instead, if there is none."""
         holder = self._with_parts()
         if holder is None:
-            self.databases[0].part_channel(
-                "internal_energy", ()
-            )  # knows best why there are none
+            # the database reports best why it has no parts
+            self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
             )
         return holder
 
     def _with_parts(self) -> Legs | None:
+        """Return the first database with parts, or None."""
         return next((database for database in self.databases if database.parts), None)
 
     def _of_parts(
         self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
     ) -> History:
+        """Return the history of the summed energy of parts; that of springs is left out unless it is all."""
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
             check_sum(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        if not energies[:, ~left_out].any():  # springs are all that has energy
+        if not energies[:, ~left_out].any():  # only springs have energy
             left_out[:] = False
         idle = [
             part
             for part, energy in zip(chosen, energies.T, strict=True)
             if not energy.any()
         ]
-        notes = (
-            (
+        notes: tuple[str, ...] = ()
+        if idle:
+            notes = (
                 f"without any internal energy: part {menu(idle)}; rigid, or without elements?",
             )
-            if idle
-            else ()
-        )
-        every = [part.name for part in chosen]
-        names, apart = list(compress(every, ~left_out)), list(compress(every, left_out))
+        all_names = [part.name for part in chosen]
+        names = list(compress(all_names, ~left_out))
+        names_left_out = list(compress(all_names, left_out))
         channel = "internal energy of " + ", ".join(names)
-        if apart:
-            notes = (*notes, _left_out(", ".join(apart)))
+        if names_left_out:
+            notes = (*notes, _left_out(", ".join(names_left_out)))
         energies = energies[:, ~left_out]
         history = self._history_of(
             holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen
@@ -389,40 +371,42 @@ class Run:
         )
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Take the energy of the whole model, less that of springs and dampers where it has other energy too."""
+        """Return the history of the whole model without the energy of springs and dampers, if it has other energy."""
         from d2rpick.histories.balance import spring_energy
 
-        whole, springs = self._of_channels((channel,)), spring_energy(database)
+        whole = self._of_channels((channel,))
+        springs = spring_energy(database)
         if springs is None:
             return whole
-        rest = whole.energy - springs[1]
         note = _left_out(f"all springs and dampers, {springs[0]},")
         return replace(
             whole,
-            energy=rest,
+            energy=whole.energy - springs[1],
             channel=f"{channel} - {springs[0]}",
             notes=(*whole.notes, note),
         )
 
     def _of_all_parts(self) -> History:
+        """Return the history of the summed energy of all parts; raise FormatError without parts."""
         if not self.parts:
-            there = listing(
-                [name for database in self.databases for name in database.channels]
-            )
-            found = f"{self.name}: no internal energy"
+            channels = [
+                name for database in self.databases for name in database.channels
+            ]
             raise FormatError(
-                f"{found}; choose with `energy`: {there or 'there are no channels'}"
+                f"{self.name}: no internal energy; choose with `energy`: "
+                f"{listing(channels) or 'there are no channels'}"
             )
-        every = self._of_parts(self.parts)
+        sum_of_parts = self._of_parts(self.parts)
         note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
         return replace(
-            every,
+            sum_of_parts,
             channel="internal energy of all parts",
             parts=None,
-            notes=(*every.notes, note),
+            notes=(*sum_of_parts.notes, note),
         )
 
     def _of_channels(self, wanted: Sequence[str]) -> History:
+        """Return the history of the summed energy of channels."""
         database, names = self._holding(wanted)
         if len(set(names)) < len(names):
             raise FormatError(f"{self.name}: an energy is given twice; name each once")
@@ -433,19 +417,18 @@ class Run:
         history = self._history_of(
             database, database.time, energy, channel, names, notes, None
         )
-        return (
-            history
-            if len(columns) == 1
-            else _with_terms(history, names, np.stack(columns, axis=1))
-        )
+        if len(columns) == 1:
+            return history
+        return _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
-        """Find the database that has all these channels, under the names it gives them."""
+        """Return the database that has all these channels, and their names in it."""
         refusals = []
-        for database in sorted(self.databases, key=lambda one: not one.channels):
+        for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    database.channel(wanted[0])  # knows best why there are none
+                    # the database reports best why it has no channels
+                    database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
                 refusals.append(error)
@@ -455,26 +438,27 @@ class Run:
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip
+        """Return a history of this energy (n,) with the names and precisions of its database."""
         time_precision, energy_precision = database.precisions(names)
         return History(
             time=time,
             energy=energy,
             source=self.sources,
             files=self.files,
-            format=" + ".join(one.format for one in self.databases),
+            format=" + ".join(legs.format for legs in self.databases),
             energy_format=database.format,
             channel=channel,
             parts=parts,
             time_precision=time_precision,
             energy_precision=energy_precision,
             time_unit=database.time_unit,
-            complete=all(one.complete for one in self.databases),
+            complete=all(legs.complete for legs in self.databases),
             notes=(*self.notes, *notes),
         )
 
 
 class _Written(Given):
-    """What the files of a run hold for some parts, read when it is asked for."""
+    """The evidence in the files of a run for some parts, read at the first request."""
 
     def __init__(
         self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
@@ -504,22 +488,22 @@ class _Written(Given):
         return terms_of(self._run.databases)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
-        """Internal energies of some parts."""
+        """Return internal energies of some parts; None if they are not written."""
         values = if_written(lambda: self._run.part_energies(parts))
         return None if values is None else Track(self._run.part_time, values)
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Kinetic energy of some parts together, or of the whole model."""
+        """Return the kinetic energy of some parts together, or of the whole model; None if it is not written."""
         if parts is None:
             return super().kinetic_energy(parts)
         values = if_written(lambda: self._run.part_kinetic_energies(parts))
-        return (
-            None if values is None else Track(self._run.part_time, values.sum(axis=1))
-        )
+        if values is None:
+            return None
+        return Track(self._run.part_time, values.sum(axis=1))
 
 
 def _selected_channels(database: Legs, selection: Selection) -> list[str]:
-    """Return the channels that are taken as energy by default, or selected, and the internal energies passed over."""
+    """Return the channels used as energy, and those that could have been: all other internal energies."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
         return [*(database.find(name) for name in selection.energy), *passed_over]
@@ -527,24 +511,26 @@ def _selected_channels(database: Legs, selection: Selection) -> list[str]:
 
 
 def _median_of_some(values: Samples) -> Samples:
-    """Median over the states of each column of values (n, k) that are not 0: the mass of a rigid part is written so."""
-    some = values != 0
-    if some.all():
+    """Return the median of each column of values (n, k) over the states in which it is not 0.
+
+    The mass of a rigid part is 0 in some states.
+    """
+    is_nonzero = values != 0
+    if is_nonzero.all():
         return median(values)
-    return np.array(
-        [
-            median(one[there]) if there.any() else 0.0
-            for one, there in zip(values.T, some.T, strict=True)
-        ]
-    )
+    medians = []
+    for column, states in zip(values.T, is_nonzero.T, strict=True):
+        medians.append(median(column[states]) if states.any() else 0.0)
+    return np.array(medians)
 
 
 def _left_out(springs: str) -> str:
-    return f"the energy of {springs} was left out: that of springs holds what their dampers take and never give back"
+    """Return the note on the energy of springs that is left out."""
+    return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"
 
 
 def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms of a summed energy, (n, k), but those that are always zero; one alone is the energy itself."""
+    """Add the terms (n, k) of a summed energy that are not always zero; a single term is the energy itself."""
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:
         return history

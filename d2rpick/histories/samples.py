@@ -1,4 +1,4 @@
-"""What a curve tells: which samples count, its integral, where it passes a level or turns, its outline, its roots."""
+"""Functions of sampled curves: valid states, integral, crossings of a level, turning points, outline, roots."""
 
 from __future__ import annotations
 
@@ -16,9 +16,20 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
+# If at least this share of the states repeats the time of the state before, a table may have rows for several parts.
+_REPEATED: Final = 0.49
+FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be chance
+# Ratio of output intervals before and after a restart; another curve or an unsorted table has another interval.
+_ALIKE = 2.0
+# Number of adjacent windows that are combined into one; with eight the table of them stays small and quick to search.
+_TOGETHER: Final = 8
+# A root that moves by less than this share of its time has converged to rounding.
+_STILL: Final = 8 * float(np.finfo(np.float64).eps)
+HALVINGS: Final = 50  # halvings of a bracket down to rounding
+
 
 def window(time: Samples, start: float, end: float) -> slice:
-    """Slice of ascending times from ``start`` to ``end``, both included [time].
+    """Return the slice of ascending times from ``start`` to ``end``, both included [time].
 
     Examples
     --------
@@ -30,7 +41,7 @@ def window(time: Samples, start: float, end: float) -> slice:
 
 
 def integral(time: Samples, values: Samples) -> Samples:
-    """Integral of values (n,) or (n, k) from the first time on, by trapezia, of their shape.
+    """Return the integral of values (n,) or (n, k) from the first time on, in their shape, by the trapezoidal rule.
 
     Examples
     --------
@@ -46,7 +57,7 @@ def integral(time: Samples, values: Samples) -> Samples:
 
 
 def median(values: Samples) -> Samples:
-    """Median of values (n,) or (n, k) over the first axis; that of numpy, which imports masked arrays to look for NaN.
+    """Return the median of values (n,) or (n, k) over the first axis; the one of numpy imports masked arrays.
 
     Examples
     --------
@@ -58,14 +69,15 @@ def median(values: Samples) -> Samples:
 
 
 def bent(time: Samples, values: Samples) -> Samples:
-    """Give what is left of each column of values (n, k) beside a straight line.
+    """Return the residual of each column of values (n, k) after a linear fit.
 
     Examples
     --------
     >>> bent(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    t = time - time.sum() / time.size  # as mean(), which is slow for few
+    # the same as mean(), which is slow for few values
+    t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
     columns -= np.multiply.outer(t @ centred / (t @ t), t)
@@ -73,10 +85,10 @@ def bent(time: Samples, values: Samples) -> Samples:
 
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Which states of a file count, and what to say of the others.
+    """Return which states of a file are valid, and notes on the others.
 
-    A state gives way to any later one at or before its time: of equal printed times the last counts, and
-    where a restarted run steps back its newer leg wins.
+    A state gives way to any later one at or before its time: of equal printed times the last one is valid, and after
+    a restart that steps back the newer leg is.
 
     Parameters
     ----------
@@ -96,75 +108,67 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # as nearly always
+    if np.all(time[1:] > time[:-1]):  # the usual case
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
-    equal, back = int(np.count_nonzero(step == 0)), int(np.count_nonzero(step < 0))
+    equal = int(np.count_nonzero(step == 0))
+    back = int(np.count_nonzero(step < 0))
     later = np.minimum.accumulate(time[::-1])[::-1]
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []
     if equal:
-        same = "1 state has" if equal == 1 else f"{equal} states have"
+        states = "1 state has" if equal == 1 else f"{equal} states have"
         notes.append(
-            f"{same} the same printed time as the next one; the last of equal times counts"
+            f"{states} the same printed time as the next one; the last of equal times is used"
         )
     if back:
         steps = "once" if back == 1 else f"{back} times"
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped"
+            f"time steps back {steps} (restart); if legs overlap the newer one is used, {dropped} dropped"
         )
     return keep, tuple(notes)
 
 
-# At least this share of the states has the time of the state before, if each time stands in two rows or more.
-_REPEATED: Final = 0.49
-FEWEST_TIMES: Final = 3  # below, rows of one time may be chance
-
-
 def count_rows_per_time(time: Samples) -> int:
-    """Return in how many rows each of the times (n,) stands, in the median; 1 if most times stand alone.
+    """Return the median number of rows with the same time (n,); 1 if most times are in one row only.
 
     Examples
     --------
     >>> count_rows_per_time(np.array([0.0, 0.0, 0.1, 0.1, 0.2, 0.2])), count_rows_per_time(np.array([0.0, 0.1, 0.1]))
     (2, 1)
     """
-    if (
-        time.size < 2 * FEWEST_TIMES
-        or np.count_nonzero(time[1:] == time[:-1]) < _REPEATED * time.size
-    ):
+    repeated = np.count_nonzero(time[1:] == time[:-1])
+    if time.size < 2 * FEWEST_TIMES or repeated < _REPEATED * time.size:
         return 1
     first_rows = np.flatnonzero(np.append(True, time[1:] != time[:-1]))
     rows = np.diff(np.append(first_rows, time.size))
     return int(np.sort(rows)[rows.size // 2])
 
 
-# A restarted run goes on with its output interval; another curve or an unsorted table has another one.
-_ALIKE = 2.0
-
-
 def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
-    """Give times (n,) back; FormatError, with the place of the state, where they are not those of one run."""
+    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they are not those of one run."""
     state = _not_a_restart(time)
     if state is None:
         return time
-    found = (
+    problem = (
         f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}"
     )
     if time[state] <= time[0]:
         cure = "another curve or part begins here: put each into its own file"
     else:
         cure = "sort the rows, or put each curve into its own file"
-    raise FormatError(f"{found}, increasing times or one restart were expected; {cure}")
+    raise FormatError(
+        f"{problem}, increasing times or one restart were expected; {cure}"
+    )
 
 
 def _not_a_restart(time: Samples) -> int | None:
-    """Find the first state at which times (n,) step back as those of one run do not; None where they never do.
+    """Return the first state at which times (n,) step back other than by a restart; None if there is none.
 
-    One step back is a restart: it does not go back to the start, and the interval behind it, as the median of all
-    behind it, is half to twice the median of those before.
+    One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
+    the median) is half to twice the median interval before it.
 
     Examples
     --------
@@ -177,33 +181,32 @@ def _not_a_restart(time: Samples) -> int | None:
     first = int(back[0])
     if back.size > 1 or time[first] <= time[0]:
         return first
-    before, behind = (np.diff(one) for one in np.split(time, [first]))
-    ratios = [_median(steps) / _median(before) for steps in (behind, behind[:1])]
-    return (
-        first if any(ratio < 1 / _ALIKE or ratio > _ALIKE for ratio in ratios) else None
-    )
+    before_restart, after_restart = (np.diff(leg) for leg in np.split(time, [first]))
+    for steps in (after_restart, after_restart[:1]):
+        ratio = _median(steps) / _median(before_restart)
+        if ratio < 1 / _ALIKE or ratio > _ALIKE:
+            return first
+    return None
 
 
 def _median(steps: Samples) -> float:
-    steps = steps[steps > 0]  # equal printed times are no interval
-    return (
-        float(median(steps)) if steps.size else np.nan
-    )  # which is neither too small nor too large
+    """Return the median of the steps above 0 (equal printed times are no interval); NaN if there are none."""
+    steps = steps[steps > 0]
+    return float(median(steps)) if steps.size else np.nan
 
 
 def find_crossings(
     time: Samples, energy: Samples, level: float
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """Times of all passages of ``energy`` through ``level``, ascending, and which of them rise, both of shape (k,).
+    """Return the times at which ``energy`` crosses ``level``, ascending, and which of them rise, both of shape (k,).
 
-    Between samples the energy is taken as linear: on piecewise linear data the answer is exact to rounding.
+    Between samples the energy is linear: for piecewise linear data the result is exact to rounding. The energy
+    crosses the level if it is on different sides before and after:
 
-    What counts is that the energy lies on different sides before and after:
-
-    * a sample exactly on the level is passed once, at that sample; a plateau on the level once, at its first;
+    * a sample exactly on the level is one crossing, at that sample; a plateau on the level is one, at its first sample;
     * touching the level and turning back is no crossing (``find_turns`` gives such points);
-    * a record that begins on the level has a crossing at its first sample, one that ends on it has one where
-      it arrives; ``rising`` then tells the one side there is.  A record that stays on the level has none.
+    * a record that begins on the level has a crossing at its first sample, one that ends on it has one where it reaches
+      the level; ``rising`` then follows from the only side there is.  A record that stays on the level has no crossing.
 
     Parameters
     ----------
@@ -218,33 +221,34 @@ def find_crossings(
     (array([0.25]), array([ True]))
     """
     side = _sides(energy, level)
-    off = np.flatnonzero(side)
-    if not off.size:
+    off_level = np.flatnonzero(side)
+    if not off_level.size:
         return np.zeros(0), np.zeros(0, dtype=bool)
-    turn = np.flatnonzero(np.diff(side[off]))
-    before, after = off[turn], off[turn + 1]
-    # with samples on the level in between, the first of them: a share of 1
+    turn = np.flatnonzero(np.diff(side[off_level]))
+    index_before = off_level[turn]
+    index_after = off_level[turn + 1]
+    # if there are samples on the level in between, the crossing is at the first of them: a share of 1
     share = np.where(
-        after == before + 1,
-        (level - energy[before]) / (energy[before + 1] - energy[before]),
+        index_after == index_before + 1,
+        (level - energy[index_before])
+        / (energy[index_before + 1] - energy[index_before]),
         1.0,
     )
-    at = time[before] + share * (time[before + 1] - time[before])
-    rising = side[after] > 0
-    if off[0] > 0:
-        at, rising = np.append(time[0], at), np.append(side[off[0]] > 0, rising)
-    if off[-1] < side.size - 1:
-        at, rising = (
-            np.append(at, time[off[-1] + 1]),
-            np.append(rising, side[off[-1]] < 0),
-        )
+    at = time[index_before] + share * (time[index_before + 1] - time[index_before])
+    rising = side[index_after] > 0
+    if off_level[0] > 0:
+        at = np.append(time[0], at)
+        rising = np.append(side[off_level[0]] > 0, rising)
+    if off_level[-1] < side.size - 1:
+        at = np.append(at, time[off_level[-1] + 1])
+        rising = np.append(rising, side[off_level[-1]] < 0)
     return at, rising
 
 
 def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Places of the samples (n,) where the energy turns, and which of them are peaks, both of shape (k,).
+    """Return the indices at which the energy (n,) turns, and which of them are peaks, both of shape (k,).
 
-    A flat top or bottom counts once, at its first sample, the ends never.
+    A flat top or bottom is one turn, at its first sample; the ends are no turns.
 
     Examples
     --------
@@ -257,17 +261,13 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     return moving[turn] + 1, slope[moving[turn]] > 0
 
 
-def _sides(values: Samples, others: Samples | float) -> NDArray[np.int8]:
-    """1 where values (n,) are above the others, -1 where below, else 0: in a byte each, of many samples."""
-    return np.asarray((values > others).view(np.int8) - (values < others).view(np.int8))
-
-
-# So many windows side by side are looked at as one: with eight the table of them is small, and is walked quickly.
-_TOGETHER: Final = 8
+def _sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
+    """Return 1 where values (n,) are above the limits, -1 where they are below, else 0; one byte each saves memory."""
+    return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
 def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
-    """Give the stretches of neighbouring ``states`` (n,) that hold, of those with at least so many.
+    """Return the slices of consecutive ``states`` (n,) that are True, if they have at least ``fewest`` states.
 
     Examples
     --------
@@ -285,56 +285,54 @@ def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
 def first_above(
     values: Samples, start: NDArray[np.intp], limit: Samples
 ) -> NDArray[np.intp]:
-    """Place of the first of values (n,) from each ``start`` on that is above its ``limit``, of their shape (m,).
+    """Return the index of the first of values (n,) from each ``start`` on above its ``limit``, in their shape (m,).
 
-    n where none is.  It takes O((n + m) log n).
+    The index is n if there is none. The search takes O((n + m) log n).
 
     Examples
     --------
     >>> first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
-    tops, width, places = (
-        [np.append(values, np.inf)],
-        1,
-        np.arange(values.size + 1),
-    )  # largest of so many from each on
+    # tops[i] is the largest of ``_TOGETHER**i`` values from each index on
+    tops = [np.append(values, np.inf)]
+    width = 1
+    indices = np.arange(values.size + 1)
     while width < values.size:
         later = (
-            np.minimum(places + width * step, values.size) for step in range(_TOGETHER)
+            np.minimum(indices + width * step, values.size) for step in range(_TOGETHER)
         )
-        tops.append(np.fmax.reduce([tops[-1][one] for one in later]))
+        tops.append(np.fmax.reduce([tops[-1][shifted] for shifted in later]))
         width *= _TOGETHER
-    found = start
+    first = start
     for top in reversed(tops):
         for _ in range(_TOGETHER):
-            found = np.where(
-                top[found] > limit, found, np.minimum(found + width, values.size)
-            )
+            skipped = np.minimum(first + width, values.size)
+            first = np.where(top[first] > limit, first, skipped)
         width //= _TOGETHER
-    return found
+    return first
 
 
 def union(*times: Samples) -> Samples:
-    """Times of all, each once, ascending; what numpy has for that imports all of numpy.ma, which costs start-up.
+    """Return all times once, ascending; the function of numpy for this imports numpy.ma, which slows start-up.
 
     Examples
     --------
     >>> union(np.array([1.0, 3.0]), np.array([[2.0, 3.0]])).tolist()
     [1.0, 2.0, 3.0]
     """
-    every = np.sort(np.concatenate([one.ravel() for one in times]))
-    return np.asarray(every[np.diff(every, prepend=-np.inf) > 0])
+    ascending = np.sort(np.concatenate([array.ravel() for array in times]))
+    return np.asarray(ascending[np.diff(ascending, prepend=-np.inf) > 0])
 
 
 def outline(time: Samples, values: Samples, stretches: int) -> Samples:
-    """Give times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
+    """Return times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
 
     Parameters
     ----------
     time, values : array of shape (n,)
     stretches : int
-        Stretches of equally many samples; the first and the last sample stay, too, and m is at most
+        Number of stretches of equally many samples.  The first and the last sample are kept too, so that m is at most
         ``2 * stretches + 2``.
 
     Examples
@@ -345,22 +343,16 @@ def outline(time: Samples, values: Samples, stretches: int) -> Samples:
     if time.size <= 2 * stretches:
         return np.stack([time, values])
     pieces = np.array_split(np.arange(time.size), stretches)
-    kept = [
-        piece[0] + place
-        for piece in pieces
-        for place in (values[piece].argmin(), values[piece].argmax())
-    ]
-    at = np.unique([0, *kept, time.size - 1])
+    extremes = [0, time.size - 1]
+    for piece in pieces:
+        extremes.append(piece[0] + values[piece].argmin())
+        extremes.append(piece[0] + values[piece].argmax())
+    at = np.unique(extremes)
     return np.stack([time[at], values[at]])
 
 
-# Of a time: a place that moves by less has been found, but for rounding.
-_STILL: Final = 8 * float(np.finfo(np.float64).eps)
-HALVINGS: Final = 50  # to rounding
-
-
 class Roots(NamedTuple):
-    """What is left of the brackets: ``within`` on the side that was asked about, ``beyond`` on the other, ``at``."""
+    """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, the root ``at``."""
 
     within: Samples
     beyond: Samples
@@ -375,18 +367,19 @@ def narrow(
     slope: Callable[[Samples], Samples] | None = None,
     steps: int = HALVINGS,
 ) -> Roots:
-    """Narrow brackets about the places where ``inside`` turns from positive to not.
+    """Narrow brackets around the roots at which ``inside`` changes from positive to not positive.
 
     Parameters
     ----------
     inside : callable
-        Positive at ``within`` and not at ``beyond``, an array for an array; true and false serve too.
+        Positive at ``within`` and not at ``beyond``, an array for an array; it may return booleans.
     within, beyond : array
         Ends of the brackets, in either order.
     slope : callable, optional
-        Derivative of ``inside``, which is then a smooth function: Newton's steps are taken where they stay inside of
-        their bracket, and each place stays once it hardly moves, whatever other places are looked for beside it.
+        Derivative of a smooth ``inside``: Newton steps are used if they stay within their bracket, and each root stays
+        once it has converged, so that it does not depend on the other roots searched with it.
     steps : int
+        Largest number of steps.
         At most.
 
     Examples
@@ -395,11 +388,13 @@ def narrow(
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """
-    at, still = (within + beyond) / 2, np.zeros(np.shape(within), dtype=bool)
+    at = (within + beyond) / 2
+    still = np.zeros(np.shape(within), dtype=bool)
     for _ in range(steps):
         value = inside(at)
         good = value > 0
-        within, beyond = np.where(good, at, within), np.where(good, beyond, at)
+        within = np.where(good, at, within)
+        beyond = np.where(good, beyond, at)
         following = (within + beyond) / 2
         if slope is not None:
             rise = slope(at)

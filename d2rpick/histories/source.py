@@ -1,4 +1,4 @@
-"""Where the bytes of a history come from: files, folders, globs, standard input."""
+"""The files of a history and their bytes: files, folders, globs, standard input."""
 
 from __future__ import annotations
 
@@ -20,22 +20,25 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# Files of LS-DYNA's d3 family, with the name of the job and the number in the family, if any.
+# File names of LS-DYNA's d3 families, with the job name before and the number in the family after them.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
-# Files of forces, which count beside those that hold energies.
+# File names of force listings, which are used next to files with energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
-_BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
-# Files of a folder often share their suffix, and have it in common with any name that has it.
+_BLOCK = 1 << 16  # packed bytes unpacked at a time, which become 68 MB at most
+# Least similarity of a file name that is suggested; names with the same suffix are similar already.
 _LIKENESS = 0.8
-_NUMBER = r"\d+\.?\d*|\.\d+"  # compiled where it is needed, as the next one
+_NUMBER = r"\d+\.?\d*|\.\d+"
+
+# A name and the number of the leg after it: runT01, binout0001, glstat02; the first leg may have no number.
+_NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
 class Source(NamedTuple):
-    """The unpacked bytes of one file, those of a big one still on its disk, under the name the user gave it.
+    """The unpacked bytes of one file (a large file stays on disk), under the name that the user gave it.
 
-    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked of ``packed``.  ``by_pattern`` is
-    True if a pattern matched the file, and nobody named it.
+    ``cut`` is True if packed data ends early: ``data`` is what could be unpacked of ``packed``. ``by_pattern`` is
+    True if a pattern or folder matched the file, rather than its name.
     """
 
     name: str
@@ -45,99 +48,97 @@ class Source(NamedTuple):
     by_pattern: bool = False
 
     def sha256(self) -> str:
-        """SHA-256 of the bytes that were read, as they lay on the disk or came in by standard input.
+        """Return the SHA-256 of the bytes that were read, before they were unpacked.
 
-        ChangedError where a big file was written anew since.
+        Raises ChangedError if a large file was rewritten since.
         """
-        read = self.data if self.packed is None else self.packed
-        if not isinstance(read, bytes):
-            return read.sha256()
+        raw = self.data if self.packed is None else self.packed
+        if not isinstance(raw, bytes):
+            return raw.sha256()
         import hashlib
 
-        return hashlib.sha256(read).hexdigest()
+        return hashlib.sha256(raw).hexdigest()
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
-    """Replace folders and globs by the files they hold, without changing the order otherwise.
+    """Replace folders and globs by their files, and keep the order otherwise.
 
-    Of a folder only the databases of solvers count, and they must be of one run.
+    Of a folder only databases of solvers are used, and they must belong to one run.
 
     Raises
     ------
     FormatError
-        If a folder or glob holds none, or a folder the T01 files of several runs.
+        If a folder or glob has none, or a folder the T01 files of several runs.
     """
     return tuple(dict.fromkeys(file for name in names for file in _files(name)))
 
 
 def open_files(names: Sequence[str]) -> list[Source]:
-    """Read the files of one run, as `expand` gives them and `open_source` reads them.
+    """Read the files of one run: `expand` finds them, `open_source` reads them.
 
     Raises
     ------
     FormatError
-        If one cannot be read, or one of several was replaced or cut meanwhile: they may be of two runs.
+        If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    apart = _of_families(files)  # what is read of them is checked when it is
-    before = {name: _state(name) for name in files if name not in apart}
-    given = {
-        *names,
-        *(file for name in names if not _is_pattern(name) for file in _files(name)),
-    }
-    opened = (apart[name] if name in apart else open_source(name) for name in files)
-    sources = [
-        source._replace(by_pattern=source.name not in given) for source in opened
-    ]
-    for name, state in before.items():
+    families = _of_families(files)  # checked whenever they are read
+    states_before = {name: _state(name) for name in files if name not in families}
+    named_files = {*names}
+    for name in names:
+        if not _is_pattern(name):
+            named_files.update(_files(name))
+    sources = []
+    for name in files:
+        source = families[name] if name in families else open_source(name)
+        sources.append(source._replace(by_pattern=source.name not in named_files))
+    for name, state in states_before.items():
         now = _state(name)
-        if len(files) > 1 and not (
-            now.continues(state) if now and state else now is state
-        ):
-            found = f"{name}: this file was replaced or written anew while the others of its run were opened"
-            raise FormatError(f"{found}; read them again when they are complete")
+        is_unchanged = now.continues(state) if now and state else now is state
+        if len(files) > 1 and not is_unchanged:
+            raise FormatError(
+                f"{name}: this file was replaced or written anew while the others of its run were opened; "
+                "read them again when they are complete"
+            )
     return sources
 
 
 def _of_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open those of the files of which little is read, by their names."""
+    """Open the files of families by name, of which little is read."""
     family = re.compile(_FAMILY)
-    found = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
+    in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
     try:
         sources = {
             name: Source(name, data)
-            for name, data in zip(found, scattered(found), strict=True)
+            for name, data in zip(in_families, scattered(in_families), strict=True)
         }
     except OSError as error:
         raise _unread(error.filename, error) from None
     for name, source in sources.items():
-        if (
-            not source.data and not name[-1].isdigit()
-        ):  # a solver opens the next file before it writes a state
+        # a later file may be empty: a solver opens it before it writes a state
+        if not source.data and not name[-1].isdigit():
             raise _empty(name)
     return sources
 
 
 def _state(name: str) -> FileState | None:
-    """State of a file; None of what is none."""
+    """Return the state of a regular file; None for anything else."""
     try:
-        found = os.stat(name)  # noqa: PTH116  start-up
+        status = os.stat(name)  # noqa: PTH116  start-up
     except (OSError, ValueError):
         return None
-    return (
-        FileState.of_stat(found)
-        if stat.S_ISREG(found.st_mode) and name != STDIN
-        else None
-    )
+    if name == STDIN or not stat.S_ISREG(status.st_mode):
+        return None
+    return FileState.of_stat(status)
 
 
 def open_source(name: str) -> Source:
-    """Read a file, or standard input for ``-``; what is gzipped is unpacked.
+    """Read a file, or standard input for ``-``; unpack gzip data.
 
     Raises
     ------
     FormatError
-        If there is nothing to be read under this name.
+        If there is nothing to read under this name.
     """
     data = _read_stdin() if name == STDIN else _read_file(name)
     source = _unpacked(name, data) if data[:2] == _GZIP else Source(name, data)
@@ -147,11 +148,13 @@ def open_source(name: str) -> Source:
 
 
 def _empty(name: str) -> FormatError:
+    """Return the error for an empty file."""
     return FormatError(f"{name}: the file is empty; has the run been started?")
 
 
 def _files(name: str) -> Sequence[str]:
-    # os.path, not pathlib: start-up
+    """Return the files of a name: a file with the later files of its family, or those of a folder or pattern."""
+    # os.path instead of pathlib, for start-up
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113
         return [name, *_behind(name)]
     from pathlib import Path
@@ -159,78 +162,80 @@ def _files(name: str) -> Sequence[str]:
     path = Path(name)
     try:
         is_folder = path.is_dir()
-    except OSError:  # a name too long; what is wrong with it shows when it is opened
+    except OSError:  # a name too long is reported when it is opened
         return [name]
     if is_folder:
         return _databases(path)
     if _is_pattern(name):
-        found = sorted(
-            str(file)
-            for file in Path(path.anchor).glob(name.removeprefix(path.anchor))
-            if file.is_file()
-        )
-        if not found:
+        pattern = name.removeprefix(path.anchor)
+        matches = Path(path.anchor).glob(pattern)
+        files = sorted(str(file) for file in matches if file.is_file())
+        if not files:
             raise FormatError(f"{name}: no file matches; check the name and the folder")
-        return found
+        return files
     return [name]
 
 
 def _is_pattern(name: str) -> bool:
+    """Return True if a name contains a wildcard."""
     return any(sign in name for sign in "*?[")
 
 
 def _behind(name: str) -> Sequence[str]:
-    """Find the files behind the first one of a family, in their order: who names that one means all."""
+    """Return the later files of a family in their order: the name of its first file stands for all."""
     folder, first = os.path.split(name)
     match = re.fullmatch(_FAMILY, first)
     if match is None or match["number"]:
         return []
     try:
-        beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  start-up
     except OSError:
         return []
-    numbers = {
-        name: number
-        for name in beside
-        if (number := number_in_family(name, first)) is not None
-    }
+    numbers: dict[str, int] = {}
+    for sibling in siblings:
+        number = number_in_family(sibling, first)
+        if number is not None:
+            numbers[sibling] = number
     in_order = sorted(numbers, key=numbers.__getitem__)
-    return [os.path.join(folder, name) for name in in_order]  # noqa: PTH118
+    return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118
 
 
 def _databases(folder: Path) -> list[str]:
-    found = {file: run for file in sorted(folder.iterdir()) if (run := _run_of(file))}
-    if not found:
+    """Return the databases of solvers in a folder; raise FormatError unless they belong to one run."""
+    runs_of_files = {file: _run_of(file) for file in sorted(folder.iterdir())}
+    databases = {file: run for file, run in runs_of_files.items() if run}
+    if not databases:
         inner = any(map(_run_of, folder.glob("*/*")))
-        cure = (
-            f"its folders are runs: give one, or all to study as '{folder}/*'"
-            if inner
-            else "give the file"
-        )
+        cure = "give the file"
+        if inner:
+            cure = f"its folders are runs: give one, or all to study as '{folder}/*'"
         raise FormatError(
             f"{folder}: no glstat, matsum, binout, d3plot or T01 in this folder; {cure}"
         )
-    runs = sorted({*found.values()})
+    runs = sorted({*databases.values()})
     if len(runs) > 1:
-        what = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
-        raise FormatError(f"{what}; name the files of one")
-    return [str(file) for file in found]
+        problem = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
+        raise FormatError(f"{problem}; name the files of one")
+    return [str(file) for file in databases]
 
 
 def _run_of(file: Path) -> str:
-    """Say to which run a file belongs that has the name of a solver's database; nothing of any other."""
+    """Return the run to which a file belongs by the name of a solver's database; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
-    for one in READERS.values():
-        match = re.fullmatch(rf"{one.files}(?:\.gz)?", file.name) if one.files else None
+    for listed in READERS.values():
+        if not listed.files:
+            continue
+        match = re.fullmatch(rf"{listed.files}(?:\.gz)?", file.name)
         if match and file.is_file():
-            return (
-                f"{match['root']}T01" if match.groupdict() else f"one of {one.solver}"
-            )
+            if match.groupdict():
+                return f"{match['root']}T01"
+            return f"one of {listed.solver}"
     return ""
 
 
 def _read_stdin() -> bytes:
+    """Return the bytes of standard input."""
     if sys.stdin is None:
         raise FormatError(f"{STDIN}: standard input is closed; give a file")
     try:
@@ -242,6 +247,7 @@ def _read_stdin() -> bytes:
 
 
 def _read_file(name: str) -> bytes | OnDisk:
+    """Return the content of a file; raise FormatError if it cannot be read."""
     try:
         return stored(name)
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
@@ -249,6 +255,7 @@ def _read_file(name: str) -> bytes | OnDisk:
 
 
 def _unread(name: str, error: OSError | ValueError) -> FormatError:
+    """Return the error for a file that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return FormatError(
             f"{name}: no such file{_meant(name)}; check the name and the folder"
@@ -260,29 +267,30 @@ def _unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _meant(name: str) -> str:
-    """Ask for the file beside it that has nearly this name, or whether it is a time."""
+    """Return a question for a similar file name in the folder, or a hint if the name is a time; empty if neither."""
     seconds = in_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
-        value = "" if seconds is None else f", {seconds:g} where it is s"
+        value = "" if seconds is None else f", {seconds:g} if that unit is s"
         return (
             f", and a time is given as `td`, a number in the unit of the record{value}"
         )
     folder, wanted = os.path.split(name)
     try:
-        beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  start-up
     except OSError:
         return ""
-    return near_miss(wanted, beside, _LIKENESS)
+    return near_miss(wanted, siblings, _LIKENESS)
 
 
 def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack what there is, within the bounds."""
+    """Unpack gzip data, as far as they are whole, within the bounds of memory."""
     import zlib
 
     data = bytes(packed)
     try:
         if len(data) * bound("RATIO") > bound("UNPACKED"):
-            _pieces(name, data, keep=False)  # before memory is taken for it
+            # check the size before memory is used for the data
+            _pieces(name, data, keep=False)
         pieces, cut = _pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
     except zlib.error as error:
@@ -296,56 +304,51 @@ def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
 
 
 def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes], bool]:
-    """Unpack files packed one behind the other; whether the last of them is cut."""
+    """Unpack gzip files that follow each other; return their pieces, and True if the last file is cut."""
     import zlib
 
-    found, size, unpacker = (
-        list[bytes](),
-        0,
-        zlib.decompressobj(wbits=31),
-    )  # 31: the gzip format
+    pieces: list[bytes] = []
+    size = 0
+    unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
-        rest = packed[end - _BLOCK : end]
-        while rest:
+        unread = packed[end - _BLOCK : end]
+        while unread:
             if unpacker.eof:
-                if not _GZIP.startswith(rest[:2]):
-                    return found, False
+                if not _GZIP.startswith(unread[:2]):
+                    return pieces, False
                 unpacker = zlib.decompressobj(wbits=31)
-            piece = unpacker.decompress(rest)
-            found += [piece] * keep
+            piece = unpacker.decompress(unread)
+            if keep:
+                pieces.append(piece)
             size += len(piece)
             if too_much := unpacked_beyond(end, size):
                 raise FormatError(f"{name}: its packed data become {too_much}")
-            rest = unpacker.unused_data
-    return found, not unpacker.eof
-
-
-# A name and the number of the leg behind it: runT01, binout0001, glstat02; the first leg may have none.
-_NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
+            unread = unpacker.unused_data
+    return pieces, not unpacker.eof
 
 
 def later_legs(names: Sequence[str]) -> list[str]:
-    """Find the files beside these that are named alike but for a higher number at the end, and were not named."""
-    from pathlib import Path  # not above: start-up
+    """Return the files in the folders of these files with the same name and a higher number that were not named."""
+    from pathlib import Path  # imported here for start-up
 
-    found: list[str] = []
+    legs: list[str] = []
     for name in names:
         path = Path(name)
         stem, number = _split(path.name)
         try:
-            beside = sorted(path.parent.iterdir())
+            siblings = sorted(path.parent.iterdir())
         except OSError:
             continue
-        found += [
-            str(one)
-            for one in beside
-            if _split(one.name)[0] == stem and _split(one.name)[1] > number
-        ]
-    named = {str(Path(name)) for name in names}
-    return [name for name in dict.fromkeys(found) if name not in named]
+        for sibling in siblings:
+            sibling_stem, sibling_number = _split(sibling.name)
+            if sibling_stem == stem and sibling_number > number:
+                legs.append(str(sibling))
+    given = {str(Path(name)) for name in names}
+    return [leg for leg in dict.fromkeys(legs) if leg not in given]
 
 
 def _split(name: str) -> tuple[str, int]:
+    """Split a file name into its stem and the number of the leg, 0 without a number."""
     match = _NUMBERED.fullmatch(name)
     assert match is not None  # it matches any text
     return match[1], int(match[2] or 0)

@@ -1,4 +1,4 @@
-"""What is known of forces from outside on the parts of a run, from elsewhere than its files: from its deck."""
+"""The forces from outside on the parts of a run: gravity, supports and imposed motions, as the deck defines them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Support(NamedTuple):
-    """A support or an imposed motion, by name and place, that acts from ``start`` to ``end`` [time]."""
+    """A support or a prescribed motion, by name and place, that acts from ``start`` to ``end`` [time]."""
 
     name: str
     start: float = 0.0
@@ -24,10 +24,11 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
-    """What acts on each part from outside, by number; on the whole model by None.
+    """What acts from outside on each part, by part id, and on the whole model, by None.
 
-    ``gravity`` has the accelerations that it may have [length/time^2], 0 where there is a time without; of a part
-    that is not in it they are not known.  ``bodies`` gives the parts that hang together, none where that is not known.
+    ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
+    accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if
+    they are unknown.
     """
 
     gravity: Mapping[int | None, tuple[float, ...]] = field(default_factory=dict)
@@ -35,38 +36,40 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Accelerations that gravity may have for some parts together, or the model; None where they are not known."""
-        known = {self.gravity.get(number) for number in _numbers(parts)}
-        return known.pop() if len(known) == 1 else None
+        """Return the possible accelerations of some parts together, or of the model; None if they are unknown."""
+        accelerations = {self.gravity.get(number) for number in _numbers(parts)}
+        return accelerations.pop() if len(accelerations) == 1 else None
 
     def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
-        """What holds some of these parts, or the model."""
-        return tuple(
-            one for number in _numbers(parts) for one in self.supports.get(number, ())
-        )
+        """Return the supports of some parts, or of the model."""
+        supports: list[Support] = []
+        for number in _numbers(parts):
+            supports += self.supports.get(number, ())
+        return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
-        """Say what holds some of these parts, or the model, at a time; None where nothing does."""
+        """Return a sentence on what holds some of these parts, or the model, at a time; None if nothing does."""
         for number in _numbers(parts):
-            for one in self.supports.get(number, ()):
-                if one.start <= time <= one.end:
-                    who = "the model" if number is None else f"part {number}"
-                    return f"{who} is held or moved by {one.name}: it does not fly"
+            for support in self.supports.get(number, ()):
+                if support.start <= time <= support.end:
+                    subject = "the model" if number is None else f"part {number}"
+                    return (
+                        f"{subject} is held or moved by {support.name}: it does not fly"
+                    )
         return None
 
     def free(
         self, parts: Iterable[Part] | None, time: float
     ) -> tuple[float, float] | None:
-        """Give the time around ``time`` in which nothing holds these parts, or the model; None where something does."""
+        """Return the interval around ``time`` in which nothing holds these parts, or the model; None if it is held."""
         start, end = -inf, inf
-        for one in self.supports_of(parts):
-            if one.start <= time <= one.end:
+        for support in self.supports_of(parts):
+            if support.start <= time <= support.end:
                 return None
-            start, end = (
-                (max(start, one.end), end)
-                if one.end < time
-                else (start, min(end, one.start))
-            )
+            if support.end < time:
+                start = max(start, support.end)
+            else:
+                end = min(end, support.start)
         return start, end
 
 
@@ -74,4 +77,5 @@ UNKNOWN = Surroundings()
 
 
 def _numbers(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
+    """Return the ids of some parts; None stands for the model."""
     return (None,) if parts is None else tuple(part.id for part in parts)

@@ -1,4 +1,4 @@
-"""Forces of contacts among the columns of a table, known by their names."""
+"""Contact forces in the columns of a table, recognised by the column names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from d2rpick.histories.formats import READERS
 if TYPE_CHECKING:
     from d2rpick.histories.database import Legs
 
-# What columns of contact forces are called in tables, beside FNX and so on of Radioss; compiled where they are needed.
+# Words in the names of contact forces in tables; Radioss names them FNX and so on.
 _TOUCHING: Final = (
     r"(?:contact|interface|wall|rcforc|rwforc|ground|barrier|impact(?:or)?)"
 )
@@ -22,10 +22,10 @@ _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
 def forces_of(database: Legs) -> tuple[ContactForce, ...]:
-    """Give the forces of a database; those of a table are columns whose names speak of them, each by itself."""
+    """Return the forces of a database; in a table each column whose name says contact force is one."""
     if READERS[database.format].solver:
         return database.contact_forces
-    named = [
+    names = [
         name
         for name in database.channels
         if re.search(_OF_CONTACT, name) and not re.search(_NO_FORCE, name)
@@ -34,5 +34,5 @@ def forces_of(database: Legs) -> tuple[ContactForce, ...]:
         ContactForce.of_changes(
             repr(name), database.time, database.channel(name)[:, np.newaxis]
         )
-        for name in named
+        for name in names
     )

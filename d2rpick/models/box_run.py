@@ -1,4 +1,4 @@
-"""Runs of the box from start to end, switched or not, what is recorded of them, and scans over tr."""
+"""Runs of the box from start to end, switched or not, their records, and scans over tr."""
 
 from __future__ import annotations
 
@@ -24,23 +24,31 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# States that are worked out together: for a single one, calling numpy takes longer than what it does.
+# Number of states whose results are computed together: for a single one, calling numpy would take most of the time.
 _BLOCK: Final = 256
+
+# Default output interval [s]: 25 states in a period of a 400 Hz mode, and not much longer than a time step.
+INTERVAL = 1e-4
+# Limit of time steps, which take some minutes; more are hardly intended.
+MOST_STEPS = 5_000_000
+# Distance between the times of a scan [s] while the load may last and after it, and of the last one before td.  In the
+# flight the energy vibrates at 40 Hz, twice the lowest mode: six times in each period resolve it.
+_FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
 class Record(NamedTuple):
     """States of a run over ``time`` (n,); SI units, vectors x + i z.
 
-    Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s] by
-    the angular momentum.  Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2).  Of the
-    whole: ``external_work``, ``friction_energy``, ``wall_energy``, ``damping_energy`` and ``lost_energy`` at tr, each
-    since time 0 (n,).  ``outline`` of the box (n, points), ``mass`` of box and step.
-    ``released``: the sled pushed last before the first of ``landings``, None if it never did; these are the times from
-    when to when the ground pushed.  ``dt`` is the step [s], ``bar_updates`` and ``seconds`` are what the run cost.
+    Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s]
+    from the angular momentum. Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2). Of
+    the whole: ``external_work``, ``friction_energy``, ``wall_energy``, ``damping_energy`` and ``lost_energy`` at tr,
+    each since time 0 (n,). ``outline`` of the box (n, points), ``mass`` of box and step. ``released`` is the time at
+    which the sled pushed last before the first of ``landings``, None if it never did; ``landings`` are the intervals
+    in which the ground pushed. ``dt`` is the time step [s]; ``bar_updates`` and ``seconds`` are the cost of the run.
 
-    Friction is what a solver counts as energy of its contacts.  Floor, curb and ground are softer than the box and
-    yield by centimetres; a solver would model them as rigid walls, as springs or as parts of their own, and so what is
-    stored in them and what crushing the cushion takes is kept apart from the contacts.
+    Friction is what a solver reports as contact energy. Floor, curb and ground are softer than the box and yield by
+    centimetres; a solver would model them as rigid walls, springs or separate parts, so the energy stored in them and
+    dissipated by the cushion is kept apart from the contacts.
     """
 
     time: Values
@@ -66,20 +74,20 @@ class Record(NamedTuple):
 
     @property
     def landed(self) -> float | None:
-        """When the ground pushed first [s]."""
+        """Time at which the ground first pushed [s]; None if it never did."""
         return self.landings[0][0] if self.landings else None
 
     @property
     def total_energy(self) -> Values:
-        """What energy is there or was spent, as a solver sums it up: without what was lost at tr (n,) [J]."""
-        there = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
+        """Present and dissipated energy (n,) [J], as a solver adds it up: without the energy lost at tr."""
+        present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
-            there + self.friction_energy + self.wall_energy + self.damping_energy
+            present + self.friction_energy + self.wall_energy + self.damping_energy
         )
 
     @property
     def energy_ratio(self) -> Values:
-        """Total energy over that of the start and the work done; 1 where both are 0 (n,) [-]."""
+        """Total energy over initial energy plus external work (n,) [-]; 1 if both are 0."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
         return np.asarray(
             np.divide(
@@ -92,7 +100,7 @@ class Record(NamedTuple):
 
     @property
     def imbalance(self) -> Values:
-        """Energy that came from nowhere, over the largest total energy (n,) [-]."""
+        """Error of the energy balance over the largest total energy (n,) [-]."""
         total = self.total_energy + self.lost_energy
         return np.asarray(
             (total - total[0] - self.external_work + self.external_work[0])
@@ -101,7 +109,7 @@ class Record(NamedTuple):
 
 
 class Recorder:
-    """Collects states of a ``motion`` up to its step ``last``."""
+    """Collects states of a ``motion`` up to its time step ``last``."""
 
     def __init__(self, motion: Motion, last: int) -> None:
         self._motion, self._began, self._updates = (
@@ -126,8 +134,10 @@ class Recorder:
         ]
 
     def note(self, mean: Plane) -> None:
-        """Note the state of the motion, with the velocities ``mean`` (n,) [m/s] over the step around it."""
-        motion, accounts, at = self._motion, self._motion.accounts, self._next % _BLOCK
+        """Store the state of the motion, with the velocities ``mean`` (n,) [m/s] over the time step around it."""
+        motion = self._motion
+        accounts = self._motion.accounts
+        at = self._next % _BLOCK
         self._places[at], self._means[at] = motion.places, mean
         self._rests[0][at], self._rests[1][at] = motion.box.rest, motion.step.rest
         self._reals[self._next] = (
@@ -139,35 +149,39 @@ class Recorder:
             self._work_out()
 
     def _work_out(self) -> None:
-        """Work out the states noted since the last block was full."""
+        """Compute the results of the states stored since the last block was full."""
         count = (self._next - 1) % _BLOCK + 1
-        states, s = slice(self._next - count, self._next), self._motion.structure
-        n, places, means = s.of_box, self._places[:count], self._means[:count]
-        momenta, arms = s.masses * means, self._arms(places)
+        states = slice(self._next - count, self._next)
+        s = self._motion.structure
+        n = s.of_box
+        positions = self._places[:count]
+        means = self._means[:count]
+        momenta = s.masses * means
+        arms = self._arms(positions)
         kinetic = (np.conj(means) * momenta).real / 2
-        of_box, of_step = momenta[:, :n].sum(axis=1), momenta[:, n:].sum(axis=1)
+        of_box = momenta[:, :n].sum(axis=1)
+        of_step = momenta[:, n:].sum(axis=1)
         spin = (np.conj(arms) * momenta[:, :n]).imag.sum(axis=1)
         reals = self._reals[states].T
         reals[1] = np.angle(np.conj(arms) @ self._start)
         reals[2] = -spin / (np.abs(arms) ** 2 @ self._box_masses)
-        for place, (bars, rest) in enumerate(
-            zip((self._motion.box, self._motion.step), self._rests, strict=True)
-        ):
-            reals[3 + place] = bars.internal_energy(
-                places, rest[:count], reals[3 + place]
-            )
+        trusses = zip((self._motion.box, self._motion.step), self._rests, strict=True)
+        for row, (bars, rest) in enumerate(trusses, start=3):
+            reals[row] = bars.internal_energy(positions, rest[:count], reals[row])
         reals[5], reals[6] = kinetic[:, :n].sum(axis=1), kinetic[:, n:].sum(axis=1)
-        centre = places[:, 0] - arms[:, 0]
+        centre = positions[:, 0] - arms[:, 0]
         self._planes[states] = np.stack(
             [centre, of_box / self._box_mass, of_box, of_step], axis=1
         )
-        self._outline[states] = places[:, : n // 2]
+        self._outline[states] = positions[:, : n // 2]
 
     def record(self) -> Record:
-        """Give what was collected; RangeError where a number is not finite."""
+        """Return the collected states; raise RangeError if a number is not finite."""
         if self._next % _BLOCK:
             self._work_out()
-        motion, real, plane = self._motion, self._reals.T, self._planes.T
+        motion = self._motion
+        real = self._reals.T
+        plane = self._planes.T
         if not (np.isfinite(real).all() and np.isfinite(plane).all()):
             raise RangeError(
                 "the motion of the box becomes infinite: these parameters are beyond what the model can do"
@@ -198,22 +212,17 @@ class Recorder:
             seconds=perf_counter() - self._began,
         )
 
-    def _arms(self, places: Plane) -> Plane:
-        """From the centre of mass of the box to its points, of the shape (..., points of the box) [m]."""
-        of_box = places[..., : self._box_masses.size]
+    def _arms(self, positions: Plane) -> Plane:
+        """Return the vectors from the centre of mass of the box to its points, shape (..., points of the box) [m]."""
+        of_box = positions[..., : self._box_masses.size]
         return np.asarray(
             of_box - (of_box @ self._box_masses / self._box_mass)[..., np.newaxis]
         )
 
 
 def _updates(motion: Motion) -> int:
+    """Return how many bar forces were computed so far."""
     return motion.box.evaluations + motion.step.evaluations
-
-
-# States are given out in this time [s]: 25 of them for a mode of 400 Hz, and a step is not much shorter.
-INTERVAL = 1e-4
-# Some minutes; what asks for more was hardly meant.
-MOST_STEPS = 5_000_000
 
 
 @dataclass(frozen=True)
@@ -236,9 +245,9 @@ def simulate(
     *windows: RigidWindow,
     interval: float = INTERVAL,
 ) -> Record:
-    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s].
+    """Compute a run from 0 to ``t_end`` with a state every ``interval`` [s].
 
-    RangeError when it takes too many steps, or when ``windows`` overlap or are not in order.
+    Raises RangeError if it takes too many time steps, or if ``windows`` overlap or are not in order.
 
     Examples
     --------
@@ -247,35 +256,31 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    with np.errstate(
-        over="ignore"
-    ):  # the number of steps tells whether it can be computed
+    # an overflow shows in the number of time steps below
+    with np.errstate(over="ignore"):
         motion = Motion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
         raise RangeError(
             f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars"
         )
-    for one, following in pairwise(windows):
-        if not one.td < following.tr:
+    for window, following in pairwise(windows):
+        if not window.td < following.tr:
             raise RangeError(
-                f"the window from tr {following.tr:g} begins before the one up to td {one.td:g} is over"
+                f"the window from tr {following.tr:g} begins before the one up to td {window.td:g} is over"
             )
     return proceed(motion, t_end, *windows)
 
 
 def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
-    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``windows``.
+    """Continue ``motion`` to ``t_end`` [s], switching at the first time step at or after the times of ``windows``.
 
-    RangeError when its numbers become infinite.
+    Raises RangeError if its numbers become infinite.
     """
     last = motion.every * (motion.step_at(t_end) // motion.every)
-    rigid, deformable = (
-        {motion.step_at(one.tr) for one in windows},
-        {motion.step_at(one.td) for one in windows},
-    )
-    with np.errstate(
-        over="ignore", invalid="ignore", divide="ignore"
-    ):  # the record tells whether it went well
+    rigid = {motion.step_at(window.tr) for window in windows}
+    deformable = {motion.step_at(window.td) for window in windows}
+    # infinite numbers are refused by the recorder
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
             if motion.count in rigid:
@@ -291,14 +296,14 @@ def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
 
 
 def run_to(motion: Motion, time: float) -> None:
-    """Go on, without switching, to the first step at or after ``time`` [s]."""
+    """Continue a motion, without switching, to the first time step at or after ``time`` [s]."""
     for _ in range(motion.step_at(time) - motion.count):
         motion.advance()
         motion.move()
 
 
 def history_of(record: Record) -> History:
-    """Give the energy of the box, with the momenta of both parts."""
+    """Return the history of the energy of the box, with the momenta of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
     momentum = np.stack(
         [record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2
@@ -315,17 +320,13 @@ def history_of(record: Record) -> History:
     )
 
 
-# Between the times of a scan [s], while the load may last and then; and how long before td the last one is.  In the
-# flight the energy swings at 40 Hz, twice the lowest mode: six times in each swing show it as it is.
-_FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
-
-
 class Outcome(NamedTuple):
-    """One switched run against the reference run.
+    """One switched run compared with the reference run.
 
-    ``energy`` [J]: of the box at tr, what is locked in; ``energy_ratio``: over that at td.  At td: ``roll_error``
-    [degrees], ``x_error``, ``z_error`` [m] of the centre of mass, ``omega_error`` [rad/s].  ``lost_energy`` [J] of the
-    vibration at tr.  ``mean_ratio``: mean energy of the box from td to the landing, over that of the reference.
+    ``energy`` [J] of the box at tr, which is locked in; ``energy_ratio`` of it to the energy at td. At td:
+    ``roll_error`` [degrees], ``x_error``, ``z_error`` [m] of the centre of mass, ``omega_error`` [rad/s].
+    ``lost_energy`` [J] of the vibration at tr. ``mean_ratio`` of the mean energy of the box from td to the landing to
+    that of the reference.
     """
 
     tr: float
@@ -340,9 +341,9 @@ class Outcome(NamedTuple):
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Times for tr: closest until half as long again after the load, then close enough for the vibration, up to td [s].
+    """Return times for tr up to td [s]: dense until 1.5 times the end of the load, then dense enough for the vibration.
 
-    RangeError when td leaves no time for any.
+    Raises RangeError if td leaves no time for tr.
     """
     dense = min(1.5 * released, td - _LAST)
     if not dense > _FINE:
@@ -356,7 +357,7 @@ def scan_times(released: float, td: float) -> list[float]:
 
 
 def comparison_end(reference: Record, td: float) -> float:
-    """When the landing, or the record, ends the comparison after ``td`` [s]; RangeError when td is not before."""
+    """Return when the comparison after ``td`` ends [s]: at the landing or with the record; RangeError from then on."""
     end = float(reference.time[-1]) if reference.landed is None else reference.landed
     if not td < end:
         raise RangeError(f"td {td:g} is not before the end of the flight at {end:g}")
@@ -370,10 +371,10 @@ def scan(
     td: float,
     jobs: int | None = None,
 ) -> Iterator[Outcome]:
-    """Compute a switched run for each of ``times``; give outcomes in the order of tr as they are ready.
+    """Yield the outcome of a switched run for each of ``times``, in the order of tr.
 
-    All runs are the reference until their tr, so that is computed once; then ``jobs`` processes share them (None: one
-    for each core; 1: this one).
+    All runs are the reference until their tr, so that part is computed once; then ``jobs`` processes share the runs
+    (None: one for each core; 1: this one).
     """
     end = comparison_end(reference, td)
     ready: dict[int, Record] = {}
@@ -395,40 +396,42 @@ def scan(
 def _branches(
     motion: Motion, times: Iterable[float], td: float, end: float
 ) -> Iterator[tuple[Motion, float, RigidWindow]]:
-    """Advance the reference from one tr to the next, and leave a copy of it at each."""
+    """Yield, for each tr, a copy of the reference run advanced to it, the end of the run, and its window."""
     for tr in times:
         run_to(motion, tr)
         yield motion.copy(), end, RigidWindow(tr, td)
 
 
 def _switched(branch: tuple[Motion, float, RigidWindow]) -> Record:
+    """Compute the switched run of a branch."""
     return proceed(*branch)
 
 
 def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
-    """Hold a switched run, which may begin at tr, against the reference run at td and from there to the landing."""
+    """Compare a switched run, which may begin at tr, with the reference run at td and from td to the landing."""
     interval = _interval(reference)
-    at, end = round(td / interval), round(comparison_end(reference, td) / interval)
+    at = round(td / interval)
+    end = round(comparison_end(reference, td) / interval)
     begin = round(float(switched.time[0]) / interval)
-    here, there = slice(at, end), slice(at - begin, end - begin)
+    after_td = slice(at, end)
+    after_td_switched = slice(at - begin, end - begin)
     energy = float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
-    way = complex(switched.centre[at - begin] - reference.centre[at])
-    means = [
-        float(run.internal_energy[part, BOX].mean())
-        for run, part in ((switched, there), (reference, here))
-    ]
+    displacement = complex(switched.centre[at - begin] - reference.centre[at])
+    mean = reference.internal_energy[after_td, BOX].mean()
+    mean_switched = switched.internal_energy[after_td_switched, BOX].mean()
     return Outcome(
         tr=tr,
         energy=energy,
         energy_ratio=energy / float(reference.internal_energy[at, BOX]),
         roll_error=float(np.degrees(switched.roll[at - begin] - reference.roll[at])),
-        x_error=way.real,
-        z_error=way.imag,
+        x_error=displacement.real,
+        z_error=displacement.imag,
         omega_error=float(switched.omega[at - begin] - reference.omega[at]),
         lost_energy=float(switched.lost_energy[-1]),
-        mean_ratio=means[0] / means[1],
+        mean_ratio=float(mean_switched) / float(mean),
     )
 
 
 def _interval(record: Record) -> float:
+    """Return the output interval of a record [s]."""
     return float(record.time[1] - record.time[0])

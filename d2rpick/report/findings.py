@@ -180,6 +180,7 @@ def as_sarif(checks: Checks, _: Shown) -> str:
             "id": rule.id,
             "shortDescription": {"text": rule.summary},
             "fullDescription": {"text": rule.explanation},
+            "help": {"text": f"Fix: {rule.fix}"},
             "defaultConfiguration": {"level": _SARIF[rule.severity]},
         }
         for rule in RULES.values()
@@ -356,6 +357,7 @@ def as_text(rule: Rule, width: int) -> str:
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     lines = [tables.wrapped(title, width), "", *wrap(rule.explanation, width)]
+    lines += ["", *wrap(f"Fix: {rule.fix}", width)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_example(title, example, width)]

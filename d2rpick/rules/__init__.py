@@ -1,6 +1,6 @@
-"""Rules of ``check``: one table of all, which of them count, and the function that runs them over a deck.
+"""Rules of ``check``: the table of all rules, the configuration that selects them, and the check of one deck.
 
-They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml; the nearest wins.
+They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml; the nearest file is used.
 """
 
 from __future__ import annotations
@@ -31,11 +31,15 @@ if TYPE_CHECKING:
 
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (
-    one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule)
+    value
+    for module in _MODULES
+    for value in vars(module).values()
+    if isinstance(value, Rule)
 )
-_BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
-_ALIKE: Final = 0.9  # of two ids, one of which has one sign more
-# What follows from one mistake of units is not reported beside it.
+_BY_HISTORY: Final = "D2R2"  # beginning of the ids of rules that need an energy history
+# Least similarity of a suggested rule id to a wrong one, from 0 to 1: they differ by one additional character.
+_ALIKE: Final = 0.9
+# Rules that report consequences of a mistake of units, by the rule that reports the mistake itself.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
@@ -49,26 +53,31 @@ RULES: Final[Mapping[str, Rule]] = {
 
 
 def find_rules(name: str) -> tuple[Rule, ...]:
-    """Rules by id or its beginning; ConfigurationError with the nearest one when there is none.
+    """Return the rules whose id begins with ``name``.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is none; the message names the nearest id.
 
     Examples
     --------
     >>> [rule.id for rule in find_rules("d2r30")]
     ['D2R301', 'D2R302', 'D2R303', 'D2R304', 'D2R305', 'D2R306', 'D2R307']
     """
-    found = tuple(
+    matching = tuple(
         rule for rule in RULES.values() if name and rule.id.startswith(name.upper())
     )
-    if not found:
+    if not matching:
         raise ConfigurationError(f"no rule {name!r}, {_expected_instead(name, RULES)}")
-    return found
+    return matching
 
 
 class Configuration(NamedTuple):
-    """Which rules count, by id or its beginning (``D2R1``), and what weight single rules have.
+    """Rules that are selected, by id or its beginning (``D2R1``), and the severity of single rules.
 
-    ``ignore`` is stronger than ``select``; an empty ``select`` means all.  ``source`` names their file, and ``notes``
-    those that are not used because another user owns them.
+    ``ignore`` overrides ``select``; an empty ``select`` selects all rules. ``source`` is the settings file. ``notes``
+    name settings files that are not used because they belong to another user.
 
     Examples
     --------
@@ -84,66 +93,78 @@ class Configuration(NamedTuple):
     notes: tuple[str, ...] = ()
 
     def selects(self, rule: str) -> bool:
-        """Whether a rule counts."""
+        """Return True if the rule with this id is selected."""
         chosen = not self.select or rule.startswith(self.select)
         return chosen and not (self.ignore and rule.startswith(self.ignore))
 
-    def verify(self, known: Collection[str]) -> None:
-        """Raise ConfigurationError for a rule that does not exist; near misses are named."""
+    def verify(self, rule_ids: Collection[str]) -> None:
+        """Raise ConfigurationError if the configuration names a rule that does not exist; the message names a
+        similar id.
+        """
         where = f"{self.source}: " if self.source else ""
         for name in (*self.select, *self.ignore, *self.severity):
             exact = name in self.severity and name not in (*self.select, *self.ignore)
-            if name in known or (
-                not exact and name and any(rule.startswith(name) for rule in known)
+            if name in rule_ids or (
+                not exact and name and any(rule.startswith(name) for rule in rule_ids)
             ):
                 continue
             raise ConfigurationError(
-                f"{where}no rule {name!r}, {_expected_instead(name, known)}"
+                f"{where}no rule {name!r}, {_expected_instead(name, rule_ids)}"
             )
 
 
-def _expected_instead(name: str, known: Collection[str]) -> str:
-    """What would have been a rule; the nearest one is named."""
+def _expected_instead(name: str, rule_ids: Collection[str]) -> str:
+    """Return the part of an error message that says which rule ids exist, and a similar one if there is one."""
     import difflib
 
-    asked = name.upper()
-    near = [rule for rule in sorted(known) if _signs_apart(rule, asked) == 1]
-    near = near or difflib.get_close_matches(asked, known, n=1, cutoff=_ALIKE)
-    return "an id like D2R101 or its beginning was expected" + (
-        f"; did you mean {near[0]}?" if near else ""
-    )
+    wanted = name.upper()
+    near = [rule for rule in sorted(rule_ids) if _signs_apart(rule, wanted) == 1]
+    near = near or difflib.get_close_matches(wanted, rule_ids, n=1, cutoff=_ALIKE)
+    text = "an id like D2R101 or its beginning was expected"
+    if near:
+        text += f"; did you mean {near[0]}?"
+    return text
 
 
-def _signs_apart(one: str, other: str) -> int:
-    """Number of places at which two texts of one length differ; that length for others."""
-    if len(one) != len(other):
-        return max(len(one), len(other))
-    return sum(a != b for a, b in zip(one, other, strict=True))
+def _signs_apart(first: str, second: str) -> int:
+    """Return the number of characters in which two texts of the same length differ; the longer length for other
+    texts.
+    """
+    if len(first) != len(second):
+        return max(len(first), len(second))
+    return sum(a != b for a, b in zip(first, second, strict=True))
 
 
 def read_configuration(
-    table: Mapping[str, object], source: str = "", others: Collection[str] = ()
+    table: Mapping[str, object], source: str = "", other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Configuration from a table of settings; ConfigurationError names what is wrong with it.
+    """Return the configuration in a table of settings.
 
-    ``others`` are keys that are about something else; tables, one for each command, are too.
+    ``other_keys`` are keys that belong to other commands; so do nested tables, one for each command.
+
+    Raises
+    ------
+    ConfigurationError
+        If a key or value is wrong; the message names it.
     """
     single = [
         key
         for key, value in table.items()
         if key in RULE_KEYS or not isinstance(value, Mapping)
     ]
-    refuse_unknown(single, (*RULE_KEYS, *others), source)
+    refuse_unknown(single, (*RULE_KEYS, *other_keys), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
-        found = f"{source}: severity is {toml_text(severity)}"
+        problem = f"{source}: severity is {toml_text(severity)}"
         raise ConfigurationError(
-            f"{found}, a table like {{D2R104 = 'warning'}} was expected"
+            f"{problem}, a table like {{D2R104 = 'warning'}} was expected"
         )
     for rule, value in severity.items():
         if value not in [*Severity]:
-            found = f"{source}: severity of {rule} is {toml_text(value)}"
-            raise ConfigurationError(f"{found}, one of {', '.join(Severity)} expected")
+            problem = f"{source}: severity of {rule} is {toml_text(value)}"
+            raise ConfigurationError(
+                f"{problem}, one of {', '.join(Severity)} expected"
+            )
     return Configuration(
         _names(table, "select", source),
         _names(table, "ignore", source),
@@ -153,6 +174,7 @@ def read_configuration(
 
 
 def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
+    """Return the list of rule ids under a key."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
@@ -162,9 +184,9 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
 
 
 class CheckedWindow(NamedTuple):
-    """A window without the deck behind it, of which there may be thousands: where the card stands that opens it.
+    """A rigid window without its deck, as there may be thousands: ``place`` is the card that opens it.
 
-    ``cards`` number those that open and close it, None where none closes it.
+    ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     """
 
     unit: Unit
@@ -175,14 +197,15 @@ class CheckedWindow(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """The part; None for a part set or rigid body whose parts cannot be known."""
+        """Return the part id; None for a part set or rigid body whose parts are unknown."""
         return self.unit.part
 
 
 class Checked(NamedTuple):
-    """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
+    """Result of the check of one deck; ``cards`` is the number of its switching cards, ``files`` are all files that
+    were read.
 
-    ``remarks`` tell of comments in the deck that silence nothing, ``notes`` of settings that are not used.
+    ``remarks`` report comments in the deck that silence no rule, ``notes`` report settings that are not used.
     """
 
     deck: str
@@ -196,9 +219,11 @@ class Checked(NamedTuple):
 
 
 def configuration_for(
-    deck: str, asked: Configuration, others: Collection[str] = ()
+    deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Take the configuration nearest to a deck; what was asked for overrules its keys, ``others`` are none of them.
+    """Return the configuration nearest to a deck, with the keys of ``override`` in place of its own.
+
+    ``other_keys`` are keys that belong to other commands.
 
     Raises
     ------
@@ -206,10 +231,15 @@ def configuration_for(
         If it cannot be read, or names a rule that does not exist.
     """
     nearest = nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has none
-    found = read_configuration(nearest.table, nearest.source, others)
-    found.verify(RULES)
-    select, ignore = asked.select or found.select, asked.ignore or found.ignore
-    return found._replace(select=select, ignore=ignore, notes=nearest.notes)
+    nearest_configuration = read_configuration(
+        nearest.table, nearest.source, other_keys
+    )
+    nearest_configuration.verify(RULES)
+    select = override.select or nearest_configuration.select
+    ignore = override.ignore or nearest_configuration.ignore
+    return nearest_configuration._replace(
+        select=select, ignore=ignore, notes=nearest.notes
+    )
 
 
 def check_deck(
@@ -226,13 +256,13 @@ def check_deck(
     path : str
         The main deck; or a file of a Radioss run, which is checked with the others of that run.
     configuration : Configuration, optional
-        Which rules count, and how much; default: all, as they are.
+        Selected rules and their severities; default: all rules as they are.
     judge : HistoryJudge, optional
         Judges the windows by an energy history; without one the energy rules find nothing.
     content : bytes, optional
-        What the deck holds, where it does not lie in a file.
+        Content of the deck, if it is not a file.
     restarts : sequence of str, optional
-        Small restarts of LS-DYNA that go on with its run: their cards switch when they begin.
+        Small restart decks of LS-DYNA that continue the run: their cards switch when the restart begins.
 
     Returns
     -------
@@ -261,7 +291,8 @@ def check_deck(
             finding.rule,
         )
     )
-    windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
+    windows = tuple(_told(case.windows.windows))
+    remarks = tuple(_remarks(case.deck))
     return Checked(
         path,
         windows,
@@ -274,22 +305,25 @@ def check_deck(
 
 
 def _without_what_follows(findings: list[Finding]) -> list[Finding]:
-    """Leave out findings that follow from a mistake of units, or of one time, which another finding reports."""
+    """Return the findings without those that follow from a mistake of units, or of one time, reported by another."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
-    places = {(finding.rule, finding.file, finding.line) for finding in findings}
+    reported_fields = {
+        (finding.rule, finding.file, finding.line) for finding in findings
+    }
     return [
         finding
         for finding in findings
         if finding.rule not in follow
         and not any(
-            (cause, finding.file, finding.line) in places
+            (cause, finding.file, finding.line) in reported_fields
             for cause in _FOLLOW_THERE.get(finding.rule, ())
         )
     ]
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
+    """Yield the windows without their deck."""
     numbers: dict[SwitchSet, int] = {}
     for unit, tr, td, opened, closed in windows:
         opening = numbers.setdefault(opened.by, len(numbers))
@@ -301,22 +335,25 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
 def _rules_for(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
-    """Give the rules that count, and look at decks of a solver: there may be thousands of those."""
-    asked = Configuration(select, ignore)
+    """Return the selected rules for a solver; memoised, as there may be thousands of decks."""
+    configuration = Configuration(select, ignore)
     wanted = (
         rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)
     )
     return tuple(
-        rule for rule in wanted if solver in rule.solvers and asked.selects(rule.id)
+        rule
+        for rule in wanted
+        if solver in rule.solvers and configuration.selects(rule.id)
     )
 
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
-    """Apply the rules that count to what they look at; what a comment silences is left out."""
-    solver, silences = case.solver, case.deck.silences
+    """Yield the findings of the selected rules, except those that a comment in the deck silences."""
+    solver = case.solver
+    silences = case.deck.silences
     for rule in _rules_for(solver, *configuration[:2], case.judge is not None):
-        for place, message in rule.check(case):
-            if silences(rule.id, place.file, place.line):
+        for field, message in rule.check(case):
+            if silences(rule.id, field.file, field.line):
                 continue
             severity = Severity(configuration.severity.get(rule.id, rule.severity))
             yield Finding(
@@ -324,16 +361,16 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
                 severity,
                 message,
                 case.deck.path,
-                place.file,
-                place.line,
-                place.column,
+                field.file,
+                field.line,
+                field.column,
             )
 
 
 def _read(
     path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]
 ) -> Case:
-    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck with its restarts."""
+    """Read a deck according to its content: a Radioss run, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
@@ -350,11 +387,11 @@ def _read(
 
 
 def _remarks(deck: Deck) -> Iterator[str]:
-    """Tell of comments that ignore rules that do not exist."""
+    """Yield remarks on comments that ignore rules that do not exist."""
     for card in deck.silencing:
         for name in card.block.silenced:
             if not (
                 name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)
             ):
                 where = f"{card.file}: the comment before line {card.line}"
-                yield f"{where} does not name a rule to ignore: {name!r} was found, {_expected_instead(name, RULES)}"
+                yield f"{where} ignores no rule: found {name!r}, {_expected_instead(name, RULES)}"

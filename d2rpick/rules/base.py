@@ -1,4 +1,4 @@
-"""What every rule of ``check`` looks at, a deck or a run as a case, and what it finds."""
+"""Define the input of a rule (the case: a deck, or a Radioss run) and its output (findings)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.deck.card import Field
 from d2rpick.deck.ls_dyna_parts import (
     Constraint,
     Parts,
@@ -31,7 +32,7 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field, Value
+    from d2rpick.deck.card import Card, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import Run, RunWindows
@@ -46,22 +47,22 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-_BY_FORCE = {1, 2, 3, 4}  # CODE
+_BY_FORCE = {1, 2, 3, 4}  # values of CODE that switch by a force
 
 K = TypeVar("K")
 V = TypeVar("V")
 
 
 def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Gather what has the same key, in the order of the keys."""
-    found: dict[K, list[V]] = {}
+    """Collect the values of each key, in the order in which the keys first occur."""
+    groups: dict[K, list[V]] = {}
     for key, value in pairs:
-        found.setdefault(key, []).append(value)
-    return found
+        groups.setdefault(key, []).append(value)
+    return groups
 
 
 class Severity(StrEnum):
-    """How much a finding weighs; ``error`` is an objection."""
+    """Severity of a finding; with an ``error`` the check fails."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -69,7 +70,7 @@ class Severity(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Return 0 for an error, more for less."""
+        """Return 0 for an error, 1 for a warning, 2 for an info."""
         return list(Severity).index(self)
 
 
@@ -77,7 +78,7 @@ ERROR, WARNING, INFO = Severity
 
 
 class Finding(NamedTuple):
-    """One thing wrong with a deck: ``deck`` is the deck that was checked, ``file`` the file it stands in."""
+    """A problem found in a deck: ``deck`` is the deck that was checked, ``file`` the file that contains the problem."""
 
     rule: str
     severity: Severity
@@ -89,7 +90,7 @@ class Finding(NamedTuple):
 
 
 class Unreadable(NamedTuple):
-    """A deck that could not be checked, and why; ``files`` may belong to it all the same."""
+    """A deck that could not be checked, with the error; ``files`` are the files that nevertheless belong to it."""
 
     deck: str
     error: Exception
@@ -97,72 +98,69 @@ class Unreadable(NamedTuple):
 
     @property
     def code(self) -> str:
-        """That of the warning that tells it."""
+        """Return the code of the warning that reports it."""
         return "unreadable-deck" if isinstance(self.error, FORESEEN) else INTERNAL_ERROR
 
     @property
     def reason(self) -> str:
-        """One line that names the deck."""
-        return (
-            f"{self.deck}: {one_line(self.error)}"
-            if self.code == INTERNAL_ERROR
-            else one_line(self.error)
-        )
+        """Return one line that names the deck and the error."""
+        if self.code == INTERNAL_ERROR:
+            return f"{self.deck}: {one_line(self.error)}"
+        return one_line(self.error)
 
 
 @dataclass(eq=False, repr=False)
 class Case:
-    """A deck as the rules see it; ``judge`` is given when there is an energy history to judge windows by."""
+    """A deck as input of the rules; ``judge`` is set if there is an energy history to judge windows by."""
 
     deck: Deck
     judge: HistoryJudge | None = None
 
     @property
     def solver(self) -> str:
-        """Whose deck it is."""
+        """Return the solver of the deck."""
         return LS_DYNA
 
     @cached_property
     def parts(self) -> Parts:
-        """Parts, part sets, rigid materials."""
+        """Return parts, part sets and rigid materials."""
         return read_parts(self.deck)
 
     @cached_property
     def sets(self) -> tuple[SwitchSet, ...]:
-        """All switching cards."""
+        """Return all switching cards."""
         return read_switching(self.deck)
 
     @property
     def switching(self) -> int:
-        """Number of the cards that switch something."""
+        """Return the number of switching cards."""
         return len(self.sets)
 
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, Header], ...]:
-        """Switching cards that have a header, with it."""
+        """Return the switching cards that have a header, with the header."""
         return tuple(
             (card, card.header) for card in self.sets if card.header is not None
         )
 
     @cached_property
     def windows(self) -> Windows:
-        """The switching windows of every part, with those of switches by force that the history shows."""
+        """Return the rigid windows of all parts, including switches by a force if the history shows them."""
+        timed = find_windows(self.sets, self.parts)
         if self.sensed:
-            events = find_windows(self.sets, self.parts).events
-            by_sensor = [each for set_ in self.sensed for each in set_.events(events)]
+            by_sensor: list[tuple[float, Event]] = []
+            for sensed_set in self.sensed:
+                by_sensor += sensed_set.events(timed.events)
             timed = find_windows(self.sets, self.parts, by_sensor)
-        else:
-            timed = find_windows(self.sets, self.parts)
-        by_force = [window for one in self.forced for window in one.windows]
-        return timed._replace(
-            windows=tuple(
-                sorted((*timed.windows, *by_force), key=lambda one: (one.unit, one.tr))
-            )
-        )
+        windows = [*timed.windows]
+        for switch in self.forced:
+            windows += switch.windows
+        windows.sort(key=lambda window: (window.unit, window.tr))
+        return timed._replace(windows=tuple(windows))
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Switches by force, with what they do in the history; none without one."""
+        """Return the switches by a force with their course in the history; empty without a history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
@@ -178,28 +176,26 @@ class Case:
 
     @cached_property
     def by_condition(self) -> tuple[Forced, ...]:
-        """Switches by force and by sensor, with their windows."""
+        """Return the switches by a force and by a sensor, with their windows."""
         if not self.sensed:
             return self.forced
         from d2rpick.rules.by_force import Forced  # not above: start-up
 
-        windows = self.windows.windows
-        by_sensor = [
-            (set_, tuple(one for one in windows if one.opened.by is set_.by))
-            for set_ in self.sensed
-        ]
-        return (
-            *self.forced,
-            *(
-                Forced(set_.by.card, (set_.by.card,), own, (), "TIMWIN")
-                for set_, own in by_sensor
-                if own
-            ),
-        )
+        switches = [*self.forced]
+        for sensed_set in self.sensed:
+            card = sensed_set.by.card
+            windows = tuple(
+                window
+                for window in self.windows.windows
+                if window.opened.by is sensed_set.by
+            )
+            if windows:
+                switches.append(Forced(card, (card,), windows, (), "TIMWIN"))
+        return tuple(switches)
 
     @cached_property
     def sensed(self) -> tuple[Sensed, ...]:
-        """Sets with CODE 5, with what their controls do: those of forces in the history, those of time without one."""
+        """Return the sets with CODE 5 with their controls; forces need a history, times do not."""
         if not any(header.code.value == BY_SENSOR for _, header in self.headers):
             return ()
         from d2rpick.rules.by_sensor import (
@@ -212,14 +208,14 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """What holds nodes together, and may lie in a part that is switched."""
+        """Return the nodal rigid bodies, extra nodes and joints, which may lie in a switched part."""
         return [
             *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
         ]
 
     @cached_property
     def made_rigid(self) -> tuple[Event, ...]:
-        """What makes a part rigid, where it is known which."""
+        """Return the events that make a known part rigid."""
         return tuple(
             event
             for event in self.windows.events
@@ -228,12 +224,12 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Whether all parts are known; a file with nothing but cards is for another deck to include."""
+        """Return True if all parts are known; a file that contains only switching cards belongs to another deck."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """ENDTIM as written; of several the last counts."""
+        """Return ENDTIM as written in the deck; the last of several definitions is used."""
         return next(
             (
                 value
@@ -245,7 +241,7 @@ class Case:
 
     @cached_property
     def end(self) -> float | None:
-        """The end of the run [time of the deck], where it is known and positive."""
+        """Return the end of the run [time of the deck]; None if it is unknown or not positive."""
         if (
             self.end_time is None
             or self.end_time.problem
@@ -254,35 +250,35 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # none in Radioss
+        ]  # empty for Radioss
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
     def unread(self) -> Sequence[Unread]:
-        """Includes that were not read and may hold what is switched."""
+        """Return the includes that were not read and may contain switching cards."""
         return self.deck.unread
 
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
-        """Cards that no clock switches, and what does."""
+        """Return the cards that no time switches, each with what switches it."""
         return ()
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Parts of solids whose stresses do not turn with a rigid body, and their formulation."""
+        """Return the formulation of each part of solids whose stresses do not rotate with a rigid body, by part id."""
         sections = read_sections(self.deck)
-        found = (
+        part_sections = (
             (part, sections.get(number)) for part, number in self.parts.sections.items()
         )
         return {
-            part: f"ELFORM {one.elform}, {one.unturned}"
-            for part, one in found
-            if one and one.unturned
+            part: f"ELFORM {section.elform}, {section.unturned}"
+            for part, section in part_sections
+            if section and section.unturned
         }
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Parts that must not be switched."""
+        """Return the parts that must not be switched, with the reason, by part id."""
         from d2rpick.deck.unswitchable import (
             find_unswitchable_in_ls_dyna,
         )  # not above: start-up
@@ -291,7 +287,9 @@ class Case:
 
     @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
-        """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
+        """Return ENDTIM and the DT of the energy databases, with their cards: the rules compare switching times with
+        them.
+        """
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
@@ -301,18 +299,18 @@ class Case:
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class RunCase(Case):
-    """The starter deck and the legs, with the windows that they make."""
+    """A Radioss run as input of the rules: starter deck, legs (engine files), and the windows that they make."""
 
     run: Run
 
     @property
     def solver(self) -> str:
-        """Whose deck it is."""
+        """Return the solver of the deck."""
         return RADIOSS
 
     @cached_property
     def found(self) -> RunWindows:
-        """Windows, and the parts of the bodies."""
+        """Return the windows, and the parts of the rigid bodies."""
         from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
 
         if self.judge is None:
@@ -322,7 +320,7 @@ class RunCase(Case):
         )
 
     def _find_course(self, body: Body) -> Course:
-        """Give what is known of the course of the run for the sensor of a body."""
+        """Return the course of the run for the sensor of a body."""
         from d2rpick.deck.radioss_run import find_course  # not above: start-up
 
         parts = self.found.parts.get(body.node.value, ())
@@ -334,7 +332,7 @@ class RunCase(Case):
 
     @cached_property
     def parts(self) -> Parts:
-        """Parts of the starter deck by id."""
+        """Return the parts of the starter deck."""
         lines = self.run.starter.parts if self.run.starter else {}
         return Parts(
             dict.fromkeys(lines, ""), {part: line.title for part, line in lines.items()}
@@ -342,52 +340,57 @@ class RunCase(Case):
 
     @cached_property
     def sets(self) -> tuple[SwitchSet, ...]:
-        """What switches bodies."""
+        """Return the cards that switch bodies."""
         return self.found.sets
 
     @cached_property
     def windows(self) -> Windows:
-        """The rigid windows of every part, or of every body whose parts are not known."""
+        """Return the rigid windows of all parts, or of the body if its parts are unknown."""
         return self.found.windows
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Bodies that a sensor of a force switches, with what it does in the history."""
+        """Return the bodies that a force sensor switches, with the course in the history."""
         from d2rpick.deck.radioss_sensors import (
             find_contacts_of_sensor,
         )  # not above: start-up
         from d2rpick.rules.by_force import Forced
 
-        starter, found = self.run.starter, []
+        starter = self.run.starter
+        forced = []
         for body in starter.bodies if starter and self.judge else ():
-            own = tuple(
+            body_windows = tuple(
                 window
                 for window in self.windows.windows
                 if window.opened.by.card is body.card
             )
-            if starter is None or not body.sensor or not own:
+            if starter is None or not body.sensor or not body_windows:
                 continue
             course = self._find_course(body)
             contacts = find_contacts_of_sensor(starter, body.sensor, course)
             if contacts is not None:
                 wait = "Tdelay of the sensor"
-                found.append(Forced(body.card, (body.card,), own, contacts, wait))
-        return tuple(found)
+                forced.append(
+                    Forced(body.card, (body.card,), body_windows, contacts, wait)
+                )
+        return tuple(forced)
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """The end of the last leg as written."""
+        """Return the end of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
     def switching(self) -> int:
-        """Number of cards that switch something: of the legs, and of bodies with a sensor or of rigid parts."""
+        """Return the number of cards that switch something: in the legs, of bodies with a sensor, and of rigid
+        parts.
+        """
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
-        """Bodies that a sensor switches whose time is not known."""
+        """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
         from d2rpick.deck.radioss_sensors import active_spans  # not above: start-up
 
         starter = self.run.starter
@@ -398,35 +401,38 @@ class RunCase(Case):
             for body in sensed
             if starter
         ]
-        told = [
-            (body.node.field, f"{body.name} is switched by {why}")
-            for body, why in spans
-            if isinstance(why, str)
+        untimed_bodies = [
+            (body.node.field, f"{body.name} is switched by {spans_or_reason}")
+            for body, spans_or_reason in spans
+            if isinstance(spans_or_reason, str)
         ]
-        return *told, *(
-            (leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active")
+        return *untimed_bodies, *(
+            (
+                leg.run.here,
+                f"engine file {leg.number} ends when sensor {leg.sensor} is active",
+            )
             for leg in legs
         )
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Parts of elements without a co-rotating frame."""
+        """Return the parts of elements without a co-rotational frame, with the formulation."""
         return self.run.starter.unturned if self.run.starter else {}
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Parts that must not be switched."""
+        """Return the parts that must not be switched, with the reason, by part id."""
         from d2rpick.deck.unswitchable import (
             find_unswitchable_in_radioss,
         )  # not above: start-up
 
-        return (
-            find_unswitchable_in_radioss(self.run.starter) if self.run.starter else {}
-        )
+        if self.run.starter:
+            return find_unswitchable_in_radioss(self.run.starter)
+        return {}
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """What the starter does to the nodes of the bodies that the legs switch."""
+        """Return what the starter does wrongly to the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
         from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
@@ -435,20 +441,20 @@ class RunCase(Case):
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:
-        """Index of every leg in which something becomes or stays rigid, with its windows."""
-        found, start = [], 0.0
+        """Return the index of each leg in which something is rigid, with its windows."""
+        rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value
-            held = [
+            leg_windows = [
                 w
                 for w in self.windows.windows
                 if w.tr < stop and (w.td is None or w.td > start)
             ]
-            if held and stop > start:
-                found.append((index, held))
+            if leg_windows and stop > start:
+                rigid_legs.append((index, leg_windows))
             start = stop
-        return found
+        return rigid_legs
 
 
-Objection = tuple["Field", str]
-"""Where, and what is wrong there."""
+Objection = tuple[Field, str]
+"""A field of the deck, and what is wrong there."""

@@ -1,7 +1,7 @@
-"""Switches by the force of a contact or rigid wall, in a run whose history shows when something pushes.
+"""Evaluate switches by a contact or rigid-wall force over a history that shows when a contact force acts.
 
-Forces that the solver wrote show when each contact and wall pushes.  Momenta show that something pushes, not what: with
-them alone a deck with several contacts and walls is not judged.
+Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
+contact exerts it: with momenta alone a deck with several contacts and walls is not judged.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
-# What pushes, and whether a set waits for a force or for none, by CODE.
+# By CODE, what has the force, and True if the set waits for a force, False if it waits until there is none.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,16 +34,17 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-_NEVER: Final = 1e20
-# A window of so much of the longest one is none that anybody wants.
+_NEVER: Final = 1e20  # TIME2 from which on there is no latest time
+# Windows below this fraction of the longest one are chatter, not flights.
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by force, or a pair of them, with its windows in the history, and when something pushes there [time].
+    """A switch by a force, or a pair of them, with its windows in the history and the spans of the contact force
+    [time].
 
-    ``place`` is the card that makes the parts rigid, ``cards`` are those of the pair; ``wait`` is what to call the time
-    that keeps it from switching, ``source`` says what of the history shows the contacts.
+    ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
+    time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
     """
 
     place: Card
@@ -55,19 +56,20 @@ class Forced(NamedTuple):
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Windows of its parts, each once, ascending."""
+        """Return the windows of its parts without duplicates, ascending."""
         return sorted(
-            {(one.tr, one.td) for one in self.windows}, key=lambda pair: pair[0]
+            {(window.tr, window.td) for window in self.windows},
+            key=lambda pair: pair[0],
         )
 
     @property
     def switches(self) -> int:
-        """How often it switches."""
+        """Return the number of switches in the history."""
         return sum(1 + (td is not None) for _, td in self.times)
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Windows that are no chatter; the end of one that stays open is infinite."""
+        """Return the windows that are not chatter; a window that stays open ends at infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
@@ -83,47 +85,61 @@ class _Seen(NamedTuple):
 def follow_forced_switches(
     deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
-    """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
+    """Yield the switches by a force in an LS-DYNA deck with their windows; nothing if the history shows no contacts."""
     by_card = {
-        event.by: [other for other in events if other.by is event.by]
+        event.by: [unit_event for unit_event in events if unit_event.by is event.by]
         for event in events
     }
     waiting = {
-        card: made for card in by_card if (made := _read_waiting(card)) is not None
+        card: conditions
+        for card in by_card
+        if (conditions := _read_waiting(card)) is not None
     }
-    for there, rigid in waiting.items():
+    for rigid_card, rigid in waiting.items():
         if not rigid.to_rigid:
             continue
-        back = _find_pair(there, by_card, waiting)
+        back_card = _find_pair(rigid_card, by_card, waiting)
         windows: list[Window] = []
-        known: _Seen | None = None
-        for event in by_card[there]:
-            seen = _see_contacts(deck, there, event.unit, judge)
-            seen_back = _see_contacts(deck, back, event.unit, judge) if back else seen
-            if seen is None or seen_back is None:
+        last_seen: _Seen | None = None
+        for event in by_card[rigid_card]:
+            seen_contacts = _see_contacts(deck, rigid_card, event.unit, judge)
+            if back_card:
+                seen_back = _see_contacts(deck, back_card, event.unit, judge)
+            else:
+                seen_back = seen_contacts
+            if seen_contacts is None or seen_back is None:
                 continue
-            known = seen
-            closing = _find_event(event.unit, by_card[back]) if back else None
-            other = waiting[back] if back and closing else None
-            spans = follow_pair(rigid, other, seen.contacts, end, seen_back.contacts)
+            last_seen = seen_contacts
+            closing = _find_event(event.unit, by_card[back_card]) if back_card else None
+            deformable = waiting[back_card] if back_card and closing else None
+            spans = follow_pair(
+                rigid, deformable, seen_contacts.contacts, end, seen_back.contacts
+            )
             windows += (
                 Window(event.unit, tr, td, event, closing if td is not None else None)
                 for tr, td in spans
             )
-        if known:
-            cards = (there.card, back.card) if back else (there.card,)
+        if last_seen:
+            cards = [rigid_card.card]
+            if back_card:
+                cards.append(back_card.card)
             yield Forced(
-                there.card, cards, tuple(windows), known.contacts, "TIME3", known.source
+                rigid_card.card,
+                tuple(cards),
+                tuple(windows),
+                last_seen.contacts,
+                "TIME3",
+                last_seen.source,
             )
 
 
 def _see_contacts(
     deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
 ) -> _Seen | None:
-    """Find the contacts that a set sees: by written forces, else by the momenta of a part if only one thing pushes.
+    """Return the contacts as a set sees them, from written forces, else from part momenta if the deck has one contact.
 
-    A contact begins earlier for a set with OFFSET, by the time to fly so far.  None where the history does not show it,
-    and for a contact whose force triggers no switch (D2R008).
+    For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
+    the contacts, and for a contact whose force triggers no switch (D2R008).
     """
     header = card.header
     if header is None or not _can_trigger(deck, header):
@@ -132,24 +148,24 @@ def _see_contacts(
     kind, _ = _CODES[header.code.value]
     by_force = find_spans_of_force(deck, judge, kind, header.entno.value)
     if by_force is not None:
-        seen = _Seen(by_force, "contact forces")
+        seen_contacts = _Seen(by_force, "contact forces")
     elif pushed is not None and _has_one_force(deck):
-        seen = _Seen(pushed.spans, "momenta")
+        seen_contacts = _Seen(pushed.spans, "momenta")
     else:
         return None
     offset = 0.0 if header.offset.problem else header.offset.value
     if offset <= 0 or card.switched[0].to_rigid:
-        return seen
+        return seen_contacts
     if pushed is None or not pushed.speed:
         return None
     lead = offset / pushed.speed
-    return seen._replace(
-        contacts=tuple((start - lead, end) for start, end in seen.contacts)
+    return seen_contacts._replace(
+        contacts=tuple((start - lead, end) for start, end in seen_contacts.contacts)
     )
 
 
 def _can_trigger(deck: Deck, header: Header) -> bool:
-    """Whether the contact or rigid wall that ENTNO names may switch parts, as far as the deck has it."""
+    """Return True if the force of contact or rigid wall ENTNO may switch parts, or the deck does not define it."""
     kind, _ = _CODES[header.code.value]
     entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
     return entity is None or kind != "contact" or entity.triggers
@@ -158,19 +174,20 @@ def _can_trigger(deck: Deck, header: Header) -> bool:
 def find_spans_of_force(
     deck: Deck, judge: HistoryJudge, kind: str, number: int, least: float = 0.0
 ) -> Spans | None:
-    """Find when a contact or rigid wall pushes by more than ``least`` [force], by its written force [time].
+    """Return when the written force of a contact or rigid wall exceeds ``least`` [force] [time].
 
-    Files call a contact by its id, or by its order if it has none.  Some call rigid walls by their order in any case:
-    of several whose ids are not their order, none is taken.
+    Files name a contact by its id, or by its order if it has none.  Some name rigid walls by their order in any case:
+    if there are several and their ids differ from their order, none is used.
     """
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)
     if entity is None:
-        # cards alone have none to name: their deck is not at hand
+        # a file of switching cards alone defines no contacts
         alone = not entities.found and number > 0
         return judge.find_force_spans(kind, number, least) if alone else None
-    name, is_order = entity.id or entity.number, kind == "rigid wall"
-    if is_order and any(each.id not in (0, each.number) for each in entities.found):
+    name = entity.id or entity.number
+    is_order = kind == "rigid wall"
+    if is_order and any(entry.id not in (0, entry.number) for entry in entities.found):
         if len(entities.found) > 1:
             return None
         by_order = judge.find_force_spans(kind, entity.number, least)
@@ -180,7 +197,7 @@ def find_spans_of_force(
 
 
 def _has_one_force(deck: Deck) -> bool:
-    """Whether a deck has one contact or rigid wall at most; cards alone have none."""
+    """Return True if a deck has at most one contact or rigid wall; a deck of switching cards alone has none."""
     return (
         len(read_entities(deck, "CONTACT").found)
         + len(read_entities(deck, "RIGIDWALL").found)
@@ -189,8 +206,11 @@ def _has_one_force(deck: Deck) -> bool:
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
-    """Give what a set waits for; None for one that does not wait for a force, or says it in a way that is not read."""
-    header, factor = card.header, card.card.transform.time
+    """Return the conditions of a switch set; None if it does not wait for a force, or one of its fields is
+    unreadable.
+    """
+    header = card.header
+    factor = card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
         return None
     if any(
@@ -216,12 +236,12 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
 
 
 def _find_pair(
-    there: SwitchSet,
+    rigid_card: SwitchSet,
     by_card: dict[SwitchSet, list[Event]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Give the set that makes the parts of another deformable again: its pair, or one that names the same parts."""
-    units = {event.unit for event in by_card[there]}
+    """Return the set that makes the same parts deformable as ``rigid_card`` makes rigid, or None."""
+    units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:
             return card
@@ -229,4 +249,5 @@ def _find_pair(
 
 
 def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
-    return next((one for one in events if one.unit == unit), None)
+    """Return the event of a unit, or None."""
+    return next((event for event in events if event.unit == unit), None)

@@ -1,4 +1,4 @@
-"""Switch sets with CODE 5: what their *SENSOR_CONTROL does, by the time and by the forces of a history."""
+"""Follow switch sets with CODE 5 through their *SENSOR_CONTROL, by the time and by the forces of a history."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ if TYPE_CHECKING:
 
 
 class Sensed(NamedTuple):
-    """A set with CODE 5 and its control: ``changes`` of that, or ``unknown``, why they are not known."""
+    """A set with CODE 5 and the ``changes`` of its control, or the reason (``unknown``) why they are unknown."""
 
     by: SwitchSet
     changes: tuple[Change, ...] = ()
     unknown: str = ""
 
     def events(self, events: Sequence[Event]) -> Iterator[tuple[float, Event]]:
-        """Give the switches of its parts [time]: made while the control is on, undone when it is off again."""
-        own = [event for event in events if event.by is self.by]
+        """Yield time and event of each switch of its parts: rigid while the control is on, deformable again when it
+        is off.
+        """
+        set_events = [event for event in events if event.by is self.by]
         begins_off = self.changes[:1] == (Change(0.0, on=False),)  # nothing to undo
         for change in self.changes[begins_off:]:
-            for event in own:
+            for event in set_events:
                 to_rigid = event.line.to_rigid == change.on
                 line = event.line._replace(to_rigid=to_rigid)
                 yield change.time, event._replace(line=line)
@@ -42,7 +44,9 @@ def follow_sensed_switches(
     judge: HistoryJudge | None,
     end: float,
 ) -> Iterator[Sensed]:
-    """Follow the controls of the sets with CODE 5 of a deck of LS-DYNA; without a history only those by time."""
+    """Yield the sets with CODE 5 of an LS-DYNA deck with their controls; without a history only the time is
+    evaluated.
+    """
     controls = {control.switch_set: control for control in read_controls(deck)}
 
     def find_spans(kind: str, number: int, least: float) -> Spans | None:

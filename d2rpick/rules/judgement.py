@@ -1,6 +1,6 @@
-"""Judges the windows of a deck by the history of a run without switching, with the code of ``verify``.
+"""Judge the windows of a deck by the energy history of a reference run, with the code of ``verify``.
 
-Not imported by the rules themselves: without a history the check does not need numbers.
+The rules do not import this module: without a history the check needs no numerics and starts faster.
 """
 
 from __future__ import annotations
@@ -34,16 +34,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 
-
-class Fault(NamedTuple):
-    """What an energy history has against a window: the rule it belongs to, at which end, and why."""
-
-    rule: str
-    at_td: bool
-    message: str
-
-
-# What verify warns of and no rule reports.
+# Codes of warnings of verify that no rule reports, so the check passes them on.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -53,19 +44,26 @@ _KEPT: Final = (
     "few-states",
     WRONG_ENERGY,
 )
-_UNKNOWN: Final = (
-    "nothing in the history shows when the load is over; give that time as `after`"
-)
+_UNKNOWN: Final = "the history does not show when the load ends; give that time with --after (in Python: after)"
+
+
+class Fault(NamedTuple):
+    """An objection of an energy history to a window: the rule, the end of the window (td or tr) and the message."""
+
+    rule: str
+    at_td: bool
+    message: str
 
 
 @dataclass
 class HistoryJudge:
-    """Judges by one run: the parts of a window together where the run has parts, else by the whole model.
+    """Judges windows by one reference run: by the energy of the switched parts, or of the whole model if it has no
+    parts.
 
-    As ``suggest`` chooses it for these parts: they are locked in and released at the same times.
+    The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
-    ``selection`` says what else was asked for; with a named energy all windows are judged by that one.  In the windows
-    that are ``done`` the run was switched already: they cannot be judged by it.
+    ``selection`` names the parts or the energy to judge by; with a named energy it applies to all windows. ``done`` are
+    the windows in which the run was switched already: the run cannot judge these.
     """
 
     run: Run
@@ -79,7 +77,9 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def beside(self, deck: str) -> None:
-        """Let the deck that is judged next tell what acts on its parts; one without parts of its own tells nothing."""
+        """Use the supports, gravity and joints of this deck for the next judgements; a deck without parts defines
+        none.
+        """
         try:
             inventory = read_inventory(deck)
         except DeckError:
@@ -92,12 +92,12 @@ class HistoryJudge:
 
     @property
     def end(self) -> float:
-        """Last time of the history."""
+        """Return the last time of the history."""
         return float(self._reference(self._known[:1]).history.time[-1])
 
     @property
     def cautions(self) -> list[Caution]:
-        """What to be aware of, by what was judged so far."""
+        """Return the warnings of all judgements so far."""
         return [
             caution._replace(message=f"{name_units(parts)}: {caution.message}")
             if parts
@@ -107,84 +107,95 @@ class HistoryJudge:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the readers left out or assumed, by what was judged so far."""
+        """Return what the readers left out or assumed in all judgements so far."""
         return tuple(
             dict.fromkeys(
-                note for one in self._references.values() for note in one.history.notes
+                note
+                for reference in self._references.values()
+                for note in reference.history.notes
             )
         )
 
     def _reference(self, parts: tuple[int, ...]) -> Reference:
-        """Give the run with the energy of some parts, or of the whole model where there are none."""
+        """Return the reference run with the energy of some parts, or of the whole model if there are none."""
         if parts not in self._references:
-            chosen = (
-                self.selection._replace(parts=tuple(map(str, parts)))
-                if parts
-                else self.selection
-            )
+            if parts:
+                chosen = self.selection._replace(parts=tuple(map(str, parts)))
+            else:
+                chosen = self.selection
             self._references[parts] = Reference.of(self.run, chosen)
         return self._references[parts]
 
     def faults(
         self, window: Window, together: Iterable[int], *, by_force: bool = False
     ) -> tuple[Fault, ...]:
-        """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged.
+        """Return all objections to a window; if it has no td, or td is not after tr, only tr is judged.
 
         ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
         judged between states of the history.
         """
         td = window.td if window.td is not None and window.td > window.tr else None
-        known = self._known
-        if known and window.part is not None and window.part not in known:
-            what = f"not in the history, which has {name_units(known)}; was it renumbered, or not written?"
-            return (Fault("D2R205", False, what),)
-        parts = (
-            ()
-            if window.part is None
-            else tuple(part for part in known if part in {*together})
-        )
+        history_parts = self._known
+        if (
+            history_parts
+            and window.part is not None
+            and window.part not in history_parts
+        ):
+            problem = f"not in the history, which has {name_units(history_parts)}; correct the id, or write its energy"
+            return (Fault("D2R205", False, problem),)
+        parts: tuple[int, ...] = ()
+        if window.part is not None:
+            parts = tuple(part for part in history_parts if part in {*together})
         tr = window.tr
         if by_force:
             tr, td = narrow_to_states(self._reference(parts).history.time, tr, td)
         key = parts, tr, td
         if key not in self._faults:
-            if known and not parts:
+            if history_parts and not parts:
                 which = "members" if window.unit.is_set else "parts"
-                who = f"the {which} of {window.unit.kind} {window.unit.id}"
-                what = f"{who} are not known, so it is judged by the whole model"
-                self._cautions[Caution("judged-by-whole", what)] = []
+                members = f"the {which} of {window.unit.kind} {window.unit.id}"
+                problem = f"{members} are unknown, so the window is judged by the energy of the whole model"
+                self._cautions[Caution("judged-by-whole", problem)] = []
             self._faults[key] = tuple(self._judged(parts, tr, td))
         return self._faults[key]
 
     def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
-        """Those of some parts that ever have internal energy; None where the history has not all of them."""
+        """Return the parts that have internal energy at any time; None if the history lacks one of them."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if len(chosen) < len(parts):
             return None
-        energies = if_written(lambda: self.run.part_energies(chosen))
-        if energies is None:
+        part_energies = if_written(lambda: self.run.part_energies(chosen))
+        if part_energies is None:
             return None
         return tuple(
             part.id
-            for part, energy in zip(chosen, energies.T, strict=True)
+            for part, energy in zip(chosen, part_energies.T, strict=True)
             if energy.any()
         )
 
     def contacts(
         self, parts: Collection[int]
     ) -> tuple[tuple[float, float], ...] | None:
-        """When something pushes some parts [time], by their momenta; None where the history does not show it."""
-        found = self.pushed(parts)
-        return found and found.spans
+        """Return the spans in which a contact force acts on some parts [time], from their momenta; None if these are
+        unknown.
+        """
+        contact_times = self.pushed(parts)
+        return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """As `contacts`, with how well the times are known."""
+        """Return the same spans as `contacts`, with their uncertainty."""
         chosen = [part for part in self.run.parts if part.id in parts]
-        momenta = (
-            next((one for one in self.run.momenta(chosen, None) if one.parts), None)
-            if chosen
-            else None
-        )
+        if chosen:
+            momenta = next(
+                (
+                    part_momenta
+                    for part_momenta in self.run.momenta(chosen, None)
+                    if part_momenta.parts
+                ),
+                None,
+            )
+        else:
+            momenta = None
         return find_contact_times(momenta) if momenta else None
 
     def find_force_spans(
@@ -195,21 +206,22 @@ class HistoryJudge:
         ``least``: only a force above it counts [force].
         """
         force = find_force(self.run.contact_forces, kind, number)
-        found = find_force_times(force, least) if force else None
-        return found and found.spans
+        force_spans = find_force_times(force, least) if force else None
+        return force_spans and force_spans.spans
 
     @property
     def _known(self) -> tuple[int, ...]:
-        return (
-            () if self.selection.energy else tuple(part.id for part in self.run.parts)
-        )
+        if self.selection.energy:
+            return ()
+        return tuple(part.id for part in self.run.parts)
 
     def _judged(
         self, parts: tuple[int, ...], tr: float, td: float | None
     ) -> Iterator[Fault]:
         reference = self._reference(parts)
         history = reference.history
-        first, last = float(history.time[0]), float(history.time[-1])
+        first = float(history.time[0])
+        last = float(history.time[-1])
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
         outside = [
             (name == "td", name, time)
@@ -218,8 +230,8 @@ class HistoryJudge:
         ]
         for at_td, name, time in outside:
             message = (
-                f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; "
-                f"correct it or run longer"
+                f"{name} = {time:.6g} lies outside the history ({first:.6g} to {last:.6g}); "
+                f"correct it, or run the reference longer"
             )
             yield Fault("D2R205", at_td, message)
         if outside:
@@ -227,19 +239,19 @@ class HistoryJudge:
         if td is None:
             yield from _of_load(history, tr, self.settings)
             return
-        if meant := in_the_record(history.time, [td], history.time_unit):
-            found = f"td = {td:.6g} lies within the first ten states of the history, {first:.6g} to {last:.6g}"
+        if times_in_record := in_the_record(history.time, [td], history.time_unit):
+            problem = f"td = {td:.6g} lies within the first ten states of the history ({first:.6g} to {last:.6g})"
             yield Fault(
                 "D2R205",
                 True,
-                f"{found}; is the deck in s and the history not? {meant[0]:.6g} lies in it too",
+                f"{problem}, but {times_in_record[0]:.6g} lies in it too; give deck and history in the same time unit",
             )
             return
         if (tr, td) in self.done:
             return
         verdict = verify_of(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
+            # Parts without energy lock in nothing, as a note of the reader reports: only the flight limits the times.
             yield from (
                 _of_flight(verdict)
                 if verdict.situation.flight.start is not None
@@ -253,28 +265,30 @@ class HistoryJudge:
 
 
 def faults_of(verdict: Verdict) -> Iterator[Fault]:
-    """Translate a verdict into rules: any pair that does not verify has at least one fault of severity error."""
-    found = [*_of_flight(verdict), *_of_error(verdict)]
-    if not verdict.verified and not found:
-        found = [Fault("D2R201", False, "; ".join(verdict.reasons))]
-    yield from found
+    """Yield the objections that follow from a verdict; a pair that is not verified has at least one of severity
+    error.
+    """
+    faults = [*_of_flight(verdict), *_of_error(verdict)]
+    if not verdict.verified and not faults:
+        faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
+    yield from faults
     situation = verdict.situation
     if (
         situation.kinetic_share is not None
         and situation.kinetic_share > POOR_KINETIC_SHARE
     ):
         better = find_better_pair(situation)
-        way_out = (
-            f"better: td = {better.td:.6g} with tr = {better.tr:.6g}"
-            if better
-            else "no better td was found"
-        )
-        what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
-        yield Fault("D2R203", True, f"{what} and no tr can keep it; {way_out}")
+        cure = "no better td was found"
+        if better:
+            cure = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}"
+        problem = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
+        yield Fault("D2R203", True, f"{problem} and no tr can keep it; {cure}")
 
 
 def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:
-    """Judge a tr of which no td is known: it should lie in the last flight of the history, or in one around it."""
+    """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
+    tr.
+    """
     last = examine(history, float(history.time[-1]), settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
@@ -291,11 +305,13 @@ def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]
         yield Fault("D2R204", False, _UNKNOWN)
     else:
         end = f"before {end_of_load(last)} ({last.flight.source})"
-        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; switch after it")
+        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; choose a later tr")
 
 
 def _of_flight(verdict: Verdict) -> Iterator[Fault]:
-    situation, tr = verdict.situation, verdict.candidate.tr
+    """Yield objections to times outside the flight: tr before the end of the load, or td after the next contact."""
+    situation = verdict.situation
+    tr = verdict.candidate.tr
     earliest = situation.earliest_tr
     if earliest is None:
         yield Fault("D2R204", False, situation.flight.refusal or _UNKNOWN)
@@ -305,44 +321,47 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     if situation.td > situation.latest_td:
         end = f"after {end_of_flight(situation)}"
         yield Fault(
-            "D2R204", True, f"td = {situation.td:.6g} lies {end}; switch back before it"
+            "D2R204", True, f"td = {situation.td:.6g} lies {end}; choose an earlier td"
         )
 
 
 def _of_error(verdict: Verdict) -> Iterator[Fault]:
-    candidate, situation = verdict.candidate, verdict.situation
+    """Yield an objection to the locked-in deformation: a wrong sign, or an error above the tolerance."""
+    candidate = verdict.candidate
+    situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        return  # nothing vibrates: any level is that of td but for round-off
+        return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
     if candidate.sign_match is False:
-        what = "the deformation at tr has the opposite sign of that at td"
-        yield Fault("D2R202", False, f"{what}; {_way_out(verdict)}")
+        quantity = "the deformation at tr has the opposite sign of that at td"
+        yield Fault("D2R202", False, f"{quantity}; {_way_out(verdict)}")
         return
     if candidate.lock_in_error is not None:
-        error, what = candidate.lock_in_error, "lock-in error"
+        error = candidate.lock_in_error
+        quantity = "lock-in error"
     elif candidate.level_error is not None:
-        error, what = candidate.level_error, "level error"
+        error = candidate.level_error
+        quantity = "level error"
     else:
         return
     if error > tolerance:
         parts = situation.history.parts or ()
-        of = (
-            f" of the {len(parts)} parts that are switched together"
-            if len(parts) > 1
-            else ""
-        )
-        levels = f"the energy{of} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
+        if len(parts) > 1:
+            of_parts = f" of the {len(parts)} parts that are switched together"
+        else:
+            of_parts = ""
+        levels = f"the energy{of_parts} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
         expected = (
-            f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
+            f"{quantity} {above(error, tolerance)}, expected at most {tolerance:g}"
         )
         yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
 
 
 def _way_out(verdict: Verdict) -> str:
-    """Name a tr that suits the td, or where to look for a pair."""
-    other = suggest_at(verdict.situation, with_better=False)
-    if other.recommended:
-        return f"tr = {other.recommended.tr:.6g} suits this td"
+    """Return what to do: a tr that suits this td, else a better pair, else where to look for one."""
+    suggestion = suggest_at(verdict.situation, with_better=False)
+    if suggestion.recommended:
+        return f"tr = {suggestion.recommended.tr:.6g} suits this td"
     if better := find_better_pair(verdict.situation):
         return (
             f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"

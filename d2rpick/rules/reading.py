@@ -1,4 +1,4 @@
-"""D2R001-003, D2R011, D2R109-110, D2R301-306: what cannot be read, and what is not judged."""
+"""Rules D2R001-003, D2R011, D2R109-110 and D2R301-306: input that cannot be read, and input that is not judged."""
 
 from __future__ import annotations
 
@@ -40,12 +40,6 @@ _CURES: Final = {
 }
 _INNER = THERE + BACK + END
 
-
-def _transformed(factor: str) -> Example:
-    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
-    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
-
-
 _PARAMETER = "*PARAMETER\nR tr           0.02\n"
 _BY_NAME = PARTS + automatic(1, "&tr", rigid=["1"]) + BACK + END
 _CODES: Final = {
@@ -55,14 +49,17 @@ _CODES: Final = {
     4: "when contact {} has a force",
     5: "by a *SENSOR_CONTROL of type DEF2RIG",
 }
-
-
 _INERTIA: Final = """\
 *DEFORMABLE_TO_RIGID_INERTIA
          1
        0.0       0.0       0.0      12.5
        1.0       0.0       0.0       1.0       0.0       1.0
 """
+
+
+def _transformed(factor: str) -> Example:
+    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
+    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
 
 
 def _elements(keyword: str) -> Example:
@@ -85,19 +82,20 @@ def _elements(keyword: str) -> Example:
 )
 @rule("D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts")
 def _counts(case: Case) -> Iterator[Objection]:
-    """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, one per part.
-    With wrong counts the solver reads a part from the wrong line, or a line as the next card. A card whose counts
-    are both 0 switches nothing. A line that is missing is named: the solver takes the next one in its place.
+    """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
+    follow it, one line per part. If a count is wrong, the solver reads a part from the wrong line, or reads a part line
+    as the next card. If a line is missing, the solver reads the next line in its place. If both counts are 0, the card
+    switches nothing.
+
+    Fix: Write one line per part, and set D2R and R2D to the number of these lines.
     """
     for card in case.sets:
         if card.count_problem:
             lost = "missing" in card.count_problem
-            rows = (
-                "all lines of the card"
-                if lost
-                else "a line per part, and their count on the second line"
-            )
-            yield card.card.here, f"{card.count_problem}; write {rows}"
+            cure = "write a line per part, and their count on the second line"
+            if lost:
+                cure = "write all lines of the card"
+            yield card.card.here, f"{card.count_problem}; {cure}"
 
 
 @passes(PASS, Example(HEAD + _PARAMETER + _BY_NAME))
@@ -127,10 +125,12 @@ def _counts(case: Case) -> Iterator[Objection]:
     BOTH,
 )
 def _fields(case: Case) -> Iterator[Objection]:
-    """Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's columns, or an
-    undefined parameter, stops the run or, worse, is read as something else. So is a keyword that begins like a
-    switching card but is not one. ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching
-    times are judged by them.
+    """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. Text in the columns of a
+    number, or an undefined parameter, stops the run or, worse, is read as something else. A keyword that resembles a
+    switching card but is none is not read at all. ENDTIM and the DT of *DATABASE_GLSTAT and *DATABASE_MATSUM are
+    checked too, because the switching times are compared with them.
+
+    Fix: Move the value into its columns, define the parameter, or correct the keyword.
     """
     for unknown, near in misspelt(case.deck):
         head = unknown.block.head.strip()
@@ -153,11 +153,12 @@ def _fields(case: Case) -> Iterator[Objection]:
 
 
 def _unreadable_members(case: Case) -> Iterator[Problem]:
+    """Yield the unreadable fields of all part sets that the switching cards use, directly or through other sets."""
     used = dict.fromkeys(
         line.part.value for card in case.sets for line in card.switched if line.by_set
     )
     for set_id in dict.fromkeys(
-        reached for one in used for reached in case.parts.reached(one)
+        reached for used_set in used for reached in case.parts.reached(used_set)
     ):
         content = case.parts.sets.get(set_id)
         yield from content.problems if content else ()
@@ -170,17 +171,22 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
 )
 @rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
 def _includes(case: Case) -> Iterator[Objection]:
-    """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
-    that includes itself or cannot be read is reported too, also one that a Radioss starter deck asks for (#include): a
-    rigid body with a sensor may stand in it. Switching cards, parts or parameters may be in it, so the other findings
-    may be incomplete.
+    """d2rpick looks for include files in the folder of the main deck, in the folders of *INCLUDE_PATH and in the folder
+    of the including file. For Radioss it follows #include in the same way. A file that is missing, unreadable or
+    includes itself is reported. It may contain switching cards, rigid bodies, parts or parameters, so the other
+    findings may be incomplete.
+
+    Fix: Add the file, correct its name, or add its folder with *INCLUDE_PATH (LS-DYNA). Then run the check again.
     """
     for missing in case.unread:
         cure = _CURES.get(missing.reason, "correct it")
         if case.solver != LS_DYNA and missing.reason in _CURES:
             cure = "add the file"
-        found = f"include {missing.name.text!r} was not read ({missing.reason})"
-        yield missing.name, f"{found}; switching cards may hide in it: {cure}"
+        problem = f"include {missing.name.text!r} was not read ({missing.reason})"
+        yield (
+            missing.name,
+            f"{problem}, so its switching cards were not checked; {cure}",
+        )
 
 
 @passes(Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME))
@@ -191,8 +197,10 @@ def _includes(case: Case) -> Iterator[Objection]:
     "a parameter used by a card is defined twice with different values",
 )
 def _ambiguous(case: Case) -> Iterator[Objection]:
-    """LS-DYNA by default warns and keeps the first definition; *PARAMETER_DUPLICATION and _MUTABLE change that, and
-    other readers of decks keep the last. A switching time should not depend on it.
+    """By default LS-DYNA warns and keeps the first definition. *PARAMETER_DUPLICATION and *PARAMETER_MUTABLE change
+    that, and other programs that read decks keep the last definition. A switching time must not depend on this choice.
+
+    Fix: Keep one definition of the parameter.
     """
     uses = [
         (card.card, value)
@@ -202,20 +210,23 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
     ]
     if case.sets:
         uses += [(card, value) for card, value in case.supporting if value.parameters]
-    seen: set[tuple[Card, str]] = set()
+    reported: set[tuple[Card, str]] = set()
     for card, value in uses:
         for name in card.scope.closure(value.parameters):
-            first, *others = card.scope.definitions(name) or (None,)
+            first, *later_definitions = card.scope.definitions(name) or (None,)
             differing = [
-                other for other in others if first and other.value != first.value
+                later
+                for later in later_definitions
+                if first and later.value != first.value
             ]
-            if first and differing and (card, name) not in seen:
-                seen.add((card, name))
-                other, place = differing[0], first.place
-                found = f"parameter &{name} is {first.value} at {place.at} but {other.value} at {other.place.at}"
+            if first and differing and (card, name) not in reported:
+                reported.add((card, name))
+                later = differing[0]
+                first_place = first.place
+                problem = f"&{name} is {first.value} at {first_place.at} but {later.value} at {later.place.at}"
                 yield (
                     value.field,
-                    f"{found}; which one counts depends on the solver: keep one",
+                    f"{problem}; the value depends on the program that reads the deck: keep one definition",
                 )
 
 
@@ -223,15 +234,17 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
 @fails(_transformed("0.5"))
 @rule("D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1")
 def _scaled(case: Case) -> Iterator[Objection]:
-    """*INCLUDE_TRANSFORM multiplies the times of a file by FCTTIM (0 means 1). d2rpick applies it to the switching
-    times too, but whether the solver does is not confirmed by any source that was available.
+    """*INCLUDE_TRANSFORM multiplies the times of the included file by FCTTIM (0 is read as 1). d2rpick applies this
+    factor to the switching times too. No available source confirms that the solver does the same.
+
+    Fix: Move the switching cards to the main deck, where no factor applies.
     """
     for card in case.sets:
         factor = card.card.transform.time
         if factor != 1:
-            found = f"the card is in an include whose times are multiplied by {factor:g} (FCTTIM)"
-            why = "that this holds for switching times is not confirmed"
-            yield card.card.here, f"{found}; {why}: move the card to the main deck"
+            problem = f"the card is in an include whose times are multiplied by {factor:g} (FCTTIM)"
+            why = "whether the solver applies this to switching times is not confirmed"
+            yield card.card.here, f"{problem}; {why}: move the card to the main deck"
 
 
 @fails(
@@ -242,12 +255,18 @@ def _scaled(case: Case) -> Iterator[Objection]:
         + END
     )
 )
-@rule("D2R303", INFO, "encrypted block: cards may hide in it")
+@rule("D2R303", INFO, "an encrypted block, which may contain switching cards")
 def _encrypted(case: Case) -> Iterator[Objection]:
-    """Vendor models hold blocks between BEGIN PGP MESSAGE and END PGP MESSAGE that only the solver can read."""
+    """Models of vendors contain encrypted blocks, from BEGIN PGP MESSAGE to END PGP MESSAGE, that only the solver can
+    read. d2rpick cannot check switching cards, parts or parameters in such a block.
+
+    Fix: Keep the switching cards outside encrypted blocks, or check the original file before it is encrypted.
+    """
     for block in case.deck.encrypted:
-        told = "an encrypted block starts here; switching cards may hide in it, nothing in it was checked"
-        yield Field("", block, 0, 1), told
+        problem = (
+            "an encrypted block starts here; switching cards in it were not checked"
+        )
+        yield Field("", block, 0, 1), problem
 
 
 @passes(Example(GOOD.removesuffix(END)))
@@ -255,29 +274,33 @@ def _encrypted(case: Case) -> Iterator[Objection]:
     Example(GOOD.removesuffix("      PART\n" + END)),
     Example(GOOD.removesuffix(END) + "*NODE\n       1\n"),
 )
-@rule("D2R011", WARNING, "a file of the deck seems to be cut", BOTH)
+@rule("D2R011", WARNING, "a file of the deck seems to be truncated", BOTH)
 def _cut(case: Case) -> Iterator[Objection]:
-    """A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and all
-    that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching cards,
-    parts or parameters may be missing. d2rpick parts computes no cost from a mesh that is cut.
+    """A file seems to be truncated if it has no *END (Radioss: /END) and its last line has no line end. A main deck
+    without *END whose last lines are nodes or elements may be truncated too. The last number may have lost its end, and
+    switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
+
+    Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END) or a line end.
     """
-    for block, told in cuts(case.deck):
+    for block, problem in cuts(case.deck):
         yield (
             Field("", block, 0, 1),
-            f"{told} What is missing was not checked: {cure(block)}",
+            f"{problem} The missing lines were not checked: {cure(block)}",
         )
 
 
 @fails(deck("*COMMENT c:" + THERE))
 @rule("D2R301", INFO, "a card disabled by *COMMENT")
 def _disabled(case: Case) -> Iterator[Objection]:
-    """Everything from *COMMENT to the next keyword is a comment, the rest of the keyword line too. Below it a
-    switching card looks alive and is not.
+    """All lines from *COMMENT to the next keyword are a comment, and so is the rest of the keyword line. A switching
+    card in this block looks active but has no effect.
+
+    Fix: Remove *COMMENT to activate the card, or delete the card.
     """
     for card in case.deck.disabled:
         yield (
             card.here,
-            f"the keyword line {card.block.head.strip()!r} is a comment: this card does nothing",
+            f"the keyword line {card.block.head.strip()!r} is a comment, so this card has no effect",
         )
 
 
@@ -293,23 +316,29 @@ def _disabled(case: Case) -> Iterator[Objection]:
     BOTH,
 )
 def _untimed(case: Case) -> Iterator[Objection]:
-    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
-    cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
-    energy history. If a history has the force of the contact or wall (or the momenta of the parts, if the deck has one
-    contact or wall), the times at which it switches are found from it and judged. A *SENSOR_CONTROL is followed through
-    *SENSOR_SWITCH of the time, or of the magnitude of such a force; that its set is made while it is on and undone
-    while it is off was not tried with the solver. Restarts that are checked together with their main deck have
-    times: each begins at the ENDTIM of the run before it.
+    """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
+    restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
+    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
+    contact or wall (or the part momenta, if the deck has only one contact or wall), d2rpick finds the switching times
+    from it and judges them. A *SENSOR_CONTROL is evaluated through *SENSOR_SWITCH of the time, or of the magnitude of
+    such a force. That its set is made rigid while the sensor is on, and deformable while it is off, was not tried with
+    the solver. Restarts that are checked together with their main deck have times: each begins at the ENDTIM of the run
+    before it.
+
+    Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
+    together with their main deck, or switch by time (CODE 0).
     """
-    for place, how in case.untimed:
-        yield place, f"{how}; not judged by time"
+    for field, how in case.untimed:
+        yield field, f"{how}; not judged by time"
     for card in case.sets:
         reason = _reason(card) if case.solver == LS_DYNA else ""
-        forced = next((one for one in case.forced if card.card in one.cards), None)
-        sensed = next((one for one in case.sensed if one.by is card), None)
+        forced = next(
+            (switch for switch in case.forced if card.card in switch.cards), None
+        )
+        sensed = next((sensed for sensed in case.sensed if sensed.by is card), None)
         if reason and forced:
             first = f", first at {forced.times[0][0]:.6g}" if forced.times else ""
-            times = f"by the {forced.source} of the history {forced.switches} times"
+            times = f"{forced.switches} times by the {forced.source} of the history"
             yield card.card.here, f"*{card.card.name} {reason}: {times}{first}"
         elif reason and sensed:
             yield card.card.here, f"*{card.card.name} {reason}{_course_of(sensed)}"
@@ -325,8 +354,11 @@ def _untimed(case: Case) -> Iterator[Objection]:
 @fails(_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID"))
 @rule("D2R304", INFO, "elements of a kind that is not searched for shared nodes")
 def _unread(case: Case) -> Iterator[Objection]:
-    """D2R108 looks for nodes that separate rigid bodies share. Element keywords with options that put more whole
-    numbers on their lines are not followed, so it may miss some.
+    """D2R108 searches the elements for nodes that separate rigid bodies share. Some options of element keywords put
+    further integers on the element lines. d2rpick does not read such lines, so D2R108 may miss shared nodes.
+
+    Fix: Check yourself that the switched parts share no nodes with the elements of this keyword, or merge the parts
+    with LRB.
     """
     switched = {event.unit for event in case.windows.events if event.line.to_rigid}
     if len(switched) < 2:
@@ -337,7 +369,7 @@ def _unread(case: Case) -> Iterator[Objection]:
     for card in first.values():
         yield (
             card.here,
-            f"nodes that parts share were not searched in *{card.name}, whose lines are not followed",
+            f"*{card.name} was not searched for nodes that parts share, because its lines are not read",
         )
 
 
@@ -346,23 +378,25 @@ def _unread(case: Case) -> Iterator[Objection]:
     "D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch"
 )
 def _inertias(case: Case) -> Iterator[Objection]:
-    """The card replaces the mass properties that the solver computes from the mesh when the part is made rigid; left
-    over from another state of the model they are wrong without a word. Source: vendor keyword data.
+    """The card replaces the mass properties that the solver computes from the mesh when it makes the part rigid. If the
+    card comes from an earlier state of the model, mass and inertia are wrong, and the solver issues no message. Source:
+    vendor keyword data.
+
+    Fix: Check that mass, centre and inertia belong to the present mesh, or remove the card.
     """
-    made = {event.unit.id for event in case.made_rigid}
+    rigid_parts = {event.unit.id for event in case.made_rigid}
     unknown = any(event.unit.is_set for event in case.windows.events)
     for card in case.sets:
         if card.kind != "inertia" or card.part is None:
             continue
         part = card.part.value
-        used = (
-            ""
-            if part in made or unknown
-            else f"; no card of this deck makes part {part} rigid"
-        )
+        if part in rigid_parts or unknown:
+            used = ""
+        else:
+            used = f"; no card of this deck makes part {part} rigid"
         yield (
             card.card.here,
-            f"gives mass and inertia of part {part} for when a switch makes it rigid{used}",
+            f"the card replaces mass and inertia of part {part} while it is rigid{used}",
         )
 
 
@@ -374,8 +408,11 @@ def _inertias(case: Case) -> Iterator[Objection]:
     "switching cards on standard input without parts: ids are not checked",
 )
 def _without_parts(case: Case) -> Iterator[Objection]:
-    """A file of cards alone is for another deck to include, which is checked with it. Cards on standard input, as in
-    d2rpick card ... | d2rpick check -, have no deck around them: that their parts exist is not known.
+    """A file that contains only switching cards is meant to be included by another deck, and is checked with it. Cards
+    from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick cannot check that
+    their parts exist.
+
+    Fix: Paste the cards into the deck, or include them there, and check the main deck.
     """
     if (
         case.deck.path == STDIN
@@ -383,12 +420,14 @@ def _without_parts(case: Case) -> Iterator[Objection]:
         and not case.parts.materials
         and case.parts.all_known
     ):
-        told = "the parts are unknown: no *PART came with the cards, so their ids were not checked"
-        yield case.sets[0].card.here, told
+        problem = (
+            "the input has no *PART, so the part ids of the cards were not checked"
+        )
+        yield case.sets[0].card.here, problem
 
 
 def _course_of(sensed: Sensed) -> str:
-    """Say when a control is on, or why that is not known."""
+    """Return the text that says when a control is on, or why that is unknown."""
     if sensed.unknown:
         return f", by {sensed.unknown}; not judged by time"
     changes = sensed.changes
@@ -396,16 +435,19 @@ def _course_of(sensed: Sensed) -> str:
         [f"{'on' if change.on else 'off'} at {change.time:.6g}" for change in changes],
         most=_MOST_LISTED,
     )
-    return f": {listed}; its parts are taken to be switched while it is on, and back while it is off"
+    return f": {listed}; its parts are assumed to be rigid while it is on, and deformable while it is off"
 
 
 def _reason(card: SwitchSet) -> str:
+    """Return how a switching card is triggered if no time on the card decides; empty if a time does, or nothing is
+    switched.
+    """
     if card.restart:
         return ""
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
     if card.kind == "plain" and not card.switched and not card.count_problem:
-        return ""  # it only lets restarts switch
+        return ""  # the card only permits switches in a restart
     if card.kind == "plain":
         return "acts at the start of the run"
     if (

@@ -1,4 +1,4 @@
-"""How a rule of ``check`` is made: its examples, the pieces that these are put together from, and the decorators."""
+"""Build the rules of ``check``: the `Rule` type, its decorators, and the pieces of decks that the examples use."""
 
 from __future__ import annotations
 
@@ -14,41 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # of an example that has no other name
-
-
-class Example(NamedTuple):
-    """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
-
-    ``history`` are arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the history it is
-    checked with, ``options`` further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
-    """
-
-    deck: str
-    files: Mapping[str, str] = MappingProxyType({})
-    history: str = ""
-    options: str = ""
-    stdin: bool = False
-    name: str = MAIN_DECK
-    computed_by: str = "replay"
-
-
-class Rule(NamedTuple):
-    """A rule: ``passing`` and ``failing`` decks are its documentation and its tests at once."""
-
-    id: str
-    severity: Severity
-    summary: str
-    explanation: str
-    check: Callable[
-        [Any], Iterable[Objection]
-    ]  # of a Case; of a RunCase where it looks at Radioss alone
-    passing: tuple[Example, ...]
-    failing: tuple[Example, ...]
-    solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
-
-
-# Pieces that the examples are put together from: decks of LS-DYNA, and runs of Radioss.
+MAIN_DECK: Final = "main.k"  # default file name of an example deck
 
 HEAD = """\
 *KEYWORD
@@ -67,6 +33,51 @@ door
 frame
          2         1         1
 """
+END = "*END\n"
+GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
+_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
+_BODY: Final = (
+    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+)
+WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
+
+
+class Example(NamedTuple):
+    """An example deck with the files that it includes or that belong to its run; ``name`` is the file name of the deck.
+
+    ``history`` holds the arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the energy
+    history for the check. ``options`` holds further arguments of ``d2rpick check``. If ``stdin`` is true, the deck is
+    read from standard input.
+    """
+
+    deck: str
+    files: Mapping[str, str] = MappingProxyType({})
+    history: str = ""
+    options: str = ""
+    stdin: bool = False
+    name: str = MAIN_DECK
+    computed_by: str = "replay"
+
+
+class Rule(NamedTuple):
+    """A rule of ``check``: what it finds (``summary``), why it matters (``explanation``) and how to mend it (``fix``).
+
+    The ``passing`` and ``failing`` decks are both its documentation and its tests.
+    """
+
+    id: str
+    severity: Severity
+    summary: str
+    explanation: str
+    fix: str
+    # Takes a Case, or a RunCase if the rule covers Radioss alone.
+    check: Callable[[Any], Iterable[Objection]]
+    passing: tuple[Example, ...]
+    failing: tuple[Example, ...]
+    solvers: tuple[str, ...] = (LS_DYNA,)
+
+
+# Pieces of LS-DYNA decks and Radioss runs for the examples.
 
 
 def automatic(
@@ -79,7 +90,10 @@ def automatic(
     pair: tuple[int, int] = (0, 0),
     counts: tuple[int, int] | None = None,
 ) -> str:
-    """Write a card; ``pair`` is RELSW and PAIRED, ``counts`` D2R and R2D where they are to be wrong."""
+    """Return a *DEFORMABLE_TO_RIGID_AUTOMATIC card.
+
+    ``pair`` holds RELSW and PAIRED. ``counts`` holds D2R and R2D, for an example with wrong counts.
+    """
     d2r, r2d = counts or (len(rigid), len(deformable))
     relsw, paired = pair
     lines = [
@@ -99,31 +113,24 @@ def automatic(
 
 THERE = automatic(1, "0.02", rigid=["1"])
 BACK = automatic(2, "0.09", deformable=["1"])
-END = "*END\n"
 GOOD = HEAD + PARTS + THERE + BACK + END
 
 
 def deck(*cards: str) -> Example:
-    """Put cards into a deck that has two parts."""
+    """Return an example deck that has two parts and these cards."""
     return Example(HEAD + PARTS + "".join(cards) + END)
 
 
 def window(tr: str, td: str, more: str = "") -> Example:
-    """Write a deck that switches part 1 by time."""
+    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``, followed by the cards ``more``."""
     return deck(automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"]), more)
 
 
 PASS = Example(GOOD)
 
-GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
-_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
-_BODY: Final = (
-    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
-)
-
 
 def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
-    """Write a starter deck: a part that is one rigid body, by its group of nodes, and whatever there is ``more``."""
+    """Return a starter deck whose only part is one rigid body on a node group; the text ``more`` follows."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
 
@@ -131,7 +138,7 @@ def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -
 def engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Write engine files: end and state of every leg."""
+    """Return the engine files of a run by file name; each leg is its end time and ON, OFF or nothing for /RBODY."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
@@ -143,36 +150,37 @@ def engine_files(
 
 
 def run_of(files: dict[str, str], deck: str = "") -> Example:
-    """Put a starter deck and its engine files together."""
+    """Return an example made of a starter deck and its engine files."""
     return Example(deck or starter_deck(), files, name="box_0000.rad")
 
 
-WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 GOOD_RUN: Final = run_of(engine_files(*WINDOW))
 
 
 def rule(
     id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
 ) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
-    """Make a rule of a function that finds what is wrong with a case; its docstring is the explanation."""
+    """Return a decorator that turns a function that finds objections in a case into a rule.
+
+    The docstring of the function is the explanation; its last paragraph, which begins with ``Fix:``, is the fix.
+    """
     passing = (PASS if LS_DYNA in solvers else GOOD_RUN,)
-    return lambda check: Rule(
-        id_,
-        severity,
-        summary,
-        " ".join((check.__doc__ or "").split()),
-        check,
-        passing,
-        (),
-        solvers,
-    )
+
+    def make_rule(check: Callable[[Any], Iterable[Objection]]) -> Rule:
+        text = " ".join((check.__doc__ or "").split())
+        explanation, _, fix = text.partition(" Fix: ")
+        return Rule(
+            id_, severity, summary, explanation, fix, check, passing, (), solvers
+        )
+
+    return make_rule
 
 
 def passes(*examples: Example) -> Callable[[Rule], Rule]:
-    """Name decks that pass a rule; without any it is that of `GOOD`, or `GOOD_RUN`."""
+    """Return a decorator that sets the passing decks of a rule; the default is `GOOD`, or `GOOD_RUN` for Radioss."""
     return lambda rule: rule._replace(passing=examples)
 
 
 def fails(*examples: Example) -> Callable[[Rule], Rule]:
-    """Name decks that fail a rule."""
+    """Return a decorator that sets the failing decks of a rule."""
     return lambda rule: rule._replace(failing=examples)

@@ -1,7 +1,4 @@
-"""D2R307, D2R401-409, D2R411-412: the legs of a Radioss run, and its rigid bodies.
-
-Bodies may go through walls, begin at rest, or be rigid all along.
-"""
+"""Rules D2R307, D2R401-409 and D2R411-412: engine files and rigid bodies of a Radioss run."""
 
 from __future__ import annotations
 
@@ -29,34 +26,41 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import Leg
     from d2rpick.deck.radioss_run import LeftRigid
 
-_MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
-_MOST_LISTED = 8
+# Largest time step while rigid, as a fraction of the rigid window: the release is up to one step late.
+_MOST_CAP = 0.01
+_MOST_LISTED = 8  # main nodes that a message lists
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
     for name, text in engine_files(*WINDOW).items()
 }
 
-
-def _row(*fields: float | str, width: int = 10) -> str:
-    return "".join(f"{field:>{width}}" for field in fields) + "\n"
-
-
 _LEGS: Final = engine_files(*WINDOW)
-_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _row(1, 2, 3, 4)
-_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _row(1808)
-_PLACES: Final = "/NODE\n" + "".join(
-    _row(n)[:-1] + _row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
-)
 _KEEPS: Final = (
     starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
 )  # Ikrem
+# Arguments of a matsum history in which only the third part deforms.
+_SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
+
+
+def _row(*fields: float | str, width: int = 10) -> str:
+    """Return a line of fields, right-aligned in columns of this width."""
+    return "".join(f"{field:>{width}}" for field in fields) + "\n"
+
+
+_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _row(1, 2, 3, 4)
+_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _row(1808)
+_PLACES: Final = "/NODE\n" + "".join(
+    _row(n)[:-1] + _row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
+)
 
 
 def _wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
-    """Write the ground, at z = 0: nodes of a group, less those of another, and those that are near."""
+    """Return a rigid wall at z = 0 that acts on the nodes of group ``added`` and those within ``reach``, less
+    ``left_out``.
+    """
     text = (
         "/RWALL/PLANE/3\nground\n"
         + _row(0, 0, added, left_out)
@@ -66,43 +70,44 @@ def _wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
 
 
 def _velocity(group: int, speed: float = 10.0) -> str:
+    """Return an /INIVEL that gives the nodes of a group this speed."""
     return (
         "/INIVEL/TRA/4\nthrown\n" + _row(speed, 0.0, 0.0, width=20)[:-1] + _row(group)
     )
 
 
 def _with(*more: str) -> Example:
-    """Add to the starter deck of a good run."""
+    """Return a good run whose starter deck has these cards too."""
     return run_of(_LEGS, starter_deck(more="".join(more)))
 
 
 def _start(state: str, *nodes: int) -> Example:
-    """Give nodes a velocity in the first leg, in which the body is on or off."""
+    """Return a run whose first engine file gives nodes an initial velocity while the body is ``state`` (ON or OFF)."""
     files = engine_files(("0.02", state), ("0.2", "OFF"))
     files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _row(*nodes)
     return run_of(files, starter_deck(_NODES.replace("NODE/8", "NODE/7")))
 
 
-# A matsum in which the third part deforms, and no other.
-_SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
-
-
 def _wheel(
-    named: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
+    further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
-    """Add a wheel that is a rigid body of its own; ``named`` stands in the /RBODY/OFF of the first leg too."""
+    """Return a run with a wheel as a second rigid body; ``further_nodes`` are added to /RBODY/OFF of the first
+    engine file.
+    """
     mesh = f"/PART/{part}\nwheel\n{_row(1, 1)}/SHELL/{part}\n{_row(2, 5, 6, 7, 8)}"
     wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_row(*members)}"
     body = "/RBODY/2\nwheel\n" + _row(1809, 0, 0, 0, "", 0, 6)
     files = {
         **_LEGS,
-        "box_0001.rad": _LEGS["box_0001.rad"].replace("1808\n", f"1808 {named}\n"),
+        "box_0001.rad": _LEGS["box_0001.rad"].replace(
+            "1808\n", f"1808 {further_nodes}\n"
+        ),
     }
     return run_of(files, starter_deck(more=wheel + body))
 
 
 def _switching_legs(case: RunCase) -> list[Leg]:
-    """Legs of a run in which one switches a body; none of any other, whose legs are nobody's business here."""
+    """Return the legs of a run if any of them switches a body, else none: other runs are not judged."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -118,37 +123,47 @@ def _switching_legs(case: RunCase) -> list[Leg]:
     ),
 )
 @rule(
-    "D2R401", ERROR, "legs of a Radioss run that do not follow each other", (RADIOSS,)
+    "D2R401",
+    ERROR,
+    "engine files of a Radioss run that are not consecutive",
+    (RADIOSS,),
 )
 def _order(case: RunCase) -> Iterator[Objection]:
-    """Each engine file continues the run where the one before ended: their numbers count up from 1, their /RUN names
-    are the same, and none ends before the one before it. Otherwise nothing can be said about when a part is rigid.
-    Two legs with the same end are not reported. Source: Altair's help for /RUN, and runs computed with OpenRadioss.
+    """Each engine file continues the run from the end of the one before. The files are numbered from 1 without gaps,
+    their /RUN lines have the same name, and no file ends before the one before it. Otherwise d2rpick cannot determine
+    when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's help for /RUN, and
+    runs computed with OpenRadioss.
+
+    Fix: Add the missing engine files, and correct their numbers, run names and end times.
     """
     legs = _switching_legs(case)
     for expected, leg in enumerate(legs, start=1):
         if leg.number != expected:
             yield (
                 leg.run.here,
-                f"leg {leg.number} of the run, leg {expected} was expected; add or write the others",
+                f"engine file {leg.number} of the run, expected engine file {expected}; add the missing engine files",
             )
             break
-    for before, leg in pairwise(legs):
+    for previous, leg in pairwise(legs):
         if (
             not leg.stop.problem
-            and not before.stop.problem
-            and leg.stop.value < before.stop.value
+            and not previous.stop.problem
+            and leg.stop.value < previous.stop.value
         ):
-            place = before.stop.field
-            found = f"leg {leg.number} ends at {leg.stop.value:g}, before leg {before.number} at {before.stop.value:g}"
+            previous_field = previous.stop.field
+            problem = (
+                f"engine file {leg.number} ends at {leg.stop.value:g}, "
+                f"earlier than engine file {previous.number} at {previous.stop.value:g}"
+            )
             yield (
                 leg.stop.field,
-                f"{found} ({place.at}); the end of each leg must follow the one before",
+                f"{problem} ({previous_field.at}); give each engine file a later end than the one before",
             )
-        if leg.name.casefold() != before.name.casefold():
+        if leg.name.casefold() != previous.name.casefold():
+            problem = f"engine file {leg.number} belongs to run {leg.name!r}"
             yield (
                 leg.run.here,
-                f"leg {leg.number} belongs to run {leg.name!r}, the one before to {before.name!r}",
+                f"{problem}, engine file {previous.number} to {previous.name!r}; give all /RUN the same name",
             )
 
 
@@ -158,13 +173,18 @@ def _order(case: RunCase) -> Iterator[Objection]:
     run_of(engine_files(*WINDOW, node="1808 77")),
 )
 @rule(
-    "D2R402", ERROR, "/RBODY/ON or /RBODY/OFF names what is not a main node", (RADIOSS,)
+    "D2R402",
+    ERROR,
+    "/RBODY/ON or /RBODY/OFF lists a node that is no main node",
+    (RADIOSS,),
 )
 def _main_nodes(case: RunCase) -> Iterator[Objection]:
-    """The engine takes the main nodes of rigid bodies, not the ids of bodies, and skips an unknown one without a
-    message: the part stays as it was. It skips the main node of a body that /MERGE/RBODY joins to another, too. 0
-    names nothing and is not reported. Judged only when the starter deck and its includes could be read. Source:
-    Altair's help and the published source of OpenRadioss.
+    """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
+    other node without a message, so the part does not change its state. It also skips the main node of a body that
+    /MERGE/RBODY merges into another one. A 0 is not reported. d2rpick applies this rule only if it could read the
+    starter deck and its includes. Source: Altair's help and the published source of OpenRadioss.
+
+    Fix: List the main node of the rigid body, or of the body into which it is merged.
     """
     if case.run.starter is None or case.run.starter.moved or case.unread:
         return
@@ -177,16 +197,20 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
                 if node.problem or node.value == 0 or node.value in bodies:
                     continue
                 mixed = by_id.get(node.value)
-                hint = (
-                    f"it is the id of rigid body {mixed.id}, whose main node is {mixed.node.value}"
-                    if mixed
-                    else ""
-                )
+                if mixed:
+                    hint = f"it is the id of rigid body {mixed.id}: write its main node {mixed.node.value}"
+                else:
+                    hint = ""
                 if main := joined_to.get(node.value):
-                    hint = f"its body is merged into {main.name}, whose main node is {main.node.value}"
-                there = ", ".join(map(str, sorted(bodies)[:_MOST_LISTED])) or "none"
-                found = f"{node.value} is not the main node of a rigid body, so it is skipped without a message"
-                yield node.field, f"{found}; {hint or f'main nodes here: {there}'}"
+                    hint = f"its body is merged into {main.name}: write main node {main.node.value}"
+                main_nodes = (
+                    ", ".join(map(str, sorted(bodies)[:_MOST_LISTED])) or "none"
+                )
+                problem = f"node {node.value} is not the main node of a rigid body, so the engine skips it silently"
+                yield (
+                    node.field,
+                    f"{problem}; {hint or f'main nodes of this deck: {main_nodes}'}",
+                )
 
 
 @passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF"))))
@@ -194,35 +218,41 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R403",
     WARNING,
-    "/RBODY/ON in a later leg for a body that was rigid from the start",
+    "/RBODY/ON in a later engine file for a body that is rigid from the start",
     (RADIOSS,),
 )
 def _never_off(case: RunCase) -> Iterator[Objection]:
-    """A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from
-    time 0 on, through the load as well. A node that D2R402 reports is not reported here. Source: Altair's help for
-    /RBODY in engine files.
+    """A rigid body is active by default from the first engine file on. If no earlier engine file has /RBODY/OFF for it,
+    the part is rigid from time 0, during the load too. A node that D2R402 reports is not reported here. Source:
+    Altair's help for /RBODY in engine files.
+
+    Fix: Add /RBODY/OFF with this main node to the first engine file.
     """
     if not case.run.legs or case.run.legs[0].number != 1:
         return
     starter = case.run.starter
-    known = starter is not None and not starter.moved and not case.unread
-    said = (
-        {*case.run.named} - {body.node.value for body in starter.bodies}
-        if starter and known
-        else set[int]()
-    )
+    is_readable = starter is not None and not starter.moved and not case.unread
+    if starter and is_readable:
+        switched_nodes = {*case.run.named} - {
+            body.node.value for body in starter.bodies
+        }
+    else:
+        switched_nodes = set[int]()
     for leg in case.run.legs:
         for card, rigid, nodes in leg.switched:
             late = [
-                node.value for node in nodes if node.value and node.value not in said
+                node.value
+                for node in nodes
+                if node.value and node.value not in switched_nodes
             ]
             if rigid and late and leg.number > 1:
-                found = f"{name_units(late, 'main node')} switched on in leg {leg.number}, but rigid from the start"
+                nodes_text = name_units(late, "main node")
+                problem = f"{nodes_text} activated in engine file {leg.number}, but rigid from the start"
                 yield (
                     card.here,
-                    f"{found}: no leg before says /RBODY/OFF; add it to leg 1",
+                    f"{problem}, as no engine file before has /RBODY/OFF; add it to engine file 1",
                 )
-            said.update(node.value for node in nodes)
+            switched_nodes.update(node.value for node in nodes)
 
 
 @passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF"))))
@@ -234,26 +264,28 @@ def _never_off(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R411",
     WARNING,
-    "/RBODY/ON in a later leg for a body that is rigid already",
+    "/RBODY/ON in a later engine file for a body that is rigid already",
     (RADIOSS,),
 )
 def _on_again(case: RunCase) -> Iterator[Objection]:
-    """What a restart finds rigid stays so. Switched on once more it moves as before, but the internal energy of its
-    elements is counted again: in one run the model had a third too much of it behind td. Source: runs computed with
-    OpenRadioss.
+    """A restart keeps a rigid body rigid. If /RBODY/ON activates it again, the motion stays the same, but the internal
+    energy of its elements is added again: in one run the model had 173 J instead of 129 J after td. Source: runs
+    computed with OpenRadioss.
+
+    Fix: Remove the main node from the /RBODY/ON of this engine file.
     """
     rigid_now: set[int] = set()
     for leg in case.run.legs:
         for card, rigid, nodes in leg.switched:
-            named = {node.value for node in nodes}
-            again = sorted(named & rigid_now)
+            leg_nodes = {node.value for node in nodes}
+            again = sorted(leg_nodes & rigid_now)
             if rigid and again:
-                found = f"{name_units(again, 'main node')} switched on in leg {leg.number}, though rigid already"
+                problem = f"{name_units(again, 'main node')} activated in engine file {leg.number}, but rigid already"
                 yield (
                     card.here,
-                    f"{found}: the internal energy behind it is too high; remove it from this leg",
+                    f"{problem}: the internal energy is too high from then on; remove it from this engine file",
                 )
-            rigid_now = rigid_now | named if rigid else rigid_now - named
+            rigid_now = rigid_now | leg_nodes if rigid else rigid_now - leg_nodes
 
 
 @passes(
@@ -270,39 +302,43 @@ def _on_again(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R404",
     WARNING,
-    "no limit of the time step, or a large one, in a leg with rigid parts",
+    "no limit of the time step, or a large one, while parts are rigid",
     (RADIOSS,),
 )
 def _step(case: RunCase) -> Iterator[Objection]:
-    """With nothing deformable left the step grows by 10 % per cycle without limit, and the release comes late with a
-    kick; /DTIX caps it. A cap above a hundredth of the rigid window is reported too. A leg without cap is reported
-    only where every element lies in a rigid part. Source: runs computed with OpenRadioss (td came 0.26 ms late).
+    """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td comes
+    late. /DTIX limits the time step. A limit above 1 % of the rigid window is reported too. A missing limit is reported
+    only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
+
+    Fix: Add /DTIX to the engine file, with a largest time step below 1 % of the rigid window.
     """
-    for index, held in case.rigid_legs:
+    for index, leg_windows in case.rigid_legs:
         leg = case.run.legs[index]
-        back = [window.td - window.tr for window in held if window.td is not None]
+        window_lengths = [
+            window.td - window.tr for window in leg_windows if window.td is not None
+        ]
         if (
             leg.cap is not None
             and not leg.cap.problem
-            and back
-            and leg.cap.value > _MOST_CAP * min(back)
+            and window_lengths
+            and leg.cap.value > _MOST_CAP * min(window_lengths)
         ):
-            found = f"/DTIX lets the step grow to {leg.cap.value:g} in a rigid window of {min(back):g}"
+            problem = f"/DTIX permits a time step of {leg.cap.value:g} in a rigid window of {min(window_lengths):g}"
             yield (
                 leg.cap.field,
-                f"{found}; the release may come a step late: take less than a hundredth of it",
+                f"{problem}, so the release may be one step late; use less than 1 % of the window",
             )
         elif (
             leg.cap is None
-            and back
-            and not _deformable_left(case, {window.unit.id for window in held})
+            and window_lengths
+            and not _deformable_left(case, {window.unit.id for window in leg_windows})
         ):
-            found = f"nothing is deformable in leg {leg.number}, so the step grows without limit"
-            yield leg.run.here, f"{found}; add /DTIX"
+            problem = f"nothing is deformable in engine file {leg.number}, so the time step grows without limit"
+            yield leg.run.here, f"{problem}; add /DTIX"
 
 
 def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
-    """Whether an element may lie outside the parts that are rigid; where that is not known it may."""
+    """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
     from d2rpick.deck.mesh import parts_with_elements  # loads numpy
@@ -312,21 +348,29 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
 
 
 @fails(run_of(_MIXED))
-@rule("D2R405", WARNING, "legs of different /VERS", (RADIOSS,))
+@rule("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
 def _versions(case: RunCase) -> Iterator[Objection]:
-    """The version says how the fields of an engine file are read. Source: Altair's help for /VERS; that a mixture
-    does harm was not seen.
+    """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
+    different versions do harm.
+
+    Fix: Give all engine files of the run the same /VERS.
     """
-    for before, leg in pairwise([leg for leg in _switching_legs(case) if leg.version]):
-        if leg.version != before.version:
-            found = f"/VERS/{leg.version} in leg {leg.number}, /VERS/{before.version} in leg {before.number}"
+    for previous, leg in pairwise(
+        [leg for leg in _switching_legs(case) if leg.version]
+    ):
+        if leg.version != previous.version:
+            problem = (
+                f"/VERS/{leg.version} in engine file {leg.number}, "
+                f"/VERS/{previous.version} in engine file {previous.number}"
+            )
             yield (
                 leg.run.here,
-                f"{found}; fields are read by the version: give the same in all legs",
+                f"{problem}, and the version defines how fields are read; give all engine files the same",
             )
 
 
 def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
+    """Yield the flaws of the run that have this code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
@@ -342,20 +386,23 @@ def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
 @rule(
     "D2R408",
     WARNING,
-    "a rigid body that no leg switches, in a run that switches others",
+    "a rigid body that no engine file switches, in a run that switches others",
     (RADIOSS,),
 )
 def _left_rigid(case: RunCase) -> Iterator[Objection]:
-    """A body is on from time 0 unless the first leg says /RBODY/OFF, and what it holds is rigid to the end: the
-    wheels of a car whose legs name its body alone. Reported where the body holds whole parts, and no history tells
-    whether these deform: it may be meant, and a comment silences it; D2R409 is for what a history tells. Source:
-    Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+    """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
+    to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
+    A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports those that
+    do). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+
+    Fix: Add the main node to the /RBODY/OFF of every engine file. If the body is meant to be rigid, silence the finding
+    with a comment.
     """
-    left, deforming = _left_rigid_parts(case)
-    if left and deforming is None:
+    left_bodies, deforming = _left_rigid_parts(case)
+    if left_bodies and deforming is None:
         yield (
-            left.place,
-            f"{left.found}; where the run without switching keeps the bodies off, {left.way_out}",
+            left_bodies.place,
+            f"{left_bodies.found}; if the reference run keeps these bodies off, {left_bodies.way_out}",
         )
 
 
@@ -364,24 +411,32 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R409",
     ERROR,
-    "a rigid body that no leg switches, though its parts deform in the history",
+    "a rigid body that no engine file switches, although its parts deform in the history",
     (RADIOSS,),
 )
 def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
-    """As D2R408, where a history has internal energy of the parts of that body: they deform in the run without
-    switching, and cannot in this one. Where the history has their energy and it is zero, they are meant to be rigid.
+    """As D2R408, for a rigid body whose parts have internal energy in the history: they deform in the reference run,
+    and cannot deform in this run. If the history has their energy and it is zero, they are meant to be rigid, and
+    nothing is reported.
+
+    Fix: Add the main node to the /RBODY/OFF of every engine file.
     """
-    left, deforming = _left_rigid_parts(case)
-    if left and deforming:
-        yield left.place, f"{left.found}, which deform in the history; {left.way_out}"
+    left_bodies, deforming = _left_rigid_parts(case)
+    if left_bodies and deforming:
+        yield (
+            left_bodies.place,
+            f"{left_bodies.found}, which deform in the history; {left_bodies.way_out}",
+        )
 
 
 def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """What no leg switches, and which of its parts deform; None where no history tells."""
+    """Return what no leg switches, and which of its parts deform; None for the parts if no history shows it."""
     from d2rpick.deck.radioss_run import left_rigid  # not above: start-up
 
-    left = left_rigid(case.run, case.windows.windows)
-    return left, case.judge.deforming(left.parts) if left and case.judge else None
+    left_bodies = left_rigid(case.run, case.windows.windows)
+    return left_bodies, case.judge.deforming(
+        left_bodies.parts
+    ) if left_bodies and case.judge else None
 
 
 @passes(GOOD_RUN, _with(_NODES, _wall(8)))
@@ -393,13 +448,15 @@ def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] 
 @rule(
     "D2R307",
     INFO,
-    "a rigid wall, an initial velocity or a rigid body whose nodes are not known",
+    "a rigid wall, an initial velocity or a rigid body whose nodes are unknown",
     (RADIOSS,),
 )
 def _d2r307(case: RunCase) -> Iterator[Objection]:
-    """What walls and velocities do to the nodes of rigid bodies (D2R406, D2R407) is judged by groups of nodes, parts
-    and subsets, and by the distance from the wall. Other groups, nodes that /TRANSFORM moves and the ids of a
-    //SUBMODEL are not followed.
+    """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They follow node
+    groups by nodes, parts and subsets, and the distance from a wall. They do not follow other groups, nodes moved by
+    /TRANSFORM and ids of a //SUBMODEL.
+
+    Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
     return _flaws(case, code=NOT_FOLLOWED)
 
@@ -415,16 +472,17 @@ def _d2r307(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R406",
     ERROR,
-    "a rigid wall that does not hold what a switched rigid body holds",
+    "a rigid wall that does not act on the nodes of a switched rigid body",
     (RADIOSS,),
 )
 def _d2r406(case: RunCase) -> Iterator[Objection]:
-    """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, also of one that the engine puts
-    off in the first leg (warning 446): what they hold goes through the wall. OpenRadioss takes the Ikrem of the
-    /RBODY with the highest id for all. With Ikrem 1 the wall holds the nodes while the body is off, and not while it
-    is on: switch back before it touches. Walls with the penalty formulation (Iform 1, since 2026) keep their nodes.
-    Source: Altair's help for /RBODY and /RWALL, the published source of OpenRadioss, and runs computed with it (a
-    car that flew through a pole).
+    """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
+    body in the first engine file (warning 446). These nodes go through the wall. OpenRadioss applies the Ikrem of the
+    /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
+    while it is on. Walls with the penalty formulation (Iform 1, since 2026) keep their nodes. Source: Altair's help for
+    /RBODY and /RWALL, the published source of OpenRadioss, and runs computed with it (a car that went through a pole).
+
+    Fix: Give every /RBODY Ikrem 1, and deactivate the body before it touches the wall.
     """
     return _flaws(case, code=THROUGH_WALL)
 
@@ -440,20 +498,22 @@ def _d2r406(case: RunCase) -> Iterator[Objection]:
 @rule(
     "D2R407",
     ERROR,
-    "an initial velocity that moves nodes of a switched rigid body and not its main node",
+    "an initial velocity for the nodes of a switched rigid body but not for its main node",
     (RADIOSS,),
 )
 def _d2r407(case: RunCase) -> Iterator[Objection]:
-    """The starter gives all nodes of an /RBODY the velocity of its main node, also of one that the engine puts off
-    in the first leg. Where the node group of /INIVEL lacks that node the body begins at rest, without a message. An
-    /INIV of an engine file moves a body that is on by its main node alone, one that is off by its nodes. Velocities
-    that begin later (tstart, a sensor) are not judged. Source: runs computed with OpenRadioss.
+    """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
+    in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
+    issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
+    its nodes. Velocities that begin later (tstart, a sensor) are not judged. Source: runs computed with OpenRadioss.
+
+    Fix: Add the main node to the node group of the initial velocity.
     """
     return _flaws(case, code=AT_REST)
 
 
 def _sensed(*lines: str) -> Example:
-    """Let a sensor of time switch the body, with these lines below its title."""
+    """Return a run in which a /SENSOR/TIME with these lines switches the body."""
     deck = starter_deck().replace(_row(1808, 0)[:-1], _row(1808, 5)[:-1])
     return run_of(
         engine_files(("0.2", "")),
@@ -470,13 +530,15 @@ def _sensed(*lines: str) -> Example:
     (RADIOSS,),
 )
 def _d2r412(case: RunCase) -> Iterator[Objection]:
-    """Tstop has a line of its own below Tdelay. A number that stands behind Tdelay is not read, so the sensor stays
-    active to the end, and the body that it switches deformable. Source: the format files of OpenRadioss, and runs
-    computed with it.
+    """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line, so the
+    sensor stays active to the end, and the body that it switches stays deformable. Source: the format files of
+    OpenRadioss, and runs computed with it.
+
+    Fix: Write Tstop on the line below Tdelay.
     """
     for card in case.run.starter.named("SENSOR") if case.run.starter else ():
         rows = card.rows[1:2] if card.words[1:2] == ("TIME",) else ()
         for row in rows:
             if stop := row.text[20:40].strip():
-                found = f"{stop} stands behind Tdelay, where nothing is read, so the sensor has no Tstop"
-                yield row.field(2), f"{found}; put it on a line of its own"
+                problem = f"{stop} follows Tdelay on the same line, where it is not read, so the sensor has no Tstop"
+                yield row.field(2), f"{problem}; write it on a line of its own"

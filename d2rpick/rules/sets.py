@@ -1,4 +1,4 @@
-"""D2R004-010, D2R012, D2R208: switch sets among each other, and switches by the force of a contact or rigid wall."""
+"""Rules D2R004-010, D2R012 and D2R208: switch sets, their pairs, and switches by a contact or rigid-wall force."""
 
 from __future__ import annotations
 
@@ -33,19 +33,28 @@ _OF_CONTACT: Final = {2, 4}
 _FAMILIES: Final = (_OF_WALL, _OF_CONTACT)
 _WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}
 
-
-def _pair(
-    codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1
-) -> Example:
-    there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0]))
-    again = automatic(2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1]))
-    return deck(there + again)
-
-
 _ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ...]] = (
     (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
 )  # fmt: skip
 _MOST_LISTED = 8
+_BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
+_WALL: Final = (
+    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       "
+    "0.0       0.0       0.0\n"
+)
+_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+# Arguments of the history of a box that lands on its edge and rattles.
+_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
+
+
+def _pair(
+    codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1
+) -> Example:
+    rigid_card = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0]))
+    back_card = automatic(
+        2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1])
+    )
+    return deck(rigid_card + back_card)
 
 
 def _force(code: int, entno: int, time3: str = "1.0e-3", contact: str = "") -> Example:
@@ -62,11 +71,6 @@ def _contact(name: str, number: int = 7) -> str:
 
 
 _FLOOR: Final = _contact("SURFACE_TO_SURFACE")
-_BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
-_WALL: Final = (
-    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       "
-    "0.0       0.0       0.0\n"
-)
 
 
 _with_floor = partial(_force, contact=_FLOOR)
@@ -75,17 +79,18 @@ _with_floor = partial(_force, contact=_FLOOR)
 @fails(deck(THERE + automatic(1, "0.09", deformable=["1"])))
 @rule("D2R004", ERROR, "SWSET used twice")
 def _unique(case: Case) -> Iterator[Objection]:
-    """Every *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with an id of its own; RELSW refers to it."""
+    """Each *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with its own id, to which RELSW refers.
+
+    Fix: Give every switch set its own SWSET.
+    """
     first: dict[int, Header] = {}
     for _, header in case.headers:
         if header.swset.problem:
             continue
-        known = first.setdefault(header.swset.value, header)
-        if known is not header:
-            found = (
-                f"SWSET {header.swset.value} is already used at {known.swset.field.at}"
-            )
-            yield header.swset.field, f"{found}; give every set its own id"
+        first_header = first.setdefault(header.swset.value, header)
+        if first_header is not header:
+            problem = f"SWSET {header.swset.value} is already used at {first_header.swset.field.at}"
+            yield header.swset.field, f"{problem}; give every switch set its own id"
 
 
 @passes(_pair((2, 4)), _pair((1, 3)))
@@ -96,11 +101,14 @@ def _unique(case: Case) -> Iterator[Objection]:
     "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
 )
 def _mutual(case: Case) -> Iterator[Objection]:
-    """Paired sets alternate as a contact or wall force comes and goes: each names the other in RELSW, PAIRED is 1
-    for the one that acts first and -1 for the other, and their CODEs are 1 and 3 (wall) or 2 and 4 (contact). Sets,
-    paired or not, that are rigid under force (CODE 3 or 4 on the D2R side, 1 or 2 on the other) are the wrong way
-    round, rigid during the impact and deformable in flight. Source: vendor keyword data for the codes; a public
-    drop tool wrote decks with 2 and 4 exchanged for months.
+    """Paired sets act in turn as a contact or wall force begins and ends. Each set names the other in RELSW. PAIRED is
+    1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). Sets
+    with CODE 3 or 4 on the D2R side and 1 or 2 on the R2D side, paired or not, are the wrong way round: the parts are
+    rigid during the impact and deformable in flight. Source: vendor keyword data for the codes. A public drop tool
+    wrote decks with CODE 2 and 4 exchanged for months.
+
+    Fix: Let RELSW of each set name the other, set PAIRED to 1 and -1, and use CODE 1 or 2 to make parts rigid and CODE
+    3 or 4 to make them deformable.
     """
     by_id = {header.swset.value: header for _, header in reversed(case.headers)}
     for _, header in case.headers:
@@ -131,31 +139,34 @@ def _mutual(case: Case) -> Iterator[Objection]:
 
 
 def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
-    """Sets that make the same parts rigid under a force and deformable without one, paired or not."""
-    rigid = [
+    """Yield the header of each set that makes parts rigid under a force, if another set makes them deformable
+    without one.
+    """
+    rigid_sets = [
         (card, header)
         for card, header in case.headers
         if header.code.value in _WITH_FORCE
     ]
-    back = [
+    back_sets = [
         (card, header)
         for card, header in case.headers
         if header.code.value in _WITHOUT_FORCE
     ]
-    for there, header in rigid:
-        for again, other in back:
-            family = {header.code.value, other.code.value} in _FAMILIES
-            if family and _units(case, there, to_rigid=True) & _units(
-                case, again, to_rigid=False
+    for rigid_card, header in rigid_sets:
+        for back_card, back_header in back_sets:
+            family = {header.code.value, back_header.code.value} in _FAMILIES
+            if family and _units(case, rigid_card, to_rigid=True) & _units(
+                case, back_card, to_rigid=False
             ):
-                ids = f"sets {header.swset.value} and {other.swset.value}"
-                found = f"{ids} make parts rigid while there is a force and deformable while there is none"
-                why = "rigid in the impact and deformable in flight: the CODEs seem to be swapped"
-                yield header, f"{found}, {why}"
+                ids = f"sets {header.swset.value} and {back_header.swset.value}"
+                problem = f"{ids} make parts rigid while there is a force and deformable while there is none"
+                why = "so they are rigid in the impact and deformable in flight"
+                yield header, f"{problem}, {why}"
                 break
 
 
 def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
+    """Return the units that a card makes rigid, or deformable."""
     return {
         event.unit
         for event in case.windows.events
@@ -164,7 +175,9 @@ def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
 
 
 def _alone(header: Header) -> str:
-    relsw, paired = header.relsw.value, header.paired.value
+    """Return what is wrong with RELSW and PAIRED of one header; empty if nothing is."""
+    relsw = header.relsw.value
+    paired = header.paired.value
     if relsw and not paired:
         return f"RELSW names set {relsw} but PAIRED is 0"
     if paired and not relsw:
@@ -172,14 +185,18 @@ def _alone(header: Header) -> str:
     return f"PAIRED is {paired}" if paired not in {-1, 0, 1} else ""
 
 
-def _mismatch(one: Header, other: Header) -> str:
-    """Say what is wrong with a mutual pair: signs, or families of CODEs."""
-    ids = f"sets {one.swset.value} and {other.swset.value}"
-    if one.paired.value == other.paired.value:
-        return f"{ids} both have PAIRED {one.paired.value}"
-    codes = [one.code.value, other.code.value]
+def _mismatch(first: Header, second: Header) -> str:
+    """Return what is wrong with the signs of PAIRED, or with the CODEs, of two sets that name each other; empty if
+    nothing is.
+    """
+    ids = f"sets {first.swset.value} and {second.swset.value}"
+    if first.paired.value == second.paired.value:
+        return f"{ids} both have PAIRED {first.paired.value}"
+    codes = [first.code.value, second.code.value]
     if any(codes) and not any(set(codes) <= family for family in _FAMILIES):
-        return f"{ids} have CODE {codes[0]} and {codes[1]}, one of 1 and 3 or of 2 and 4 was expected"
+        return (
+            f"{ids} have CODE {codes[0]} and {codes[1]}, expected 1 and 3, or 2 and 4"
+        )
     return ""
 
 
@@ -187,21 +204,25 @@ def _mismatch(one: Header, other: Header) -> str:
 @fails(deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK))
 @rule("D2R006", WARNING, "PAIRED together with CODE 0")
 def _timed_pair(case: Case) -> Iterator[Objection]:
-    """For one window by time two unpaired sets are enough."""
+    """A pair acts in turn by a force. Two unpaired sets are enough for a window that is defined by times (CODE 0).
+
+    Fix: Set PAIRED and RELSW to 0.
+    """
     for _, header in case.headers:
         if (
             header.paired.value
             and header.code.value == BY_TIME
             and not header.code.problem
         ):
-            found = f"PAIRED is {header.paired.value} with CODE 0; a pair alternates by force"
+            problem = f"PAIRED is {header.paired.value} with CODE 0, but only sets that switch by a force are paired"
             yield (
                 header.paired.field,
-                f"{found}, a switch by time needs none: set PAIRED and RELSW to 0",
+                f"{problem}; set PAIRED and RELSW to 0",
             )
 
 
 def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
+    """Yield the readable headers with one of these CODEs."""
     for _, header in case.headers:
         if (
             not header.code.problem
@@ -225,29 +246,31 @@ def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
 )
 @rule("D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck")
 def _there(case: Case) -> Iterator[Objection]:
-    """CODE 2 and 4 wait for the force of contact ENTNO, 1 and 3 for that of a rigid wall. One that does not exist
-    never has a force. ENTNO is the id of *CONTACT_..._ID; without ids the order of definition counts (from memory of
-    the manual, not confirmed). Judged only when all of the deck could be read and it has parts. Source: vendor
-    keyword data.
+    """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. If it does not
+    exist, it never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in the order of
+    their definition (no available source confirms this). d2rpick applies this rule only if it could read the whole deck
+    and the deck has parts. Source: vendor keyword data.
+
+    Fix: Set ENTNO to the id of a contact or rigid wall of the deck.
     """
-    for codes, what, keyword in _ENTITIES:
+    for codes, kind, keyword in _ENTITIES:
         headers = [header for header in _by_force(case, codes) if header.entno.value]
         entities = read_entities(case.deck, keyword) if headers else None
         if entities is None or not (entities.all_known and case.whole):
             continue
         for header in headers:
             if entities.named(header.entno.value) is None:
-                number = f"ENTNO is {header.entno.value}, but"
+                entno = f"ENTNO is {header.entno.value}, but"
                 if entities.found:
-                    found = f"{number} no {what} has this number: the deck has {_listed(entities)}"
+                    problem = f"{entno} no {kind} has this id (the deck has {_listed(entities)})"
                     yield (
                         header.entno.field,
-                        f"{found}; the switch never comes: give the number of one of them",
+                        f"{problem}, so the set never switches; give the id of one of them",
                     )
                 else:
                     yield (
                         header.entno.field,
-                        f"{number} the deck has no {what}, so the switch never comes; add one",
+                        f"{entno} the deck has no {kind}, so the set never switches; add one",
                     )
 
 
@@ -262,40 +285,45 @@ def _there(case: Case) -> Iterator[Objection]:
 )
 @rule("D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch")
 def _able(case: Case) -> Iterator[Objection]:
-    """Only surface-to-surface and nodes-to-surface contacts switch parts by their force; one of type GENERAL or
-    SINGLE_SURFACE never does, so the part stays as it is, silently. Source: Vol I, Remark 1, as quoted by a public
-    drop tool, and the vendor's help on OFFSET, which names the same types; not tried with the solver.
+    """Only the force of surface-to-surface and nodes-to-surface contacts triggers a switch. A contact of type GENERAL
+    or SINGLE_SURFACE never does, so the part keeps its state, and the solver issues no message. Source: Vol I, Remark
+    1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not tried with the
+    solver.
+
+    Fix: Define a surface-to-surface or nodes-to-surface contact for the impact, and set ENTNO to its id.
     """
     headers = [header for header in _by_force(case, _OF_CONTACT) if header.entno.value]
     entities = read_entities(case.deck, "CONTACT") if headers else None
     for header in headers:
-        named = entities.named(header.entno.value) if entities else None
-        if named and entities and not named.triggers:
-            others = [one for one in entities.found if one.triggers]
-            able = (
-                f" (here: {_listed(entities._replace(found=tuple(others)))})"
-                if others
-                else ""
-            )
-            found = f"ENTNO {header.entno.value} is *{named.keyword}, whose force triggers no switch"
+        entity = entities.named(header.entno.value) if entities else None
+        if entity and entities and not entity.triggers:
+            able_entities = [
+                candidate for candidate in entities.found if candidate.triggers
+            ]
+            if able_entities:
+                able = (
+                    f" (here: {_listed(entities._replace(found=tuple(able_entities)))})"
+                )
+            else:
+                able = ""
+            problem = f"ENTNO {header.entno.value} is *{entity.keyword}, whose force triggers no switch"
             yield (
                 header.entno.field,
-                f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}",
+                f"{problem}; choose a surface-to-surface or nodes-to-surface contact{able}",
             )
 
 
 def _listed(entities: Entities) -> str:
+    """Return the contacts or walls as text, each with its id, keyword and title."""
     texts = [
-        f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})"
-        for one in entities.found
+        f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
+        for entity in entities.found
     ]
     return listing(texts, most=_MOST_LISTED)
 
 
-_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
-
-
 def _sensed(control: str) -> Example:
+    """Return a deck whose switch set has CODE 5, with this *SENSOR_CONTROL."""
     return deck(control + automatic(20, "0.0", rigid=["1"], code=BY_SENSOR))
 
 
@@ -312,8 +340,10 @@ def _sensed(control: str) -> Example:
 @rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
 def _uncontrolled(case: Case) -> Iterator[Objection]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
-    never switches. Judged only when all of the deck could be read and it has parts. D2R302 says when the sensor
-    switches. Source: vendor keyword data.
+    never switches. d2rpick applies this rule only if it could read the whole deck and the deck has parts. D2R302
+    reports when the sensor switches. Source: vendor keyword data.
+
+    Fix: Add a *SENSOR_CONTROL with TYPE DEF2RIG and TYPEID equal to SWSET, or choose another CODE.
     """
     if not case.whole:
         return
@@ -328,35 +358,39 @@ def _uncontrolled(case: Case) -> Iterator[Objection]:
             and not header.code.problem
             and header.swset.value not in controlled
         ):
-            found = f"no *SENSOR_CONTROL of type DEF2RIG has TYPEID {header.swset.value}, so set {header.swset.value}"
+            problem = f"no *SENSOR_CONTROL of type DEF2RIG has TYPEID {header.swset.value}, so set {header.swset.value}"
             yield (
                 header.code.field,
-                f"{found} never switches; add one, or choose another CODE",
+                f"{problem} never switches; add one, or choose another CODE",
             )
 
 
 def _controlled(card: Card) -> Iterator[int]:
-    """Switch sets that a *SENSOR_CONTROL switches."""
+    """Yield the id of the switch set that a *SENSOR_CONTROL switches, if it switches one."""
     for row in card.data[:1]:
         if card.word(row, 1).value == "DEF2RIG":
             yield card.integer(row, 2).value + card.transform.rest
 
 
 def _delayed(wait: str) -> Example:
-    """Write a pair of sets, of which the one that makes parts deformable waits before the other may act again."""
-    there = automatic(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
-    again = automatic(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
+    """Return a deck with a pair of sets; ``wait`` is TIME3 of the set that makes parts deformable."""
+    rigid_card = automatic(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
+    back_card = automatic(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
     old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}"
-    return deck(there + again.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1))
+    return deck(
+        rigid_card + back_card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1)
+    )
 
 
 @passes(PASS, _with_floor(4, 7), _delayed("0.01"))
 @fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"), _delayed("0.0"))
 @rule("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
 def _delay(case: Case) -> Iterator[Objection]:
-    """TIME3 is how long after a switch no other one of the set is made. With 0 the next step may switch back: the
-    force of a contact is zero and not zero many times in one impact, and the parts chatter. Of a pair one set has to
-    wait. Source: vendor keyword data for the meaning; a public drop tool reports the chatter.
+    """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
+    many times in one impact, so with TIME3 = 0 the parts switch back and forth. Of a pair, one set must wait. Source:
+    vendor keyword data for the meaning. A public drop tool reports the repeated switches.
+
+    Fix: Set TIME3 to a time in which the contact settles.
     """
     waiting = {
         header.swset.value for _, header in case.headers if header.time3.value > 0
@@ -367,10 +401,10 @@ def _delay(case: Case) -> Iterator[Objection]:
             and header.time3.value == 0
             and header.relsw.value not in waiting
         ):
-            found = f"TIME3 is 0 with CODE {header.code.value}: the parts may switch back and forth in every contact"
+            problem = f"TIME3 is 0 with CODE {header.code.value}, so parts may switch back and forth in every contact"
             yield (
                 header.time3.field,
-                f"{found}; set it to a time in which the contact settles",
+                f"{problem}; set TIME3 to a time in which the contact settles",
             )
 
 
@@ -378,50 +412,48 @@ def _delay(case: Case) -> Iterator[Objection]:
 @fails(_with_floor(4, 0), _force(3, 0))
 @rule("D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)")
 def _unnamed(case: Case) -> Iterator[Objection]:
-    """The switch waits for a force that is not zero. Without the number of the contact or rigid wall there is no
-    force to wait for. Source: vendor keyword data; what the solver does with 0 is not confirmed.
+    """The set waits for a force that is not zero. If ENTNO is 0, no contact or rigid wall is named, so there is no
+    force to wait for. Source: vendor keyword data. It is not confirmed what the solver does with 0.
+
+    Fix: Set ENTNO to the id of the contact or rigid wall.
     """
     for header in _by_force(case, _WITH_FORCE):
         if header.entno.value == 0:
-            what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
-            found = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}"
-            yield header.entno.field, f"{found}; give its number"
-
-
-# A box that lands on its edge, and rattles.
-_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
+            kind = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
+            problem = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {kind}"
+            yield header.entno.field, f"{problem}; give its id"
 
 
 def _landed(wait: str) -> Example:
+    """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
     landed = _delayed(wait).deck.replace("       0.2", "       0.7", 1)  # ENDTIM
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 
 @passes(PASS, _landed("0.07"))
 @fails(_landed("0.0"))
-@rule("D2R208", WARNING, "a switch by force that chatters in the history", BOTH)
+@rule("D2R208", WARNING, "a switch by a force that chatters in the history", BOTH)
 def _chatters(case: Case) -> Iterator[Objection]:
-    """A force comes and goes many times in one impact. If the history has the force of the contact or wall, or if it
-    has the momenta of the parts and the deck has one contact or wall, d2rpick follows the switches: windows below a
-    tenth of the longest are no flight. A TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the
-    sensor) that lasts longer than the contact keeps them out. A force that comes and goes within one interval of the
-    history is not seen.
+    """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
+    if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
+    history. Rigid windows below 10 % of the longest one are not flights but chatter. They disappear if TIME3 of the set
+    that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick does not see a
+    force that begins and ends within one output interval.
+
+    Fix: Raise TIME3 (Radioss: Tdelay) to the value in the finding.
     """
-    for one in case.by_condition:
-        short = len(one.times) - len(one.lasting)
-        if short:
-            wait = one.contacts and find_delay_without_chatter(
-                one.lasting, one.contacts
+    for switch in case.by_condition:
+        short_count = len(switch.times) - len(switch.lasting)
+        if short_count:
+            wait = switch.contacts and find_delay_without_chatter(
+                switch.lasting, switch.contacts
             )
-            cure = (
-                f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}"
-                if wait
-                else ""
-            )
-            found = (
-                f"{one.switches} switches by the history, in {len(one.times)} windows"
-            )
+            if wait:
+                cure = f"; set {switch.wait} to {wait:.3g} or more, which leaves {len(switch.lasting)}"
+            else:
+                cure = ""
+            problem = f"{switch.switches} switches in the history, in {len(switch.times)} windows"
             yield (
-                one.place.here,
-                f"{found}, {short} of which are below a tenth of the longest{cure}",
+                switch.place.here,
+                f"{problem}, {short_count} of which are below 10 % of the longest{cure}",
             )

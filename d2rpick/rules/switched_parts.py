@@ -1,4 +1,4 @@
-"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-120: the parts that are switched, and what holds on to them."""
+"""Rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and what is attached to them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Field
     from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit
 
-_NEAREST = 3  # ids that are named in place of one that the deck does not have
+_NEAREST = 3  # ids of the deck that a message lists next to an unknown id
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -36,25 +36,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-
-def _both(*lines: str) -> Example:
-    there = automatic(1, "0.02", rigid=lines)
-    return deck(_TOUCHING + there + automatic(2, "0.09", deformable=["1", "2"]))
-
-
-_LAYERS, _BEAMS = (
-    Example(_both("1", "2").deck.replace(_TOUCHING, text))
-    for text in (
-        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace(
-            "       4\n", "       4\n         1       0.5\n"
-        ),
-        "*ELEMENT_BEAM_ELFORM\n"
-        + "".join(f"{one:8d}{one:8d}{one:8d}{one + 1:8d}\n{1:10d}\n" for one in (1, 2)),
-    )
-)
-
-
-_DELETED = 1  # NRBF, NCSF
+_DELETED = 1  # value of NRBF and NCSF that deletes constraints
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
@@ -65,30 +47,60 @@ _JOINT: Final = (
     + "\n"
 )
 _COUNTS: Final = "         0         0         0       0.0         1         0"
+_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
+_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
+_JOINING: Final = (
+    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
+)
+
+
+def _both(*lines: str) -> Example:
+    """Return a deck whose two parts share nodes; ``lines`` are the D2R lines of the first card."""
+    rigid_card = automatic(1, "0.02", rigid=lines)
+    return deck(_TOUCHING + rigid_card + automatic(2, "0.09", deformable=["1", "2"]))
+
+
+_LAYERS, _BEAMS = (
+    Example(_both("1", "2").deck.replace(_TOUCHING, text))
+    for text in (
+        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace(
+            "       4\n", "       4\n         1       0.5\n"
+        ),
+        "*ELEMENT_BEAM_ELFORM\n"
+        + "".join(
+            f"{element:8d}{element:8d}{element:8d}{element + 1:8d}\n{1:10d}\n"
+            for element in (1, 2)
+        ),
+    )
+)
 
 
 def _constrained(text: str, flags: str = "         0         0") -> Example:
-    there = THERE.replace(_COUNTS, flags + _COUNTS[20:])
-    return deck(_MESH + _SET + text + there + BACK)
+    """Return a deck with a constraint on a node of part 1; ``flags`` holds NRBF and NCSF of the card that makes it
+    rigid.
+    """
+    rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
+    return deck(_MESH + _SET + text + rigid_card + BACK)
 
 
 def _solid(elform: str, tr: str = "0.02") -> Example:
+    """Return a deck whose part 1 is a solid with this ELFORM, made rigid at ``tr``."""
     cards = automatic(1, tr, rigid=["1"]) + BACK
     return deck(f"*SECTION_SOLID\n         1{elform:>10s}\n" + cards)
 
 
 def _by_card(events: Iterable[Event]) -> Iterator[tuple[SwitchSet, Field, str]]:
-    """Each card with some events, where the first of them stands, and the names of all its units."""
-    for card, those in grouped((event.by, event) for event in events).items():
-        by_kind = grouped((event.unit.kind, event.unit.id) for event in those)
-        named = " and ".join(
+    """Yield each card with the field of its first event and the names of all units that it switches."""
+    for card, card_events in grouped((event.by, event) for event in events).items():
+        by_kind = grouped((event.unit.kind, event.unit.id) for event in card_events)
+        unit_names = " and ".join(
             name_units(ids, kind) for kind, ids in sorted(by_kind.items())
         )
-        yield card, those[0].line.part.field, named
+        yield card, card_events[0].line.part.field, unit_names
 
 
 def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
-    """Whether a part set that cannot be resolved is switched: any part may be in it."""
+    """Return True if a part set that cannot be resolved is switched: it may contain any part."""
     return any(
         event.unit.is_set and event.line.to_rigid == to_rigid
         for event in case.windows.events
@@ -98,8 +110,10 @@ def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
 @fails(deck(BACK), deck(THERE + BACK.replace("  1  ", "  2  ")))
 @rule("D2R103", ERROR, "a part switched back that nothing made rigid")
 def _never_rigid(case: Case) -> Iterator[Objection]:
-    """An R2D line for a part that no D2R line made rigid before has no effect; usually an id is wrong on one of the
-    two cards.
+    """An R2D line for a part that no D2R line has made rigid before has no effect. Usually a part id is wrong on one of
+    the two cards.
+
+    Fix: Add the D2R line, correct the part id, or remove the R2D line.
     """
     if _unknown_members(case, to_rigid=True):
         return
@@ -109,41 +123,45 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
         if event.unit not in case.windows.other_rigid
         and not case.parts.is_rigid(event.unit.id)
     ]
-    for _, place, named in _by_card(orphans):
+    for _, field, unit_names in _by_card(orphans):
         yield (
-            place,
-            f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this",
+            field,
+            f"{unit_names} switched back, but no card makes it rigid before; add a D2R line or remove this R2D line",
         )
-
-
-_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
 
 
 @passes(PASS, Example(_RESTART.format(1, 2)))
 @fails(Example(_RESTART.format(1, 1)))
 @rule("D2R117", ERROR, "a part made rigid and deformable in one restart")
 def _both_ways(case: Case) -> Iterator[Objection]:
-    """*RIGID_DEFORMABLE_D2R and _R2D of a restart act together, when it begins: a part that both name is not rigid
-    for any time, or rigid to the end, and nobody knows which.
+    """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part that
+    both name has no rigid window, or stays rigid to the end: no available source says which.
+
+    Fix: Move one of the two cards to another restart.
     """
     of_restarts = [event for event in case.windows.events if event.by.kind == "restart"]
     for file, events in grouped(
         (event.by.card.file, event) for event in of_restarts
     ).items():
         rigid = {event.unit for event in events if event.line.to_rigid}
-        both = [
+        back_events = [
             event for event in events if not event.line.to_rigid and event.unit in rigid
         ]
-        for _, place, named in _by_card(both):
-            found = f"{named} made rigid and deformable when the restart {file} begins"
-            yield place, f"{found}; one of them belongs into another restart"
+        for _, field, unit_names in _by_card(back_events):
+            problem = (
+                f"{unit_names} made rigid and deformable when the restart {file} begins"
+            )
+            yield field, f"{problem}; move one of the two to another restart"
 
 
 @fails(deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n"))
 @rule("D2R104", INFO, "a part made rigid and never switched back", BOTH)
 def _never_back(case: Case) -> Iterator[Objection]:
-    """It stays rigid to the end of the run, unless a restart deck switches it back. What it would have deformed in
-    the next contact is missing from the result.
+    """The part stays rigid to the end of the run, unless a restart deck switches it back. Its deformation in the next
+    contact is missing from the result.
+
+    Fix: Add an R2D line at td, before the next contact. If the part is meant to stay rigid, silence the finding with a
+    comment.
     """
     if _unknown_members(case, to_rigid=False):
         return
@@ -152,11 +170,11 @@ def _never_back(case: Case) -> Iterator[Objection]:
         for window in case.windows.windows
         if window.closed is None and window.unit not in case.windows.other_deformable
     }
-    for card, place, named in _by_card([*opened]):
+    for card, field, unit_names in _by_card([*opened]):
         times = [tr for event, tr in opened.items() if event.by is card]
         yield (
-            place,
-            f"{named} made rigid at {min(times):g} and never switched back in this deck",
+            field,
+            f"{unit_names} made rigid at {min(times):g} and never switched back in this deck",
         )
 
 
@@ -179,17 +197,25 @@ def _never_back(case: Case) -> Iterator[Objection]:
     "part or part set not in the deck (only when every include was read)",
 )
 def _exists(case: Case) -> Iterator[Objection]:
-    """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a set without
-    parts. Judged only when all of the deck could be read and it has parts at all.
+    """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a part set without
+    parts. d2rpick applies this rule only if it could read the whole deck and the deck has parts.
+
+    Fix: Correct the id, and check the id offsets of *INCLUDE_TRANSFORM.
     """
     for card in case.sets if case.whole else ():
         missing = grouped(
             absent for line in card.switched for absent in _absent(line, case.parts)
         )
         for kind in sorted(missing, key=["part set", "part", "lead part"].index):
-            near = "" if kind == "part set" else _nearest(missing[kind][0], case.parts)
-            what = f"{name_units(missing[kind], kind)} not in the deck{near}"
-            yield card.card.here, f"{what}; check the ids and include offsets"
+            if kind == "part set":
+                nearest_ids = ""
+            else:
+                nearest_ids = _nearest(missing[kind][0], case.parts)
+            problem = f"{name_units(missing[kind], kind)} not in the deck{nearest_ids}"
+            yield (
+                card.card.here,
+                f"{problem}; correct the ids, or the offsets of the includes",
+            )
         empty = [
             line.part.value
             for line in card.switched
@@ -200,12 +226,12 @@ def _exists(case: Case) -> Iterator[Objection]:
         if empty:
             yield (
                 card.card.here,
-                f"{name_units(empty, 'part set')} without a part in the deck, so nothing is switched",
+                f"{name_units(empty, 'part set')} without parts in the deck, so nothing is switched; add the parts",
             )
 
 
 def _nearest(number: int, parts: Parts) -> str:
-    """List the nearest ids of the deck, with their titles."""
+    """Return the nearest part ids of the deck with their titles, as text in brackets."""
     from heapq import nsmallest  # not above: start-up
 
     near = sorted(
@@ -219,19 +245,18 @@ def _nearest(number: int, parts: Parts) -> str:
 
 
 def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
-    """Parts, part sets, their members and the lead part of a line that the deck does not have, by kind."""
+    """Yield what a line of a card names but the deck does not define, as kind (part set, part or lead part) and id."""
     if line.by_set and not line.part.problem:
         yield from (
-            ("part set", one)
-            for one in parts.reached(line.part.value)
-            if one not in parts.sets
+            ("part set", set_id)
+            for set_id in parts.reached(line.part.value)
+            if set_id not in parts.sets
         )
     if not line.part.problem:
-        members = (
-            (parts.members(line.part.value) or ())
-            if line.by_set
-            else (line.part.value,)
-        )
+        if line.by_set:
+            members = parts.members(line.part.value) or ()
+        else:
+            members = (line.part.value,)
         yield from (("part", part) for part in members if part not in parts.materials)
     if line.lead and line.lead.value and line.lead.value not in parts.materials:
         yield "lead part", line.lead.value
@@ -240,21 +265,22 @@ def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
 @fails(deck(_RIGID + BACK))
 @rule("D2R107", WARNING, "a *MAT_RIGID part switched to deformable")
 def _always_rigid(case: Case) -> Iterator[Objection]:
-    """A part with *MAT_RIGID is rigid from the start and cannot become deformable. It must be modelled with its
-    deformable material and made rigid by the card.
+    """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
+
+    Fix: Give the part its deformable material, and make it rigid with a D2R line.
     """
-    back = [
+    back_events = [
         event
         for event in case.windows.events
         if not event.line.to_rigid
         and not event.unit.is_set
         and case.parts.is_rigid(event.unit.id)
     ]
-    for _, place, named in _by_card(back):
-        found = f"{named} has *MAT_RIGID and cannot become deformable"
+    for _, field, unit_names in _by_card(back_events):
+        problem = f"{unit_names} has *MAT_RIGID and cannot become deformable"
         yield (
-            place,
-            f"{found}; give it its deformable material and let a D2R line make it rigid",
+            field,
+            f"{problem}; give it a deformable material and make it rigid with a D2R line",
         )
 
 
@@ -262,8 +288,10 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
 @fails(_both("1", "2"), _LAYERS, _BEAMS)
 @rule("D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes")
 def _torn(case: Case) -> Iterator[Objection]:
-    """With LRB 0 each part becomes a rigid body of its own, and the bodies fight over the nodes they share. Merge
-    them: the lead part with LRB 0, the others with LRB = the lead.
+    """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, each prescribes the motion
+    of these nodes, which they cannot both obey.
+
+    Fix: Merge the parts: the lead part has LRB 0, the other parts have LRB = id of the lead part.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if len(first) < 2:
@@ -276,35 +304,35 @@ def _torn(case: Case) -> Iterator[Objection]:
 
     for (low, high), node in first_shared_nodes(cards, bodies).items():
         if _together(case, first[low].unit, first[high].unit):
-            place = (first[high].line.lead or first[high].line.part).field
+            field = (first[high].line.lead or first[high].line.part).field
             lines = ((part, first[part].line) for part in (low, high))
-            one, other = (
+            low_name, high_name = (
                 f"part {part}" + f" (of part set {line.part.value})" * line.by_set
                 for part, line in lines
             )
-            found = f"{one} and {other} share node {node} but become separate rigid bodies that both own it"
-            yield place, f"{found}; merge them: LRB {low} on the line of {other}"
+            problem = f"{low_name} and {high_name} share node {node} but become separate rigid bodies that both own it"
+            yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
 
 
 def _find_bodies(first: Mapping[int, Event]) -> dict[int, int]:
-    """Give the lead of the rigid body of each part by the event that makes it rigid: the end of its LRB chain.
+    """Return the lead part of the rigid body of each part, by the event that makes it rigid: the end of its LRB chain.
 
-    A part that merges into nobody leads itself.
+    A part that is not merged leads itself.
     """
     leads = {
         part: event.line.lead.value for part, event in first.items() if event.line.lead
     }
-    return {
-        part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[
-            -1
-        ]
-        for part in first
-    }
+
+    def find_lead(part: int) -> list[int]:
+        lead = leads.get(part)
+        return [lead] if lead else []
+
+    return {part: reached([part], find_lead)[-1] for part in first}
 
 
-def _together(case: Case, one: Unit, other: Unit) -> bool:
-    """Whether two units may be rigid at the same time; by force nobody knows."""
-    if {one, other} & case.windows.other_rigid:
+def _together(case: Case, first: Unit, second: Unit) -> bool:
+    """Return True if two units may be rigid at the same time, or if this is unknown because of a switch by force."""
+    if {first, second} & case.windows.other_rigid:
         return True
     far = float("inf")
     spans = {
@@ -313,38 +341,41 @@ def _together(case: Case, one: Unit, other: Unit) -> bool:
             for w in case.windows.windows
             if w.unit == unit
         ]
-        for unit in (one, other)
+        for unit in (first, second)
     }
-    return any(a < d and c < b for a, b in spans[one] for c, d in spans[other])
+    return any(a < d and c < b for a, b in spans[first] for c, d in spans[second])
 
 
 def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
-    """Constraints on parts that cards make rigid while leaving the constraints active."""
+    """Yield constraints on parts that cards make rigid without deleting the constraints."""
     switched = _left_active(case, nodal=nodal)
-    wanted = [
-        one
-        for one in (case.constraints if switched else ())
-        if (one.kind == "nodal rigid body") == nodal
+    constraints = [
+        constraint
+        for constraint in (case.constraints if switched else ())
+        if (constraint.kind == "nodal rigid body") == nodal
     ]
-    owner = _owners(case, switched) if wanted else {}
-    for constraint in wanted:
-        own = (owner[node] for node in sorted(constraint.nodes) if node in owner)
-        part = constraint.part if constraint.part in switched else next(own, None)
+    owner = _owners(case, switched) if constraints else {}
+    for constraint in constraints:
+        part_of_nodes = (
+            owner[node] for node in sorted(constraint.nodes) if node in owner
+        )
+        part = next(part_of_nodes, None)
+        if constraint.part in switched:
+            part = constraint.part
         if part is None:
             continue
-        name = (
-            f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
-        )
+        if constraint.id:
+            name = f"{constraint.kind} {constraint.id}"
+        else:
+            name = constraint.kind
         flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
-        found_at = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
-        way_out = (
-            "it stays active; delete it there (1) and activate it on the way back (2)"
-        )
-        yield constraint.place, f"{found_at}: {way_out}"
+        problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
+        cure = "set the flag to 1 there and to 2 on the card that switches back"
+        yield constraint.place, f"{problem}, so it stays active; {cure}"
 
 
 def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Nodes of some parts, each with the first of these that has it."""
+    """Return the first of ``parts`` that contains each node, by node id."""
     cards = element_cards(case.deck, searched=True)
     if not cards:
         return {}
@@ -354,7 +385,7 @@ def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
 
 
 class _Flags(NamedTuple):
-    """NRBF and NCSF with which a card makes parts rigid, and where they stand."""
+    """NRBF and NCSF with which a card makes parts rigid, and the field of the first of them."""
 
     nrbf: int
     ncsf: int
@@ -362,43 +393,51 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Give the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
+    """Return the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
     if card.header:
-        nrbf, ncsf = card.header.nrbf, card.header.ncsf
+        nrbf = card.header.nrbf
+        ncsf = card.header.ncsf
         return _Flags(nrbf.value, ncsf.value, nrbf.field)
     if card.kind != "restart":
         return None
     controls = (
-        other
-        for other in case.sets
-        if other.card.file == card.card.file and other.card.name.endswith("_CONTROL")
+        control
+        for control in case.sets
+        if control.card.file == card.card.file
+        and control.card.name.endswith("_CONTROL")
     )
     values = next((control.values for control in controls if control.values), None)
     if values is None:
         return _Flags(0, 0, card.card.here)
-    nrbf_value, ncsf_value = values[0].value, values[1].value
+    nrbf_value = values[0].value
+    ncsf_value = values[1].value
     return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
 
 
 def _left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Parts made rigid by cards that delete nothing, with the flags of the first such card."""
-    found: dict[int, _Flags] = {}
+    """Return the flags of the first card that makes each part rigid without deleting constraints, by part id."""
+    first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
         flags = _find_flags(case, event.by)
         if flags and flags.nrbf != _DELETED and (nodal or flags.ncsf != _DELETED):
-            found.setdefault(event.unit.id, flags)
-    return found
+            first_flags.setdefault(event.unit.id, flags)
+    return first_flags
 
 
 @passes(PASS, _solid("0"), _solid("2", "0.0"))
 @fails(_solid("2"), _solid(""), _solid("13"))
-@rule("D2R116", WARNING, "solids whose stresses do not turn with the rigid body", BOTH)
+@rule(
+    "D2R116", WARNING, "solids whose stresses do not rotate with the rigid body", BOTH
+)
 def _unturned(case: Case) -> Iterator[Objection]:
-    """While a part is rigid its elements are not computed. Formulations without a co-rotating frame keep their
-    stresses in global axes: after a rotation they spring back in the wrong direction. Parts that are rigid from the
-    start hold no stress and are not reported. Source: Altair's help says so for Radioss (bricks with Isolid 1 or 2
-    without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH, HA8). For LS-DYNA it is concluded
-    from the theory of the formulations; sources differ on what it does with their stresses.
+    """While a part is rigid its elements are not computed. Formulations without a co-rotational frame keep their
+    stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid from the
+    start hold no stress and are not reported. Source for Radioss: Altair's help (bricks with Isolid 1 or 2 without
+    Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA it follows from the theory
+    of the formulations; sources disagree on what LS-DYNA does with the stresses.
+
+    Fix: Use a co-rotational formulation for these solids, or keep them deformable. If the part rotates little between
+    tr and td, the error is small.
     """
     loaded = [
         window
@@ -406,44 +445,49 @@ def _unturned(case: Case) -> Iterator[Objection]:
         if window.td is not None and window.tr > 0
     ]
     formulations = case.unturned if loaded else {}
-    held = (
+    affected = (
         (window.part, window.opened.line.part.field)
         for window in loaded
         if window.part in formulations
     )
-    for form, those in grouped(
-        (formulations[part], (part, place)) for part, place in held if part is not None
+    for formulation, affected_parts in grouped(
+        (formulations[part], (part, field))
+        for part, field in affected
+        if part is not None
     ).items():
-        found = f"{name_units(part for part, _ in those)} of solids that do not co-rotate ({form})"
-        why = "the stresses locked in do not turn with the rigid body"
-        yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
+        names = name_units(part for part, _ in affected_parts)
+        problem = f"{names} of solids without a co-rotational frame ({formulation})"
+        why = "the locked-in stresses do not rotate with the rigid body, which is wrong after a large rotation"
+        yield affected_parts[0][1], f"{problem}: {why}; use a co-rotational formulation"
 
 
 def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
-    """Parts that are switched, by cards that act at any time, and must not be."""
-    kept = (
-        {
-            part: why.reason
-            for part, why in case.unswitchable.items()
-            if why.flows == flows
+    """Yield the parts that a card makes rigid at any time although they must not be switched."""
+    if case.sets:
+        reasons = {
+            part: unswitchable.reason
+            for part, unswitchable in case.unswitchable.items()
+            if unswitchable.flows == flows
         }
-        if case.sets
-        else {}
-    )
+    else:
+        reasons = {}
     opened = [
         event
         for event in case.windows.events
-        if event.line.to_rigid and event.unit.part in kept
+        if event.line.to_rigid and event.unit.part in reasons
     ]
     first = {event.unit.id: event for event in reversed(opened)}
-    for reason, parts in grouped((kept[part], part) for part in sorted(first)).items():
+    for reason, parts in grouped(
+        (reasons[part], part) for part in sorted(first)
+    ).items():
         yield (
             first[parts[0]].line.part.field,
-            f"{name_units(parts)}: {reason}; do not switch it",
+            f"{name_units(parts)}: {reason}; keep it deformable",
         )
 
 
 def _of_law(law: str) -> Example:
+    """Return a deck whose part 1 has the material law of this keyword."""
     return deck(f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK)
 
 
@@ -451,8 +495,10 @@ def _of_law(law: str) -> Example:
 @fails(_solid("5"), _solid("11"), _solid("12"))
 @rule("D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH)
 def _flows(case: Case) -> Iterator[Objection]:
-    """ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT, /EULER/MAT) hold whatever flows
-    through them: there is no body to be made rigid. Source: the vendor's keyword data, Altair's help.
+    """Material flows through ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT,
+    /EULER/MAT), so there is no body to make rigid. Source: the vendor's keyword data and Altair's help.
+
+    Fix: Remove the part from the switching cards.
     """
     return _unswitchable(case, flows=True)
 
@@ -467,10 +513,12 @@ def _flows(case: Case) -> Iterator[Objection]:
     "D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH
 )
 def _with_reference(case: Case) -> Iterator[Objection]:
-    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, and not from
-    what was stored when the part was made rigid: it may come back with a stress that it did not have. Source: the
-    theory of the laws, and a report of 2026 on LS-DYNA R14 in which a hyperelastic solid did; not tried with the
-    solver. Radioss: hyperelastic laws, and solids with Ismstr 10 to 12.
+    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
+    stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
+    not have before. For Radioss: hyperelastic laws, and solids with Ismstr 10 to 12. Source: the theory of the laws,
+    and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tried with the solver.
+
+    Fix: Keep the part deformable, or compare its stress after td with the reference run.
     """
     return _unswitchable(case, flows=False)
 
@@ -483,37 +531,33 @@ def _with_reference(case: Case) -> Iterator[Objection]:
 @fails(_constrained(_NODAL), _constrained(_NODAL, "         2         1"))
 @rule("D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)")
 def _d2r112(case: Case) -> Iterator[Objection]:
-    """A node cannot belong to two rigid bodies. A nodal rigid body on a part that is made rigid must be deleted by
-    the same card (NRBF 1) and activated again on the way back (2); else the run stops (Error 30164, as a public drop
-    tool reports). Source: vendor keyword data for NRBF, which says that such bodies cause instabilities.
+    """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
+    it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
+    tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
+
+    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
     return _held(case, nodal=True)
 
 
-_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
-_JOINING: Final = (
-    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
-)
-
-
 def _joined(*lines: str) -> Example:
-    """Join two parts by a nodal rigid body that the card deletes; node 99 is of no element."""
-    there = automatic(1, "0.02", rigid=lines)
-    back = automatic(2, "0.09", deformable=["1", "2"][: len(lines)])
-    there, back = (
-        text.replace(_COUNTS[:40], f"{flag:10d}{_COUNTS[10:40]}", 1)
-        for text, flag in ((there, 1), (back, 2))
-    )
-    return deck(_TWO + _JOINING + there + back)
+    """Return a deck in which a nodal rigid body joins two parts; ``lines`` are the D2R lines of the first card."""
+    rigid_card = automatic(1, "0.02", rigid=lines)
+    back_card = automatic(2, "0.09", deformable=["1", "2"][: len(lines)])
+    deleting = rigid_card.replace(_COUNTS[:40], f"{1:10d}{_COUNTS[10:40]}", 1)
+    activating = back_card.replace(_COUNTS[:40], f"{2:10d}{_COUNTS[10:40]}", 1)
+    return deck(_TWO + _JOINING + deleting + activating)
 
 
 @passes(PASS, _joined("1", "         2         1      PART"))
 @fails(_joined("1", "2"), _joined("1"))
 @rule("D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies")
 def _come_apart(case: Case) -> Iterator[Objection]:
-    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts holds them together. Parts that it
-    joined come apart if they become several rigid bodies, or if one of them is not switched. Merge them, or switch all
-    of them. Source: vendor keyword data for NRBF and LRB.
+    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
+    separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
+    NRBF and LRB.
+
+    Fix: Merge the parts by LRB, and switch all of them.
     """
     deleting = [
         event
@@ -531,23 +575,23 @@ def _come_apart(case: Case) -> Iterator[Objection]:
     from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
 
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
-    every = frozenset[int]().union(*(constraint.nodes for constraint in joining))
-    owners = find_parts_of_nodes(cards, every)
+    joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))
+    owners = find_parts_of_nodes(cards, joined_nodes)
     for constraint in joining:
         parts = set[int]().union(*(owners.get(node, ()) for node in constraint.nodes))
         switched = parts & bodies.keys()
         if not switched or len({bodies.get(part) for part in parts}) == 1:
             continue
-        found = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
-        if others := parts - switched:
+        problem = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
+        if unswitched_parts := parts - switched:
             yield (
                 constraint.place,
-                f"{found}, but {name_units(others)} {are(others)} not made rigid with the others; switch all of them",
+                f"{problem}, but {name_units(unswitched_parts)} {are(unswitched_parts)} not made rigid; switch all",
             )
         else:
             yield (
                 constraint.place,
-                f"{found}, but they become separate rigid bodies; merge them by LRB",
+                f"{problem}, but they become separate rigid bodies; merge them by LRB",
             )
 
 
@@ -567,8 +611,11 @@ def _come_apart(case: Case) -> Iterator[Objection]:
     "extra nodes or a joint on a switched part stay active (NRBF, NCSF)",
 )
 def _d2r113(case: Case) -> Iterator[Objection]:
-    """Extra nodes and joints tie nodes to a rigid body; on a part that a card makes rigid the nodes then belong to
-    two. The vendor asks to delete what lies in switched parts (1) and to activate it on the way back (2); which of
-    NRBF and NCSF does so for joints and extra nodes is not confirmed, so either keeps this quiet.
+    """Extra nodes and joints attach nodes to a rigid body. On a part that a card makes rigid, these nodes belong to two
+    rigid bodies. The vendor asks to delete such constraints on switched parts and to activate them again when the parts
+    are switched back. It is not confirmed whether NRBF or NCSF does this for joints and extra nodes, so either value of
+    1 satisfies this rule.
+
+    Fix: Set NRBF and NCSF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
     return _held(case, nodal=False)

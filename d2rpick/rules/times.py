@@ -1,4 +1,6 @@
-"""D2R1: the times of the windows; D2R2: windows held against the energy history of a run without switching."""
+"""Rules D2R101-102, D2R105, D2R111, D2R114-115 and D2R201-207: the window times, also compared with an energy
+history.
+"""
 
 from __future__ import annotations
 
@@ -29,18 +31,27 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-_INTERVALS = (
-    200  # output intervals per rigid window, for crossings to be found within 0.5 %
-)
+# Output intervals per rigid window: d2rpick then finds crossings within 0.5 % of the window.
+_INTERVALS = 200
+# Relative excess of an output interval over its limit that rounding explains.
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # cards: D2R102 and D2R105 say it already
+_FEW = 2  # With so few cards D2R102 and D2R105 report the same mistake.
 _SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(
     4, "0.1", deformable=["2"]
 )
+
+_DECADES = 3.0  # decimal powers between two units of time
+# Decades by which the end of the history may differ: a reference run may end at half of the time.
+_NEAR = math.log10(2)
+_HISTORY: Final = (
+    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+)
+_GOOD_PAIR: Final = (".0135867", ".0687534")
+_WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
 
 
 @fails(
@@ -56,8 +67,10 @@ _SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(
 )
 @rule("D2R101", ERROR, "switch time outside [0, ENDTIM)")
 def _in_run(case: Case) -> Iterator[Objection]:
-    """TIME1 is the switching time for CODE 0 and the earliest one for CODE 1 to 4. At or after ENDTIM of
-    *CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.
+    """TIME1 is the switching time for CODE 0, and the earliest switching time for CODE 1 to 4. If TIME1 is at or after
+    ENDTIM of *CONTROL_TERMINATION, the set never switches. With CODE 1 to 4 it does not switch after TIME2 either.
+
+    Fix: Correct TIME1, TIME2 or ENDTIM. Check that all of them have the same time unit.
     """
     for card, header in case.headers:
         if (
@@ -70,13 +83,13 @@ def _in_run(case: Case) -> Iterator[Objection]:
         if time < 0:
             yield (
                 header.time1.field,
-                f"TIME1 is {time:g}, a time from 0 on was expected",
+                f"TIME1 is {time:g}, expected 0 or later; correct TIME1",
             )
         elif case.end is not None and time >= case.end:
-            found = f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM)"
+            problem = f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM)"
             yield (
                 header.time1.field,
-                f"{found}, so nothing is ever switched; correct one of them",
+                f"{problem}, so the set never switches; correct one of them",
             )
         latest = header.time2
         if (
@@ -84,31 +97,36 @@ def _in_run(case: Case) -> Iterator[Objection]:
             and not latest.problem
             and 0 < latest.value < header.time1.value
         ):
-            problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so nothing is ever switched"
-            yield latest.field, f"{problem}; a later time was expected, or 0 for no end"
+            problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so the set never switches"
+            yield latest.field, f"{problem}; give a later time, or 0 for no limit"
 
 
 def _closed(case: Case) -> dict[tuple[SwitchSet, SwitchSet], list[Window]]:
-    """Windows with both ends, by the cards that open and close them."""
+    """Return the windows with both ends, by the cards that open and close them."""
     return grouped(
-        ((one.opened.by, one.closed.by), one)
-        for one in case.windows.windows
-        if one.closed is not None
+        ((window.opened.by, window.closed.by), window)
+        for window in case.windows.windows
+        if window.closed is not None
     )
 
 
 def _named(windows: Sequence[Window]) -> str:
-    return name_units(one.unit.id for one in windows)
+    """Return the ids of the parts in some windows as text."""
+    return name_units(window.unit.id for window in windows)
 
 
-def _lost(one: Window) -> bool:
-    return one.tr == 0 == one.td
+def _lost(window: Window) -> bool:
+    """Return True if both times of a window are 0."""
+    return window.tr == 0 == window.td
 
 
 @fails(window("0.09", "0.02"), window("0.02", "0.02"))
 @rule("D2R102", ERROR, "switched back before (or when) it was switched to rigid", BOTH)
 def _order(case: Case) -> Iterator[Objection]:
-    """The R2D switch of a part must come after its D2R switch; the solver does not sort them for you."""
+    """The R2D switch of a part must come after its D2R switch. The solver does not sort the switches by time.
+
+    Fix: Make td later than tr. The two times may be swapped.
+    """
     for (opening, closing), windows in _closed(case).items():
         first = windows[0]
         together = (
@@ -121,24 +139,26 @@ def _order(case: Case) -> Iterator[Objection]:
             and not _lost(first)
             and not together
         ):
-            found = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
-            way_out = f"({opening.time_field.at}), an earlier time was expected there; are the two times swapped?"
-            yield closing.time_field, f"{found} {way_out}"
+            problem = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
+            cure = f"({opening.time_field.at}); give a later time here, unless the two times are swapped"
+            yield closing.time_field, f"{problem} {cure}"
 
 
 @passes(PASS, window("0.0", "0.09"))
 @fails(window("0.0", "0.0"))
 @rule("D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)")
 def _zero(case: Case) -> Iterator[Objection]:
-    """Writers that print times with one decimal turn everything below 0.05 into 0.0. Two sets that both switch at 0
-    are a sign of it.
+    """Programs that print times with one decimal write every time below 0.05 as 0.0. Two sets that both switch at 0 are
+    a sign of this.
+
+    Fix: Print the times with more decimals, for example as 0.0135867.
     """
     for (opening, closing), windows in _closed(case).items():
         if _lost(windows[0]) and opening.kind == "automatic":
-            found = f"both times of {_named(windows)} are 0 (the other at {opening.time_field.at})"
+            problem = f"both times of {_named(windows)} are 0 (the other at {opening.time_field.at})"
             yield (
                 closing.time_field,
-                f"{found}; print times below 0.05 with more than one decimal",
+                f"{problem}; print times below 0.05 with more than one decimal",
             )
 
 
@@ -153,11 +173,17 @@ def _zero(case: Case) -> Iterator[Objection]:
     "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
 )
 def _sampling(case: Case) -> Iterator[Objection]:
-    """Switching times are chosen by the internal energy of a reference run: glstat holds it for the whole run,
-    matsum for every part. Written too rarely, the energy at tr and td is not known well enough. Decks that are only
-    switching cards, and runs with --history, are not judged.
+    """Switching times are chosen from the internal energy of a reference run: glstat has the energy of the whole model,
+    matsum that of each part. If the output interval is too long, the energy at tr and td is not known well enough.
+    Decks that contain only switching cards, and checks with --history, are not judged.
+
+    Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
-    spans = [one.td - one.tr for one in case.windows.windows if one.td is not None]
+    spans = [
+        window.td - window.tr
+        for window in case.windows.windows
+        if window.td is not None
+    ]
     spans = [span for span in spans if span > 0]
     if case.judge is not None or not spans:
         return
@@ -170,24 +196,25 @@ def _sampling(case: Case) -> Iterator[Objection]:
             continue
         card = cards[-1]
         value = card.real(card.rows[0], 0)
-        by_curve = card.integer(card.rows[0], 2).value
+        curve = card.integer(card.rows[0], 2).value
         interval = value.value * card.transform.time
-        if value.problem or by_curve:
+        if value.problem or curve:
             continue
         if interval <= 0:
             missing.append(f"*{keyword} with DT above 0")
         elif interval > limit * (1 + _ROUNDING):
-            found = f"DT of *{keyword} is {interval:g}, at most {limit:g} was expected ({_INTERVALS} intervals"
-            why = "in the shortest rigid window) to choose a switching time from its energies"
-            yield value.field, f"{found} {why}; write it more often"
+            problem = f"DT of *{keyword} is {interval:g}, too long to choose switching times from its energies"
+            why = f"expected at most {limit:g}: {_INTERVALS} intervals in the shortest rigid window"
+            yield value.field, f"{problem} ({why}); reduce DT"
     whole = case.whole or (case.parts.all_known and case.end_time is not None)
     if missing and whole:
-        found = f"the deck has no {' and no '.join(missing)}, so there is no energy history to choose the times by"
-        first = next(one for one in case.windows.windows if one.closed)
-        yield first.opened.by.card.here, f"{found}; add what is missing"
+        problem = f"the deck has no {' and no '.join(missing)}, so there is no energy history to choose the times from"
+        first = next(window for window in case.windows.windows if window.closed)
+        yield first.opened.by.card.here, f"{problem}; add what is missing"
 
 
 def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
+    """Return the cards with CODE 0 whose time is known, with their headers."""
     return [
         (card, header)
         for card, header in case.headers
@@ -202,15 +229,18 @@ def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
 )
 @rule("D2R114", ERROR, "all switching times are equal (decimals lost in writing)")
 def _equal(case: Case) -> Iterator[Objection]:
-    """Writers with one decimal make 0.0 of every time below 0.05, and 0.1 of 0.07 and 0.13. Cards that make parts
-    rigid and cards that make them deformable, all at one time, are a sign of it. Source: a public drop tool wrote
-    such decks.
+    """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. Cards
+    that make parts rigid and cards that make them deformable, all at the same time, are a sign of this. Source: a
+    public drop tool wrote such decks.
+
+    Fix: Print the times with more decimals.
     """
     timed = _timed(case)
     times = {card.time for card, _ in timed}
     ways = {line.to_rigid for card, _ in timed for line in card.switched}
     inverted = any(
-        one.td is not None and one.td <= one.tr for one in case.windows.windows
+        window.td is not None and window.td <= window.tr
+        for window in case.windows.windows
     )
     if (
         len(times) != 1
@@ -220,26 +250,30 @@ def _equal(case: Case) -> Iterator[Objection]:
     ):
         return
     (time,) = times
-    found = f"all {len(timed)} switching times of the deck are {time:g}, to rigid and back; were decimals lost?"
-    yield timed[0][1].time1.field, f"{found} print them with more digits"
+    problem = (
+        f"all {len(timed)} switching times of the deck are {time:g}, to rigid and back"
+    )
+    yield timed[0][1].time1.field, f"{problem}; print them with more decimals"
 
 
-def _mixed(times: list[float], end: float, what: str) -> str | None:
-    """Say so where all times multiplied by 1000, or by 1/1000, suit a run up to ``end``, and as they are do not.
+def _mixed(times: list[float], end: float, run_end: str) -> str | None:
+    """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000, else None.
 
-    Times before the run, or at its start, suit it in any unit.
+    ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
     later = [time for time in times if time > 0]
     if not later:
         return None
-    latest, earliest = max(later), min(later)
+    latest = max(later)
+    earliest = min(later)
     if 10 * end < latest < _THOUSAND * end and earliest >= end:
-        way = "later: milliseconds for seconds"
+        direction = "later: milliseconds for seconds"
     elif end / 50 <= _THOUSAND * latest < end:
-        way = "earlier: seconds for milliseconds"
+        direction = "earlier: seconds for milliseconds"
     else:
         return None
-    return f"the switching times reach {latest:g} but {what}, about 1000 times {way}? give both in the same unit"
+    problem = f"the switching times reach {latest:g} but {run_end}, about 1000 times {direction}"
+    return f"{problem}? give both in the same unit"
 
 
 @passes(
@@ -256,58 +290,54 @@ def _mixed(times: list[float], end: float, what: str) -> str | None:
     "the switching times are about 1000 times the termination time, or a thousandth of it",
 )
 def _thousand(case: Case) -> Iterator[Objection]:
-    """Seconds and milliseconds are mixed: the times would lie in the run if they were divided, or multiplied, by
-    1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no units, so
-    this is a guess by size.
+    """Seconds and milliseconds are mixed: divided or multiplied by 1000, the switching times lie in the run, and as
+    they are they lie outside, or only in its first 1/1000. Files contain no unit names, so d2rpick infers this from the
+    magnitudes. D2R101, which also reports times after the end, is then left out.
+
+    Fix: Write the switching times and ENDTIM in the same time unit.
     """
     times = [card.time for card, _ in _timed(case) if card.time is not None]
     if case.end is None:
         return
-    if found := _mixed(times, case.end, f"the run ends at {case.end:g} (ENDTIM)"):
-        yield _timed(case)[0][1].time1.field, found
-
-
-_DECADES = 3.0  # of a factor of 1000
-_NEAR = math.log10(2)  # a reference run may have been stopped at half of its time
-
-_HISTORY: Final = (
-    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
-)
-_GOOD_PAIR: Final = (".0135867", ".0687534")
+    if problem := _mixed(times, case.end, f"the run ends at {case.end:g} (ENDTIM)"):
+        yield _timed(case)[0][1].time1.field, problem
 
 
 def _pair(
     tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY
 ) -> Example:
-    there, back = automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"])
-    return Example(head + PARTS + there + back + END, history=history, options=options)
+    """Return a deck with one window for part 1, checked by a history of `d2rpick replay` with these arguments."""
+    rigid_card = automatic(1, tr, rigid=["1"])
+    back_card = automatic(2, td, deformable=["1"])
+    return Example(
+        head + PARTS + rigid_card + back_card + END, history=history, options=options
+    )
 
 
 _PASSING: Final = (_pair(*_GOOD_PAIR),)
 
 
 def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Objections of one rule; those that parts of one card share are one."""
+    """Yield the objections of the energy history for one rule; parts of one card with the same objection share one."""
     assert case.judge is not None
     windows = case.windows.windows
-    together = grouped(
-        ((one.tr, one.td), one.part) for one in windows if one.part is not None
+    parts_by_times = grouped(
+        ((window.tr, window.td), window.part)
+        for window in windows
+        if window.part is not None
     )
-    by_force = {window for each in case.by_condition for window in each.windows}
-    found = grouped(
-        ((event.by, one.unit.kind, fault.message), one.unit.id)
-        for one in windows
-        for fault in case.judge.faults(
-            one, together.get((one.tr, one.td), ()), by_force=one in by_force
-        )
-        if (event := one.closed if fault.at_td else one.opened)
-        and fault.rule == rule_id
-    )
-    for (card, kind, message), ids in found.items():
+    by_condition = {window for switch in case.by_condition for window in switch.windows}
+    objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
+    for judged_window in windows:
+        together = parts_by_times.get((judged_window.tr, judged_window.td), ())
+        by_force = judged_window in by_condition
+        for fault in case.judge.faults(judged_window, together, by_force=by_force):
+            event = judged_window.closed if fault.at_td else judged_window.opened
+            if event and fault.rule == rule_id:
+                key = event.by, judged_window.unit.kind, fault.message
+                objections.append((key, judged_window.unit.id))
+    for (card, kind, message), ids in grouped(objections).items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
-
-
-_WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
 
 
 @passes(*_PASSING, PASS)
@@ -315,12 +345,14 @@ _WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
 @rule(
     "D2R206",
     WARNING,
-    "deck and history seem to have different time units (ENDTIM and the record's end differ by a power of 1000)",
+    "deck and history seem to have different time units (their ends differ by a power of 1000)",
     BOTH,
 )
 def _units(case: Case) -> Iterator[Objection]:
-    """Decks in microseconds or milliseconds and histories in seconds are a common mix. Files name no units, so the two
-    ends are all there is to compare. It is left out if D2R115 or D2R207 reports the same mistake.
+    """Decks in microseconds or milliseconds are often checked with a history in seconds. Files contain no unit names,
+    so d2rpick compares the two end times. The finding is left out if D2R115 or D2R207 reports the same mistake.
+
+    Fix: Give deck and history in the same time unit.
     """
     assert case.judge is not None
     if case.end is None or case.end_time is None or not case.judge.end > 0:
@@ -328,11 +360,11 @@ def _units(case: Case) -> Iterator[Objection]:
     decades = math.log10(case.end) - math.log10(case.judge.end)
     power = round(decades / _DECADES)
     if power and abs(decades - _DECADES * power) <= _NEAR:
-        found = f"the deck ends at {case.end:g} but the history at {case.judge.end:g}, about 1e{abs(3 * power)} times"
-        way = "earlier" if power > 0 else "later"
+        problem = f"the deck ends at {case.end:g} but the history at {case.judge.end:g}, about 1e{abs(3 * power)} times"
+        direction = "earlier" if power > 0 else "later"
         yield (
             case.end_time.field,
-            f"{found} {way}: different units of time? give both in the same",
+            f"{problem} {direction}, so the time units seem to differ; give both in the same unit",
         )
 
 
@@ -348,40 +380,53 @@ def _units(case: Case) -> Iterator[Objection]:
     BOTH,
 )
 def _thousand_of_history(case: Case) -> Iterator[Objection]:
-    """A deck in milliseconds and a history in seconds, or the other way round: the windows would lie in the history
-    if their times were divided, or multiplied, by 1000. Files name no units, so this is a guess by size; D2R205
-    tells of times outside the history.
+    """Deck and history have different time units: divided or multiplied by 1000, the windows lie in the history. Files
+    contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the history are reported by
+    D2R205.
+
+    Fix: Give deck and history in the same time unit.
     """
     windows = case.windows.windows
-    times = [time for one in windows for time in (one.tr, one.td) if time is not None]
+    times = [
+        time
+        for window in windows
+        for time in (window.tr, window.td)
+        if time is not None
+    ]
     assert case.judge is not None
     if not case.judge.end > 0:
         return
-    if found := _mixed(
+    if problem := _mixed(
         times, case.judge.end, f"the history ends at {case.judge.end:g}"
     ):
-        yield windows[0].opened.by.time_field, found
+        yield windows[0].opened.by.time_field, problem
 
 
 @passes(*_PASSING, PASS)
 @fails(_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05"))
 @rule("D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH)
 def _d2r201(case: Case) -> Iterator[Objection]:
-    """While a part is rigid it keeps the deformation it had at tr; it springs back at td. The deformation should be
-    the one it would have had at td: same energy, same sign. Judged as d2rpick verify does, for the parts that share
-    a window together, else by the energy of the whole model: by the lock-in error where an oscillator describes the
-    record, else by the level error.
+    """While a part is rigid it keeps the deformation that it had at tr, and it springs back at td. This deformation
+    should be the one that the part would have at td: same energy, same direction. d2rpick judges the parts that share a
+    window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in error
+    if an oscillator describes the history, else the level error.
+
+    Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
     """
     return _faults(case, "D2R201")
 
 
 @passes(*_PASSING)
 @fails(_pair(".0122659", "0.064"))
-@rule("D2R202", ERROR, "opposite sign of the deformation", BOTH)
+@rule(
+    "D2R202", ERROR, "the deformation at tr has the opposite sign of that at td", BOTH
+)
 def _d2r202(case: Case) -> Iterator[Objection]:
-    """A vibrating part passes every energy level twice stretched and twice compressed. Locked in with the wrong
-    sign, the vibration after td is worse than with no energy at all. Known only where an oscillator describes the
-    record.
+    """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
+    wrong sign is locked in, the vibration after td is worse than with no locked-in energy. The sign is known only if an
+    oscillator describes the history.
+
+    Fix: Replace tr by the time in the finding, which has the right sign.
     """
     return _faults(case, "D2R202")
 
@@ -391,12 +436,14 @@ def _d2r202(case: Case) -> Iterator[Objection]:
 @rule(
     "D2R203",
     WARNING,
-    "poor td (kinetic share above one half): the better td, named",
+    "poor td: more than half of the vibration energy is kinetic",
     BOTH,
 )
 def _d2r203(case: Case) -> Iterator[Objection]:
-    """The share of the vibration energy that is kinetic at td is lost whatever tr is, since a rigid part does not
-    vibrate. Near a peak of the internal energy hardly any is kinetic.
+    """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
+    Near a maximum of the internal energy hardly any vibration energy is kinetic.
+
+    Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """
     return _faults(case, "D2R203")
 
@@ -405,9 +452,12 @@ def _d2r203(case: Case) -> Iterator[Objection]:
 @fails(_pair(*_GOOD_PAIR, "--after 0.03"))
 @rule("D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH)
 def _d2r204(case: Case) -> Iterator[Objection]:
-    """Before the load is over equal energy is an accident and the motion comes out wrong; after the next contact the
-    part should have deformed. When the flight begins and ends is found from the momentum or the energy of the
-    history, or given with --after. A history that does not show it is an objection too.
+    """Before the load is over, equal energy is a coincidence, and the motion of the body becomes wrong. After the next
+    contact the part should have deformed. d2rpick finds the begin and end of the flight from the momentum or the energy
+    of the history, or uses the time given by --after. A history that does not show the flight is reported too.
+
+    Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
+    --after.
     """
     return _faults(case, "D2R204")
 
@@ -416,7 +466,9 @@ def _d2r204(case: Case) -> Iterator[Objection]:
 @fails(_pair(".0135867", "0.16"))
 @rule("D2R205", ERROR, "tr or td outside the reference history", BOTH)
 def _d2r205(case: Case) -> Iterator[Objection]:
-    """The energy at such a time is unknown, and so is that of a part that the history does not have. A td within the
-    first ten states, whose thousandfold lies in the history, was given in another unit.
+    """The energy outside the history is unknown, and so is the energy of a part that the history does not contain. A td
+    within the first ten states is reported if 1000 times this td lies in the history: it seems to have another unit.
+
+    Fix: Correct the time or the part id, or run the reference longer.
     """
     return _faults(case, "D2R205")

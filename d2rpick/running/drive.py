@@ -177,7 +177,7 @@ class Driver:
         return order
 
     def _is_computed(self, order: Order) -> bool:
-        """Whether an earlier driver began this leg, and the solver has finished it since."""
+        """Return True if an earlier driver began this leg, and the solver has finished it since."""
         last = self.journal.records[-1]
         begun = last["event"] == "started" and Order(*last["order"]) == order
         return (
@@ -275,7 +275,7 @@ class Driver:
         self.solver.keep(kept_restarts)
 
     def _is_whole(self, order: Order, cycles: int | None) -> bool:
-        """Whether a leg left whole restarts, and a history that ends with it."""
+        """Return True if a leg left whole restarts, and a history that ends with it."""
         step = (order.until - order.start) / (cycles or 1)
         last_state = order.until - max(3 * self.limits.interval, 2 * step)
         number = order.number

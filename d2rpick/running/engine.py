@@ -205,7 +205,7 @@ class Solver:
 
     @property
     def alive(self) -> bool:
-        """Whether a solver is running, even if an earlier driver started it."""
+        """Return True if a solver is running, even if an earlier driver started it."""
         if self._process is not None:
             code = self._process.poll()
             if code is None:
@@ -239,7 +239,7 @@ class Solver:
         return max(0.0, now - written)
 
     def ended_well(self, number: int) -> bool:
-        """Whether the listing of a leg reports its normal end."""
+        """Return True if the listing of a leg reports its normal end."""
         return b"NORMAL TERMINATION" in _read_tail(self.file(number, ".out"))
 
     def took(self, number: int) -> tuple[int | None, float | None]:
@@ -252,7 +252,7 @@ class Solver:
         )
 
     def whole(self, number: int) -> bool:
-        """Whether a leg, 0 for the starter, has left whole restarts of all domains.
+        """Return True if a leg, 0 for the starter, has left whole restarts of all domains.
 
         A restart of OpenRadioss begins with its own name.  It is as long as the one of the starter except for what has
         changed in the contacts.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -271,7 +271,7 @@ class Solver:
         return True
 
     def came_to(self, number: int, end: float) -> bool:
-        """Whether the history of a leg has a state at a time or after it [time]."""
+        """Return True if the history of a leg has a state at a time or after it [time]."""
         path = self.history(number)
         try:
             times = TimeHistory(path.read_bytes(), str(path)).time
@@ -280,7 +280,7 @@ class Solver:
         return bool(times.size) and float(times[-1]) >= end
 
     def started_well(self) -> bool:
-        """Whether the starter has ended without an error and left a whole restart."""
+        """Return True if the starter has ended without an error and left a whole restart."""
         return self.whole(0) and not _STARTER_ERROR.search(
             _read_tail(self.file(0, ".out"))
         )

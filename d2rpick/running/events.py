@@ -68,7 +68,7 @@ def find_events(
 def _is_rigid(
     tr: float | None, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> bool:
-    """Whether parts are rigid already at a tr that is advised."""
+    """Return True if parts are rigid already at a tr that is advised."""
     if tr is None:
         return False
     return any(start <= tr <= end for start, _, end in rigid_times)

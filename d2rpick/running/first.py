@@ -184,7 +184,7 @@ def _refuse_loads(starter: Starter) -> None:
 
 
 def _falls_from_rest(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
-    """Whether the parts are at rest at first and gravity acts on them; no support holds them."""
+    """Return True if the parts are at rest at first and gravity acts on them; no support holds them."""
     if run.starter is None or run.starter.named("INIVEL"):
         return False
     if any(leg.starts for leg in run.legs):

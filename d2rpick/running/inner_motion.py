@@ -401,7 +401,7 @@ class InnerMotion:
         return so_far[count - 1] if count else None
 
     def _is_at_rest(self, start: float, now: float) -> bool:
-        """Whether no force has acted since the record began, and nothing vibrates."""
+        """Return True if no force has acted since the record began, and nothing vibrates."""
         history = self._evidence.history
         if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
             return False
@@ -414,7 +414,7 @@ class InnerMotion:
         return largest[0] <= _ROUND_OFF * max(largest)
 
     def _has_long_ongoing_swing(self, now: float) -> bool:
-        """Whether a swing goes on that has taken much longer already than all swings before it."""
+        """Return True if a swing goes on that has taken much longer already than all swings before it."""
         longest = self._get_longest(now)
         strongest = longest.strength if longest else 0.0
         motions = [

@@ -48,7 +48,7 @@ class Looks:
 
     @property
     def grow(self) -> bool:
-        """Whether the format lets new states be read without the states before them."""
+        """Return True if the format lets new states be read without the states before them."""
         return bool(self._read_parts)
 
     def new_states(self, names: Sequence[str]) -> tuple[History | None, bool]:

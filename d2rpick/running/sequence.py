@@ -89,7 +89,7 @@ class Order(NamedTuple):
 
     @property
     def rigid(self) -> bool:
-        """Whether the parts are rigid in this leg."""
+        """Return True if the parts are rigid in this leg."""
         return self.kind in RIGID_KINDS
 
     def following(self, kind: str, until: float) -> Order:

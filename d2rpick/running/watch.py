@@ -103,7 +103,7 @@ class Watch:
 
     @property
     def reads_what_is_new(self) -> bool:
-        """Whether the next look reads only the new states."""
+        """Return True if the next look reads only the new states."""
         return self._looks.grow
 
     def state(self) -> Event:
@@ -237,7 +237,7 @@ def _is_rewritten(
     files_before: Sequence[tuple[str, os.stat_result]],
     files: Sequence[tuple[str, os.stat_result]],
 ) -> bool:
-    """Whether a file is gone or has become shorter."""
+    """Return True if a file is gone or has become shorter."""
     sizes = {name: status.st_size for name, status in files}
     return any(
         name not in sizes or sizes[name] < status.st_size

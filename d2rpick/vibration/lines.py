@@ -213,22 +213,25 @@ def predict(grid: Grid) -> Prediction | None:
     first = grid.first(int(FIRST_PART * grid.time.size))
     behind = slice(first.time.size, None)
     space = _SignalSpace.of(first)
-    tried: list[tuple[float, int, Spectrum]] = []
+    tried: list[tuple[float, int, bool, Spectrum]] = []
     for order in _ORDERS:
         if order > first.time.size // 3 or order + 2 > space.size:
             break
-        spectrum = fit_spectrum(first, space.poles(order), grid.span)
-        predicted = _block_means(spectrum, grid.time[behind], grid)
-        off = float(np.sqrt(np.mean((predicted - grid.energy[behind]) ** 2)))
-        missed = float(np.hypot(off, spectrum.error)) / swing
-        if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
-            tried.append((missed, order, spectrum))
-        if missed < _PERFECT:
+        poles = space.poles(order)
+        for every_decay in (False, True):
+            spectrum = fit_spectrum(first, poles, grid.span, every_decay=every_decay)
+            predicted = _block_means(spectrum, grid.time[behind], grid)
+            off = float(np.sqrt(np.mean((predicted - grid.energy[behind]) ** 2)))
+            missed = float(np.hypot(off, spectrum.error)) / swing
+            if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
+                tried.append((missed, order, every_decay, spectrum))
+        if tried[-1][0] < _PERFECT:
             break
     if not tried:
         return None
-    missed, order, of_first = tried[-1]
-    whole = fit_spectrum(grid, _SignalSpace.of(grid).poles(order), grid.span)
+    missed, order, every_decay, of_first = tried[-1]
+    poles = _SignalSpace.of(grid).poles(order)
+    whole = fit_spectrum(grid, poles, grid.span, every_decay=every_decay)
     return Prediction(whole, of_first, missed, swing)
 
 
@@ -260,9 +263,14 @@ class _SignalSpace:
         return np.asarray(np.log(factors[kept].astype(np.complex128)) / self.step)
 
 
-def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
-    """Fit lines and mean with given poles to a grid; the time ``span`` decides which poles can be separated [time]."""
-    lines, mean = _split(poles, span)
+def fit_spectrum(
+    grid: Grid, poles: Complex, span: float, *, every_decay: bool = False
+) -> Spectrum:
+    """Fit lines and mean with these poles to a grid; poles are told apart by what they do within ``span`` [time].
+
+    ``every_decay``: the mean has that of each line as it is, which noise allows of few lines alone.
+    """
+    lines, mean = _split(poles, span, every_decay=every_decay)
     every = np.concatenate([lines, mean])
     waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(
         every
@@ -290,20 +298,28 @@ def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
     return np.asarray(means[0] + means[1])
 
 
-def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
-    """Separate the poles of lines from those of the mean: a constant, a few decays, and very slow swings."""
+def _split(
+    poles: Complex, span: float, *, every_decay: bool
+) -> tuple[Complex, Complex]:
+    """Tell the poles of lines from those of the mean: a constant, a few decays, and swings slower than the record."""
     decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
     rate = poles.imag
     turns = rate * span / (2 * np.pi)
     lasting = decay * span < _MOST_DECAY
     is_line = (turns > _LEAST_TURNS) & (decay < _MOST_DAMPED * rate) & lasting
     is_slow = (rate >= 0) & ~is_line & (turns < _LEAST_TURNS) & lasting
-    every = np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1)
-    decays = np.array(sorted({one for one in every.tolist() if abs(one) > _SAME_DECAY}))
-    if decays.size > _MOST_DECAYS:
-        decays = decays[
-            np.linspace(0, decays.size - 1, _MOST_DECAYS).round().astype(int)
-        ]
+    decays = np.concatenate([decay[is_line], decay[is_slow]])
+    if not every_decay:
+        decays = _few_of(decays, span)
     slow = rate[is_slow & (rate * span > 0.5)]
-    mean = np.concatenate([[0.0], -decays / span, 1j * slow])
+    mean = np.concatenate([[0.0], -decays, 1j * slow])
     return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)
+
+
+def _few_of(decays: Samples, span: float) -> Samples:
+    """Give a few decays that the record tells apart in place of many."""
+    rounded = sorted(set(np.round(decays * span, 1).tolist()))
+    few = np.array([decay for decay in rounded if abs(decay) > _SAME_DECAY])
+    if few.size > _MOST_DECAYS:
+        few = few[np.linspace(0, few.size - 1, _MOST_DECAYS).round().astype(int)]
+    return few / span

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials
 
-# Least size of a line relative to the strongest one, of its partner, and in multiples of its own scatter.
-NOTABLE, _NOTABLE_PARTNER, _ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are equal if they differ by less than this share of a turn over the record.
+# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
+# Two rates are one if they differ by less than this share of a turn over the record.
 _SAME_RATE: Final = 0.1
 # Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
@@ -44,11 +44,11 @@ def find_stretches(
     order = np.argsort(-size).tolist()
     found: list[Stretch] = []
     for line in order:
-        if size[line] < max(NOTABLE * strongest, _ABOVE_SCATTER * scatter):
+        if size[line] < max(NOTABLE * strongest, ABOVE_SCATTER * scatter):
             continue
         for own in order:
             if own == line or size[own] < max(
-                _NOTABLE_PARTNER * strongest, _ABOVE_SCATTER * scatter
+                _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
             ):
                 continue
             if abs(rate[own] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
@@ -93,7 +93,7 @@ def _measure_locked_to(
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))
         apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
-        if line == first or apart or size[line] < _ABOVE_SCATTER * scatter:
+        if line == first or apart or size[line] < ABOVE_SCATTER * scatter:
             break
         # stiffening and softening springs have harmonics of opposite signs
         if (

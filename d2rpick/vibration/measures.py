@@ -187,14 +187,30 @@ def sign_match(
     return np.asarray(vibration.overlap(tr, td) >= 0)
 
 
-def band_up_to(
-    highest: Callable[[Samples, Samples, Any], Samples],
-    stated: Samples,
-    tr: Samples,
-    td: Samples | float,
+def band_about(
+    squared: Samples, off: Samples, hidden: Samples | float, left_out: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
-    """Return the band of a model whose stated residual is its lower bound, from a function of the ``highest``."""
-    return stated, stated, highest(stated, tr, td)
+    """Give a residual to state, and the lowest and the highest, from its square and by how much that may be off.
+
+    It may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No square is
+    below zero: where it may reach there, the middle of what remains is stated.
+    """
+    low, high = np.maximum(squared - off, 0.0), squared + off
+    lowest = np.maximum(low - left_out, 0.0)
+    return np.sqrt((low + high) / 2), np.sqrt(lowest), np.sqrt(high + hidden)
+
+
+# By so many damping ratios R^2 depends on the phases at td, at most by two.
+_PHASES_COUNT = 1.5
+
+
+def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
+    """Share of R^2 that depends on where in its swing the error begins [-].
+
+    Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
+    after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.
+    """
+    return np.asarray(_PHASES_COUNT * np.abs(alpha) / (2 * omega))
 
 
 def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
@@ -331,7 +347,9 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Return the interval between the two times around each of ``at`` [time]."""
+        """Interval between the two times around each of ``at``; infinite without two times [time]."""
+        if self.time.size < 2:
+            return np.full(np.shape(at), np.inf)
         after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[after] - self.time[after - 1])
 

@@ -15,8 +15,10 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration import measures
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
 from d2rpick.vibration.locked_lines import (
+    ABOVE_SCATTER,
     NOTABLE,
     Stretch,
     find_stretches,
@@ -76,13 +78,13 @@ _FINER: Final = 4
 # share.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# Half-width of R^2 without any known error.
-_LEAST_HALF: Final = 0.01
+# The half-width of R^2, before anything is known to be wrong.
+_LEAST_HALF: Final = 0.006
 _VAGUE_HALF: Final = (
     0.2  # half-width of R^2 of vague modes; well-identified ones have 0.02 to 0.1
 )
-_SOME_TIMES: Final = 64  # number of times at which the band is evaluated as a whole
-_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
+_SOME_TIMES: Final = 64  # at which the band is looked at as a whole
+_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 1.6
 _DRIFT_OF_NOISE: Final = 0.08
 _HIDDEN_LINES: Final = 12  # number of lines that may hide in the rest of the fit
 
@@ -182,6 +184,8 @@ class ModalVibration:
         Scatter of the record about its lines [energy].
     systematic : float
         Share of the scatter that neighbouring states share, and which is believed [-].
+    states_per_period : float
+        States of the record in a period of the fastest line that is told from noise [-].
     slack : float
         Negative static energy that noise makes, over the mean vibration energy [-].
     source : str
@@ -199,6 +203,7 @@ class ModalVibration:
     doubts: Doubts
     noise: float
     systematic: float
+    states_per_period: float
     slack: float
     source: str = "internal energy"
     second: Reading | None = None
@@ -328,6 +333,7 @@ class ModalVibration:
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
             + np.minimum(lines, 1.0)
             + _NOISE_COUNTS * scatter
+            + self._phase_share * squared
             + beside
             + self._of_other_readings(tr, td, squared)
         )
@@ -346,9 +352,7 @@ class ModalVibration:
 
         Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.
         """
-        squared, half = np.square(stated), self.half_width(tr, td)
-        low, high = np.maximum(squared - half, 0.0), squared + half
-        return np.sqrt((low + high) / 2), np.sqrt(low), np.sqrt(high)
+        return measures.band_about(np.square(stated), self.half_width(tr, td), 0.0, 0.0)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the share of the vibration energy at td that corresponds to the band, from each tr on [-].
@@ -356,6 +360,14 @@ class ModalVibration:
         A hidden mode in opposite phase at tr and td adds four times its share to R^2.
         """
         return self.half_width(tr, td) / 4
+
+    @cached_property
+    def _phase_share(self) -> float:
+        """Share of R^2 that depends on the phases at td, of all modes [-]."""
+        modes = self.reading.modes
+        poles, sizes = modes.poles, np.abs(modes.weights)
+        shares = measures.phase_share(-poles.real, poles.imag / 2)
+        return float(sizes @ shares / max(float(sizes.sum()), 1e-300))
 
     @cached_property
     def _wrong(self) -> float:
@@ -551,9 +563,18 @@ def _read(
         doubts,
         noise,
         systematic,
+        min(grid.strong, _count_states(spectrum.lines, grid, scatter)),
         slack,
         "kinetic energy" if kinetic else "internal energy",
     )
+
+
+def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
+    """Count the states in a period of the fastest line that is notable, and no scatter."""
+    sizes = np.abs(lines.weights)
+    least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
+    fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
+    return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
 
 
 def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:

@@ -49,18 +49,27 @@ def find_described(
     memory : Memory
         Of the record: what was identified in a window is looked for once.
     """
-    known = memory.once("described by modes", list[Described])
-    for found in known:
-        if found.span.start <= td <= found.span.end:
-            return found
     for window in _windows(history, td, guess):
-        vibration = _identified(history, window, memory)
-        if vibration is None or not vibration.convinces:
-            continue
-        found = _grown(history, Described(vibration, window), memory)
-        known.append(found)
-        return found
+        found = _described_from(history, window, memory)
+        if found is not None:
+            return found
     return None
+
+
+def _described_from(history: History, window: Span, memory: Memory) -> Described | None:
+    """Grow a window whose modes go on by themselves; None if they do not.
+
+    What comes out depends on the window alone, not on the td that was asked for first.
+    """
+    key = ("described by modes", *window)
+    return memory.once(key, lambda: _look_in(history, window, memory))
+
+
+def _look_in(history: History, window: Span, memory: Memory) -> Described | None:
+    vibration = _identified(history, window, memory)
+    if vibration is None or not vibration.convinces:
+        return None
+    return _grown(history, Described(vibration, window), memory)
 
 
 def inner_window(history: History, guess: Span) -> Span:

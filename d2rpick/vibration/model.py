@@ -31,7 +31,8 @@ from d2rpick.vibration.moments import (
     SampledEnergy,
     moments_of_mode,
 )
-from d2rpick.vibration.span import SMALLEST, residual_bound
+from d2rpick.vibration.oscillator_band import residual_band
+from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -399,9 +400,9 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the states per period of the energy's fastest strong line [-]; None if no lines were searched."""
+        """States per period of the fastest line of the energy [-]; None if no lines were looked for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
-        return modal.doubts.coarse if modal else None
+        return modal.states_per_period if modal else None
 
     @property
     def has_model(self) -> bool:
@@ -521,7 +522,7 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
         whole.mode,
         *whole.span,
         None,
-        partial(measures.band_up_to, partial(residual_bound, fit)),
+        partial(residual_band, fit),
     )
     return Vibration(
         "oscillator", whole, compared, undescribed="not described by the oscillator"

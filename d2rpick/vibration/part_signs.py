@@ -238,16 +238,10 @@ class SignedParts(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the stated residual of each tr (n,), which is the lower bound, and the upper bound [-]."""
-        return measures.band_up_to(self.residual_bound, stated, tr, td)
-
-    def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Return the largest residual of each tr (n,) if the hidden part is in opposite phase at tr and td [-]."""
-        return np.asarray(
-            np.hypot(
-                residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
-            )
-        )
+        """Residual of each tr (n,), and its bounds if what may be hidden stood opposed at tr and td [-]."""
+        opposed = np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
+        squared, hidden = np.square(stated), np.square(opposed)
+        return measures.band_about(squared, 0.0 * squared, hidden, hidden)
 
     def comparable_since(self, td: float) -> float:
         """Return the last unclear time before ``td``: from there on signs can be compared with those at td [time]."""

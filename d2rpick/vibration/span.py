@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import product
 from math import ceil, log
 from typing import TYPE_CHECKING, Final
 
@@ -62,7 +63,9 @@ _MUCH_BETTER = 0.7
 # largest of: this share of the vibration energy, this many standard errors of such a mean, this many times the
 # systematic rest of the fit. Of a million means of white noise one does so by chance.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Most fits of the growing window; two are usual.
+# An oscillator that describes this share of the bounds is that of every td in its window: none is sought beside it.
+_MOST_OF_BOUNDS = 0.5
+# Fits of the growing window until it stays; two are usual.
 _MOST_REFITS = 8
 
 
@@ -121,15 +124,50 @@ def described_span(
     return None, refused[up_to_td]
 
 
+def most_described(
+    history: History,
+    bounds: Span,
+    fitter: Fitter = identify,
+    *,
+    whole: bool = False,
+    memory: Memory | None = None,
+) -> tuple[Span, Identification] | None:
+    """Find a window of most of the ``bounds`` that one oscillator describes; None if none is found.
+
+    It is that of any td in it, whichever is asked for.  Since it holds the middle of the bounds, it is looked for
+    there.  One that is not found is found from its td.  Parameters as for `described_span`.
+    """
+    start, end = bounds
+    middle = (start + end) / 2
+    beginnings, ends = [start], [end]
+    if not whole:
+        beginnings.append(_mark(middle - _BEGINNINGS[0] * (middle - start), bounds))
+        ends.append(_mark(middle + _ENDS[0] * (end - middle), bounds, 1))
+    windows = [Span(*window) for window in product(beginnings, ends)]
+    reach = partial(_reach, history, bounds, memory or Memory())
+    for window in sorted(windows, key=lambda one: one.start - one.end):
+        span, fit = _grow(history, middle, window, bounds, fitter, reach)
+        if span and span.end - span.start >= _MOST_OF_BOUNDS * (end - start):
+            return span, fit
+    return None
+
+
 def _reach(
     history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification
 ) -> Span | None:
-    """Give the `span_of` a fit; all times in it have the same but for rounding, and every td near it asks for it."""
-    known = memory.once(("spans", fit.mode, fit.rms, fit.structure, bounds), list[Span])
-    span = next((one for one in known if one.start <= anchor <= one.end), None)
-    if span is None and (span := span_of(history, anchor, fit, bounds)):
-        known.append(span)
-    return span
+    """Give the `span_of` a fit, from the middle of what it was fitted to if the anchor lies in that.
+
+    All times in it have the same but for rounding, and many td ask for it: none of them shall have it of another.
+    """
+    key, middle = (fit.mode, fit.rms, fit.structure, bounds), (fit.start + fit.end) / 2
+    span = memory.once(
+        ("span", *key, middle), lambda: span_of(history, middle, fit, bounds)
+    )
+    if span is not None and span.start <= anchor <= span.end:
+        return span
+    return memory.once(
+        ("span", *key, anchor), lambda: span_of(history, anchor, fit, bounds)
+    )
 
 
 def span_of(
@@ -359,16 +397,3 @@ def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # the energy of a mode swings about a mean by half of its vibration energy
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
-
-
-def residual_bound(
-    fit: Identification, residual: Samples, tr: Samples, td: Samples | float
-) -> Samples:
-    """Return the largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
-
-    The mode is then in opposite phase at tr and td, and smaller at td by the damping in between: R^2 grows by its share
-    of the vibration energy times (1 + exp(alpha (td - tr)/2))^2.
-    """
-    assert fit.mode is not None
-    swing = 1 + np.exp(fit.mode.alpha / 2 * (td - tr))
-    return np.sqrt(residual**2 + fit.hidden_share * swing**2)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import find_turns
-from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.measures import Profile, vertices, wrong_sign
 
@@ -106,15 +105,13 @@ class Swings(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the stated residual of each tr (n,), which is the lower bound, and the upper bound [-]."""
-        return measures.band_up_to(self.residual_bound, stated, tr, td)
-
-    def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Return the largest residual of each tr (n,): for any spring, with the worst that the floor may hide [-]."""
+        """Residual of each tr (n,), and its bounds for any spring, with what may hide in the floor [-]."""
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0)
         )
-        return np.asarray(np.hypot(_OF_ANY_SPRING * residual, hidden))
+        least = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
+        highest = np.hypot(_OF_ANY_SPRING * stated, hidden)
+        return stated, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the share of the vibration energy at td that a mode may hide in the floor, for each tr (n,) [-].

@@ -9,9 +9,9 @@ from d2rpick.base.errors import listing, printable
 
 @given(st.text())
 def test_what_is_shown_holds_no_line_end_and_no_control_character(text: str) -> None:
-    shown = printable(text)
-    assert len(shown.splitlines()) <= 1
-    assert not {unicodedata.category(letter) for letter in shown} & {
+    escaped = printable(text)
+    assert len(escaped.splitlines()) <= 1
+    assert not {unicodedata.category(letter) for letter in escaped} & {
         "Cc",
         "Cf",
         "Zl",

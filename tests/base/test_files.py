@@ -1,4 +1,4 @@
-"""When a file is at rest: so long after its last change that no write is under way and a later one would show."""
+"""A file is settled so long after its last change that no write is in progress and a later one would show."""
 
 import os
 import stat
@@ -28,8 +28,13 @@ MEGABYTE = 10**6
             100 * MEGABYTE,
             0.55,
             False,
-        ),  # the write of so much may have begun then
-        (200 * MOMENT, 100 * MEGABYTE, 0.05, True),  # but little at a time is appended
+        ),  # a write of this size may have begun then
+        (
+            200 * MOMENT,
+            100 * MEGABYTE,
+            0.05,
+            True,
+        ),  # a write appends only little at a time
         *(
             (WHOLE, 0, 2.05, may_grow) for may_grow in (False, True)
         ),  # times in whole seconds
@@ -59,9 +64,9 @@ def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
             "fstat",
             lambda _: SimpleNamespace(st_dev=1, st_ino=2, st_size=size, **times),
         )
-        found = settled_state(file, may_grow=may_grow)
-    assert found
-    assert found.size == size
+        state = settled_state(file, may_grow=may_grow)
+    assert state
+    assert state.size == size
     assert pauses == ([] if pause is None else [pytest.approx(pause)])
 
 
@@ -91,8 +96,8 @@ def test_a_file_that_is_replaced_keeps_its_owner(tmp_path: Path) -> None:
     file.touch(mode=0o600)
     os.chown(file, 12345, 23456)
     write_whole(file, b"new")
-    found = file.stat()
-    assert (found.st_uid, found.st_gid, stat.S_IMODE(found.st_mode)) == (
+    status = file.stat()
+    assert (status.st_uid, status.st_gid, stat.S_IMODE(status.st_mode)) == (
         12345,
         23456,
         0o600,
@@ -109,11 +114,11 @@ def test_a_new_file_has_the_mode_of_any_new_file(tmp_path: Path) -> None:
 def test_a_name_may_be_as_long_as_the_file_system_allows(
     tmp_path: Path, letter: str
 ) -> None:
-    most = os.pathconf(tmp_path, "PC_NAME_MAX")
-    file = tmp_path / (letter * (most // len(os.fsencode(letter))))
+    longest = os.pathconf(tmp_path, "PC_NAME_MAX")
+    file = tmp_path / (letter * (longest // len(os.fsencode(letter))))
     for content in (b"old", b"new"):
         write_whole(file, content)
-    assert [one.read_bytes() for one in tmp_path.iterdir()] == [b"new"]
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"new"]
     with pytest.raises(OSError, match="too long"):
         write_whole(tmp_path / f"{file.name}{letter}", b"")
 
@@ -125,6 +130,6 @@ def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(
     file.write_bytes(b"old")
     with pytest.raises(TypeError):
         write_whole(file, ["no bytes"])  # type: ignore[arg-type]
-    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [
         ("a", b"old")
     ]

@@ -17,7 +17,7 @@ class Ours(NamedTuple):
 
     @property
     def both(self) -> str:
-        """The two of them."""
+        """Both values in one text."""
         return f"{self.first} {self.second}"
 
 
@@ -29,13 +29,13 @@ class Theirs(typing.NamedTuple):
 
 
 class Measure(Record):
-    """What others may have too."""
+    """A record whose field others inherit."""
 
     share: float | None = None
 
 
 class Wide(Measure, Record):
-    """It stands between what must be given and what need not be."""
+    """The inherited field is between the required and the optional fields."""
 
     name: str
     kind: str = "any"
@@ -51,10 +51,10 @@ def test_fields_defaults_and_names_are_those_of_typing() -> None:
 
 
 def test_it_is_a_tuple_with_what_its_class_defines() -> None:
-    one = Ours(1)
-    assert one == (1, "two")
-    assert one._replace(first=3).both == "3 two"
-    assert pickle.loads(pickle.dumps(one)) == one
+    record = Ours(1)
+    assert record == (1, "two")
+    assert record._replace(first=3).both == "3 two"
+    assert pickle.loads(pickle.dumps(record)) == record
 
 
 def test_a_record_has_the_fields_of_its_base_behind_those_that_must_be_given() -> None:

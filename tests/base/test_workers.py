@@ -1,4 +1,4 @@
-"""Calls are computed here, by processes, or by a cluster, always the same way; a process that dies stops nothing."""
+"""Calls give the same results here, in processes and on a cluster; a process that dies stops nothing."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ FARMS = [Farm, lambda: Cores(2, __name__)]
 
 
 def square(number: int) -> int:
-    """Work, or fail, or die, as the number asks for."""
+    """Compute, fail or die, depending on the number."""
     if number == 13:
         raise ValueError("thirteen")
     if number == 99:
@@ -29,37 +29,40 @@ def square(number: int) -> int:
 
 @pytest.mark.parametrize("farm", FARMS)
 def test_every_item_is_answered_once_by_its_number(farm: Callable[[], Farm]) -> None:
-    with farm() as place:
-        found = {
-            answer.number: answer.result for answer in place.answers(square, range(12))
+    with farm() as workers:
+        results = {
+            answer.number: answer.result
+            for answer in workers.answers(square, range(12))
         }
-    assert found == {i: i**2 for i in range(12)}
+    assert results == {i: i**2 for i in range(12)}
 
 
 @pytest.mark.parametrize("farm", FARMS)
 def test_an_error_is_the_answer_of_its_item_alone(farm: Callable[[], Farm]) -> None:
-    with farm() as place:
-        found = {answer.number: answer for answer in place.answers(square, (1, 13, 2))}
-    assert [found[i].result for i in range(3)] == [1, None, 4]
-    assert str(found[1].error) == "thirteen"
-    assert found[0].error is found[2].error is None
+    with farm() as workers:
+        answers = {
+            answer.number: answer for answer in workers.answers(square, (1, 13, 2))
+        }
+    assert [answers[i].result for i in range(3)] == [1, None, 4]
+    assert str(answers[1].error) == "thirteen"
+    assert answers[0].error is answers[2].error is None
 
 
 def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
     items = [*range(8), 99, *range(8, 12), 99, 12]
-    with Cores(2, __name__) as place:
-        found = {answer.number: answer for answer in place.answers(square, items)}
-    dead = [number for number, answer in found.items() if answer.error]
+    with Cores(2, __name__) as workers:
+        answers = {answer.number: answer for answer in workers.answers(square, items)}
+    dead = [number for number, answer in answers.items() if answer.error]
     assert sorted(dead) == [8, 13]
-    assert all(isinstance(found[number].error, D2RPickError) for number in dead)
-    assert "memory" in str(found[8].error)
-    assert [found[n].result for n in sorted(found) if n not in dead] == [
+    assert all(isinstance(answers[number].error, D2RPickError) for number in dead)
+    assert "memory" in str(answers[8].error)
+    assert [answers[n].result for n in sorted(answers) if n not in dead] == [
         i**2 for i in range(13)
     ]
 
 
 def children_of(process: int) -> dict[str, list[int]]:
-    """Ids of the processes below one, by what they are; of those that are forked the command is that of the first."""
+    """Return the ids of the child processes by kind; forked processes have the command of the first one."""
     listed = check_output(
         ["ps", "-e", "-ww", "-o", "pid=,ppid=,args="], text=True
     ).splitlines()
@@ -116,9 +119,9 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
             taken += 1
             yield number
 
-    with farm() as place:
-        for done, _ in enumerate(place.answers(square, items())):
-            assert taken <= done + getattr(place, "room", 1)
+    with farm() as workers:
+        for done, _ in enumerate(workers.answers(square, items())):
+            assert taken <= done + getattr(workers, "room", 1)
 
 
 def test_there_is_a_core() -> None:
@@ -128,13 +131,13 @@ def test_there_is_a_core() -> None:
 def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
     tmp_path: Path,
 ) -> None:
-    """A parent that goes on after the interrupt starts the process anew."""
+    """If the parent continues after the interrupt, it restarts the process."""
     (tmp_path / "slow.py").write_text(
         "import sys; print('importing', flush=True); sys.stdin.readline()"
     )
     code = (
         "import signal; from d2rpick.base.workers import Cores, begin\n"
-        "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
+        "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored SIGINT would be inherited
         "begin(2, 'slow')\n"
         "with Cores(2, 'slow') as farm: print(next(farm.answers(abs, [-7])).result)\n"
     )
@@ -150,5 +153,5 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "importing\n"
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        os.killpg(process.pid, signal.SIGINT)  # to the children too, as a terminal does
         assert process.communicate("\n", timeout=TIME_LIMIT) == ("importing\n7\n", "")

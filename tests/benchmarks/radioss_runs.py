@@ -11,20 +11,20 @@ import tempfile
 from math import inf
 from pathlib import Path
 
-from tests.deck.test_openradioss import solve
+from tests.deck.test_openradioss import run_solver
 from tests.deck.test_solver_listings import (
     OFF,
     ON,
     RESET,
     STEP,
     Listed,
-    body,
-    clock,
-    logic,
-    merge,
-    place,
-    rigid_by_check,
-    rigid_by_listing,
+    find_spans_by_check,
+    find_spans_by_listing,
+    write_body,
+    write_clock,
+    write_logic,
+    write_merge,
+    write_run,
 )
 from tests.decks import wide
 
@@ -53,12 +53,12 @@ def write_group(chance: random.Random, part: int) -> tuple[int, str]:
 def write_sensors(chance: random.Random) -> str:
     """Write two clocks and one sensor of both, number 7."""
     times = [chance.randint(0, 6) / 1000 for _ in range(4)]
-    clocks = clock(5, times[0], chance.choice([None, times[1]])) + clock(
+    clocks = write_clock(5, times[0], chance.choice([None, times[1]])) + write_clock(
         6, times[2], chance.choice([None, times[3]])
     )
     kind = chance.choice(["OR", "AND", "NOT"])
     asked = (5,) if kind == "NOT" else (5, 6)
-    return clocks + logic(kind, 7, *asked)
+    return clocks + write_logic(kind, 7, *asked)
 
 
 def write_leg(
@@ -88,8 +88,8 @@ def write_leg(
     return "\n".join(lines)
 
 
-def write_run(seed: int) -> Listed:
-    """Write a run of one to three bodies."""
+def draw_run(seed: int) -> Listed:
+    """Draw a random run of one to three bodies."""
     chance = random.Random(seed)
     starter, nodes = "", []
     parts = chance.sample(PARTS, chance.randint(1, 3))
@@ -104,7 +104,7 @@ def write_run(seed: int) -> Listed:
         nodes.append(node or 103 + made)
         group, text = write_group(chance, part)
         sensor = chance.choice([5, 7]) if sensed and part == parts[0] else 0
-        starter += text + body(number, node, part, sensor).replace(
+        starter += text + write_body(number, node, part, sensor).replace(
             wide(part, 0, 0, 0), wide(group, 0, 0, 0), 1
         )
     if sensed:
@@ -116,7 +116,7 @@ def write_run(seed: int) -> Listed:
             if line.startswith("/RBODY/")
         )
         first, other = chance.sample(ids, 2)
-        starter += merge((first, 1, other, 1))
+        starter += write_merge((first, 1, other, 1))
     count = chance.choice([1, 2, 3])
     off: set[int] = set()
     legs = tuple(write_leg(chance, nodes, off, first=at == 0) for at in range(count))
@@ -146,11 +146,11 @@ def spread(folder: Path, chance: random.Random, starter: str) -> None:
 
 def compare(folder: Path, seed: int) -> str:
     """Compare `check` with the listing of a run; empty where both agree."""
-    run = write_run(seed)
-    main = place(folder, run)
+    run = draw_run(seed)
+    main = write_run(folder, run)
     spread(folder, random.Random(seed), run.starter)
-    solve(folder, "X")
-    listed, checked = rigid_by_listing(folder), rigid_by_check(main)
+    run_solver(folder, "X")
+    listed, checked = find_spans_by_listing(folder), find_spans_by_check(main)
     closed = {
         part: [(tr, inf if td is None else td) for tr, td in spans]
         for part, spans in checked.items()

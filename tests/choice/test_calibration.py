@@ -14,7 +14,7 @@ from d2rpick.choice.calibration import (
     observations_of_runs,
 )
 from d2rpick.choice.cost import MEASURED
-from tests.deck.test_radioss_inventory import BEGIN, PROPS, nodes
+from tests.deck.test_radioss_inventory import BEGIN, PROPS, write_nodes
 from tests.decks import wide
 
 TRUE = {"QBAT": 2.0, "BT": 0.9, "solid": 1.5}
@@ -85,7 +85,7 @@ def run_folder(folder: Path) -> Path:
     body = (
         f"/GRNOD/PART/1\ng\n{wide(1)}/RBODY/1\nbody\n{wide(9)[:-1]}{' ' * 50}{wide(1)}"
     )
-    deck = f"{BEGIN}{nodes(9)}{parts}{PROPS}{body}/END\n"
+    deck = f"{BEGIN}{write_nodes(9)}{parts}{PROPS}{body}/END\n"
     (folder / "TEST_0000.rad").write_text(deck)
     (folder / "TEST_0001.rad").write_text("/RUN/TEST/1\n0.1\n/RBODY/OFF\n9\n")
     (folder / "TEST_0002.rad").write_text("/RUN/TEST/2\n0.2\n/RBODY/ON\n9\n")

@@ -126,7 +126,7 @@ def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
     first.write_bytes(Path(BOX).read_bytes())
     later.touch()
     told = run("verify", "--part", "box", "--switched", str(first), BOX).stderr
-    assert f"beside it lies {later}, a later leg of the run? Name it too" in told
+    assert f"in the same folder is {later}, a later leg of the run? Name it too" in told
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at, suggest_of
-from d2rpick.choice.candidates import Candidate
 from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
@@ -26,33 +25,21 @@ SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("b
 def check(
     found: TradeOff, history: History, asked: Settings, offers: list[Offer]
 ) -> None:
-    """Hold offers against what ``suggest`` says of their td."""
-    fits = Fits()
+    """Hold offers against what ``suggest`` says of their td, asked for it alone."""
     for one in offers:
-        alone = suggest_at(examine(history, one.td, asked, fits))
-        assert as_found(one.best) == pytest.approx(as_found(alone.chosen), rel=1e-6)
+        alone = suggest_at(examine(history, one.td, asked, Fits()))
+        assert one.best == alone.chosen
         assert (one.basis, one.energy_td, one.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
         )  # fmt: skip
-        shown, asked_for = (
-            [(it.start, it.end) for it in answer.windows or ()]
-            for answer in (one.answer, alone)
-        )
-        np.testing.assert_allclose(shown, asked_for, rtol=1e-6)
-        assert (one.answer.expected is None) == (alone.expected is None)
-        assert (one.quality and one.quality.grade) == (
-            alone.quality and alone.quality.grade
-        )
+        assert one.answer.windows == alone.windows
+        assert one.answer.expected == alone.expected
+        assert one.quality == alone.quality
         assert one.answer.why_none == "; ".join(
             it.message for it in alone.cautions if it.code == "no-candidate"
         )
     assert all(low.td < high.td for low, high in pairwise(found.offers))
     unbeaten(found)
-
-
-def as_found(best: Candidate | None) -> tuple[float, ...]:
-    """Give what a pair is chosen by."""
-    return () if best is None else (best.tr, best.energy, best.rigid_time)
 
 
 def unbeaten(found: TradeOff) -> None:
@@ -151,7 +138,7 @@ def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=2, deadline=None, derandomize=True)
+@settings(max_examples=2, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None

@@ -379,7 +379,7 @@ def test_a_rule_is_explained_with_its_examples(name: str) -> None:
     assert " ".join(text.split()).startswith(
         f"{name} ({rule.severity}): {rule.summary}"
     )
-    assert rule.explanation in " ".join(text.split())
+    assert f"{rule.explanation} Fix: {rule.fix} Passes" in " ".join(text.split())
     for example in (*rule.passing, *rule.failing):
         assert f"\n\n{example.deck.rstrip()}\n" in text
         assert all(f"with {file}:" in text for file in example.files)

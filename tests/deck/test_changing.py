@@ -1,4 +1,4 @@
-"""Decks that are cut, rewritten or replaced while they are read: one of their states or an error, never a mix."""
+"""Decks that are cut, rewritten or replaced while they are read give one of their states or an error, never a mix."""
 
 import builtins
 import itertools
@@ -37,13 +37,13 @@ TWICE = ONCE.replace(
 )
 
 
-# Bytes beside what a deck holds: a file of more than 256 KiB stays on its disk, one of more than 4 MiB is searched by
+# Sizes of comments added to a deck: a file above 256 KiB stays on disk, a file above 4 MiB is searched by
 # threads and read in pieces.
 SIZES = {"small": 0, "big": 300_000, "big, by threads": 5_000_000}
 
 
-def grown(text: str, size: str) -> str:
-    """A deck with so many comments in its middle, where a cut leaves half of it."""
+def grow_text(text: str, size: str) -> str:
+    """Return a deck with comments of this size in its middle, so that a cut leaves half of the deck."""
     middle = text.index("\n", len(text) // 2) + 1
     sign = "#" if text[0] in "#/" else "$"
     return (
@@ -52,8 +52,8 @@ def grown(text: str, size: str) -> str:
 
 
 @contextmanager
-def changed_after(turns: int, change: Callable[[], None]) -> Iterator[list[int]]:
-    """Change something before a file is opened or read once so many turns are over; the number of turns."""
+def change_after(turns: int, change: Callable[[], None]) -> Iterator[list[int]]:
+    """Change something before the file access number ``turns``; provide the number of accesses so far."""
     taken: list[int] = []
 
     def at_the_turn(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -72,78 +72,83 @@ def changed_after(turns: int, change: Callable[[], None]) -> Iterator[list[int]]
         yield taken
 
 
-def cut(file: Path, _: str) -> None:
+def cut_file(file: Path, _: str) -> None:
     os.truncate(file, file.stat().st_size // 2)
 
 
-def empty(file: Path, _: str) -> None:
+def clear_file(file: Path, _: str) -> None:
     os.truncate(file, 0)
 
 
-def rewrite(file: Path, text: str) -> None:
+def rewrite_file(file: Path, text: str) -> None:
     file.write_text(text)
 
 
 def rewrite_in_place(file: Path, text: str) -> None:
-    """As long as before."""
+    """Rewrite the file with a text of the same length."""
     size = file.stat().st_size
     with file.open("r+") as target:
         target.write(text[:size].ljust(size, "\n"))
 
 
-def replace(file: Path, text: str) -> None:
+def replace_file(file: Path, text: str) -> None:
     new = file.with_name("new")
     new.write_text(text)
     new.replace(file)
 
 
-CHANGES = [cut, empty, rewrite, rewrite_in_place, replace]
+CHANGES = [cut_file, clear_file, rewrite_file, rewrite_in_place, replace_file]
 
 
-def verdict(path: str) -> Hashable:
-    found = check_deck(path)
+def find_verdict(path: str) -> Hashable:
+    checked = check_deck(path)
     return (
         tuple(
             (window.part, window.tr, window.td, window.place.line)
-            for window in found.windows
+            for window in checked.windows
         ),
-        tuple((one.rule, one.file, one.line, one.message) for one in found.findings),
+        tuple(
+            (finding.rule, finding.file, finding.line, finding.message)
+            for finding in checked.findings
+        ),
     )
 
 
-def parts(path: str) -> Hashable:
-    found = read_inventory(path)
+def read_parts_of(path: str) -> Hashable:
+    inventory = read_inventory(path)
     return tuple(
-        (part, *counts.items()) for part, counts in sorted(found.counts.items())
-    ), found.notes
+        (part, *counts.items()) for part, counts in sorted(inventory.counts.items())
+    ), inventory.notes
 
 
-def answer(ask: Callable[[str], Hashable], path: str) -> Hashable:
-    """What is found, or the error."""
+def find_answer(ask: Callable[[str], Hashable], path: str) -> Hashable:
+    """Return the result, or the text of the error."""
     try:
         return ask(path)
     except DeckError as error:
         return str(error)
 
 
-def age(folder: Path) -> None:
-    """Let files look old, so that a change shows in their times however soon it comes."""
+def make_older(folder: Path) -> None:
+    """Make the files look old, so that any later change alters their times."""
     for file in folder.iterdir():
         os.utime(file, (1e9, 1e9))
 
 
 CASES = {
-    "deck": (verdict, GOOD, {}, "main.k", LATER),
-    "include": (verdict, ONCE, CARDS, "cards.k", OTHER_CARDS),
-    "included twice": (verdict, TWICE, CARDS, "cards.k", OTHER_CARDS),
-    "starter": (verdict, RUN.deck, RUN.files, RUN.name, "#\n" + RUN.deck.replace("1808", "1809")),
-    "engine": (verdict, RUN.deck, RUN.files, "box_0002.rad", "#\n" + RUN.files["box_0002.rad"].replace(".09", ".07")),
-    "elements": (parts, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT", "$\n*ELEMENT")[:9000]),
+    "deck": (find_verdict, GOOD, {}, "main.k", LATER),
+    "include": (find_verdict, ONCE, CARDS, "cards.k", OTHER_CARDS),
+    "included twice": (find_verdict, TWICE, CARDS, "cards.k", OTHER_CARDS),
+    "starter": (find_verdict, RUN.deck, RUN.files, RUN.name, "#\n" + RUN.deck.replace("1808", "1809")),
+    "engine": (find_verdict, RUN.deck, RUN.files, "box_0002.rad", "#\n" + RUN.files["box_0002.rad"].replace(".09",
+    ".07")),
+    "elements": (read_parts_of, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT",
+    "$\n*ELEMENT")[:9000]),
 }  # fmt: skip
 THREADED = (
     "deck",
     "elements",
-)  # what is asked of one file does not depend on how many there are
+)  # the reads of one file do not depend on the number of files
 
 
 @pytest.mark.slow
@@ -151,11 +156,11 @@ THREADED = (
     ("case", "size", "change"),
     [
         *((case, "big", change) for case in CASES for change in CHANGES),
-        *((case, "small", cut) for case in CASES),
+        *((case, "small", cut_file) for case in CASES),
         *(
             (case, "big, by threads", change)
             for case in THREADED
-            for change in (cut, replace)
+            for change in (cut_file, replace_file)
         ),
     ],
 )
@@ -165,29 +170,34 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
     ask, deck, files, changed, text = CASES[case]
     name = RUN.name if deck is RUN.deck else "main.k"
     texts = {**files, name: deck}
-    texts[changed], text = grown(texts[changed], size), grown(text, size)
+    texts[changed], text = grow_text(texts[changed], size), grow_text(text, size)
     path, file = write(tmp_path, texts[name], texts, name), tmp_path / changed
-    before = answer(ask, path)
+    first_state = find_answer(ask, path)
     change(file, text)
-    after = answer(ask, path)
-    assert before != after
-    found = set()
+    second_state = find_answer(ask, path)
+    assert first_state != second_state
+    outcomes = set()
     for turn in itertools.count():
         write(tmp_path, texts[name], texts, name)
-        age(tmp_path)
-        with changed_after(turn, lambda: change(file, text)) as taken:
-            found.add(answer(ask, path))
+        make_older(tmp_path)
+        with change_after(turn, lambda: change(file, text)) as taken:
+            outcomes.add(find_answer(ask, path))
         if len(taken) <= turn:
-            break  # it was read before the change
-    errors = {one for one in found if isinstance(one, str)} - {before, after}
-    assert found - errors <= {before, after}
-    assert not [one for one in errors if "\n" in one]
+            break  # the file was read before the change
+    errors = {error for error in outcomes if isinstance(error, str)} - {
+        first_state,
+        second_state,
+    }
+    assert outcomes - errors <= {first_state, second_state}
+    assert not [error for error in errors if "\n" in error]
     assert all(
-        "rewritten or replaced while it was read" in one or "was found" in one
-        for one in errors
+        "rewritten or replaced while it was read" in error or "was found" in error
+        for error in errors
     )
     if size != "small":
-        assert any("rewritten or replaced while it was read" in one for one in errors)
+        assert any(
+            "rewritten or replaced while it was read" in error for error in errors
+        )
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -195,8 +205,8 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
 def test_rows_that_are_read_late_are_those_of_the_keywords(
     change: Callable[[Path, str], None], size: str, tmp_path: Path
 ) -> None:
-    deck = read_deck(write(tmp_path, grown(GOOD, size)))
-    age(tmp_path)
+    deck = read_deck(write(tmp_path, grow_text(GOOD, size)))
+    make_older(tmp_path)
     deck = read_deck(deck.path)
     change(tmp_path / "main.k", LATER)
     if size == "small":
@@ -211,36 +221,36 @@ def test_rows_that_are_read_late_are_those_of_the_keywords(
 
 @pytest.mark.parametrize("size", ["small", "big"])
 def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
-    """Whenever both files are written anew with cards in them, which would have been refused."""
-    mesh = grown("*NODE\n$ of a mesh\n", size)
+    """Both files may be rewritten at any time with cards that `write_deck` refuses."""
+    mesh = grow_text("*NODE\n$ of a mesh\n", size)
     text, files = f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh}
-    asked = (
+    read_calls = (
         str(tmp_path / "main.k"),
         cards([(0.02, 0.09)], Printing(part=(1,))),
         str(tmp_path / "next"),
     )
 
     def change() -> None:
-        rewrite(tmp_path / "main.k", LATER)
-        rewrite(tmp_path / "more.k", THERE)
+        rewrite_file(tmp_path / "main.k", LATER)
+        rewrite_file(tmp_path / "more.k", THERE)
 
     refusals = set()
     for turn in itertools.count():
         write(tmp_path, text, files)
-        age(tmp_path)
-        with changed_after(turn, change) as taken:
+        make_older(tmp_path)
+        with change_after(turn, change) as taken:
             try:
-                written, _, more = write_deck(*asked)
+                written, _, added_part = write_deck(*read_calls)
             except DeckError as error:
                 refusals.add(str(error).split(": ")[1])
                 assert not (tmp_path / "next").exists()
             else:
                 assert PARTS + mesh in Path(written).read_text()
-                assert Path(more).read_text() == mesh
+                assert Path(added_part).read_text() == mesh
                 shutil.rmtree(tmp_path / "next")
         if len(taken) <= turn:
             break
-    assert {one.partition(";")[0] for one in refusals} == {
+    assert {refusal.partition(";")[0] for refusal in refusals} == {
         "the file was rewritten or replaced while it was read",
         "the deck switches part 1 already",
     }
@@ -252,7 +262,7 @@ def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
 def test_a_deck_that_is_half_saved_is_read_when_it_is_whole(
     size: str, share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = grown(GOOD, size)
+    text = grow_text(GOOD, size)
     written = int(share * len(text))
     path = write(tmp_path, text[:written])
 
@@ -269,7 +279,7 @@ def test_a_deck_that_is_half_saved_is_read_when_it_is_whole(
 def test_a_deck_that_changes_all_the_time_is_an_error(
     size: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text, number = grown(GOOD, size), itertools.count()
+    text, number = grow_text(GOOD, size), itertools.count()
     path = write(tmp_path, text)
     monkeypatch.setattr(
         time, "sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{text}")
@@ -279,7 +289,7 @@ def test_a_deck_that_changes_all_the_time_is_an_error(
         match=r"main\.k: the file keeps changing while it is read; read it again",
     ):
         read_deck(path)
-    assert main_decks(str(tmp_path)) == [path]  # it is not passed over
+    assert main_decks(str(tmp_path)) == [path]  # the file is not skipped
 
 
 def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Times of switches by force that give planned windows, read back by the check that follows such switches."""
+"""Times of force switches for planned windows, which the check of such switches reads back."""
 
 import itertools
 import math
@@ -18,7 +18,7 @@ PUSHES = Pushes(
 )
 
 
-def flat(windows: Sequence[tuple[float, float]]) -> list[float]:
+def flatten_windows(windows: Sequence[tuple[float, float]]) -> list[float]:
     return [time for window in windows for time in window]
 
 
@@ -27,10 +27,10 @@ def test_the_wait_lets_no_window_begin_before_it_is_planned() -> None:
     pair = time_pair(planned, PUSHES)
     assert [tr for tr, _ in pair.windows] == pytest.approx([0.02, 0.08])
     assert pair.earliest == 0.02
-    assert 0.12 < pair.latest < 0.13  # in the contact behind the last window
+    assert 0.12 < pair.latest < 0.13  # in the contact after the last window
     sensor = time_sensor(planned, PUSHES)
     assert sensor.wait == pytest.approx(0.01)
-    assert flat(sensor.windows) == pytest.approx([0.02, 0.05, 0.08, 0.119])
+    assert flatten_windows(sensor.windows) == pytest.approx([0.02, 0.05, 0.08, 0.119])
 
 
 def test_the_offset_is_what_the_parts_fly_from_td_to_the_contact() -> None:
@@ -42,10 +42,10 @@ def test_the_offset_is_what_the_parts_fly_from_td_to_the_contact() -> None:
 
 def test_chatter_between_two_windows_is_waited_for() -> None:
     timing = time_sensor([(0.013, 0.05), (0.0705, 0.12)], PUSHES)
-    assert flat(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
+    assert flatten_windows(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
     with pytest.raises(
         DeckError, match="no wait lets a sensor switch"
-    ):  # the gap from 0.06 to 0.062 is left open
+    ):  # the short gap from 0.06 to 0.062 stays without a window
         time_sensor([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
 
@@ -63,7 +63,7 @@ def test_a_flight_without_a_window_is_left_out_by_a_pair_alone() -> None:
 def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
     with pytest.raises(DeckError, match="no wait lets a pair"):
         time_pair([(0.22, 0.3)], PUSHES)
-    assert flat(time_sensor([(0.22, 0.3)], PUSHES).windows) == pytest.approx(
+    assert flatten_windows(time_sensor([(0.22, 0.3)], PUSHES).windows) == pytest.approx(
         [0.22, 0.3]
     )
 
@@ -72,7 +72,7 @@ def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
 def test_windows_after_every_contact_are_met_by_a_common_wait(
     gaps: list[float], share: float
 ) -> None:
-    """Contacts of length 1 with gaps; planned is each gap from the same time after its contact on."""
+    """Contacts of length 1 with gaps: each window begins at the same time after a contact and fills the gap."""
     starts = [sum(gaps[:at]) + at for at in range(len(gaps) + 1)]
     contacts = tuple((start, start + 1.0) for start in starts)
     wait = share * min(gaps)
@@ -80,7 +80,7 @@ def test_windows_after_every_contact_are_met_by_a_common_wait(
         (end + wait, start) for (_, end), (start, _) in itertools.pairwise(contacts)
     ]
     timing = time_sensor(planned, Pushes(contacts))
-    assert flat(timing.windows) == pytest.approx(flat(planned))
+    assert flatten_windows(timing.windows) == pytest.approx(flatten_windows(planned))
     assert timing.wait == pytest.approx(wait, abs=1e-9)
     paired = time_pair(planned, Pushes(contacts))
     assert [tr for tr, _ in paired.windows] == pytest.approx([tr for tr, _ in planned])
@@ -110,12 +110,12 @@ def test_the_printed_pair_is_read_back_with_its_windows(
     )
     assert card is not None
     assert len(card.card.windows) == 2
-    found = answer(
+    report = answer(
         "check", str(put(tmp_path / "pair.k", card.card.text)), "--history", falls
     )
-    read = [(one["tr"], one["td"]) for one in found["windows"]]
-    assert flat(read) == pytest.approx(
-        flat(card.card.windows), abs=1e-5
+    read_windows = [(window["tr"], window["td"]) for window in report["windows"]]
+    assert flatten_windows(read_windows) == pytest.approx(
+        flatten_windows(card.card.windows), abs=1e-5
     )  # digits of the card
 
 
@@ -146,5 +146,7 @@ def test_what_pushes_has_to_be_named_once(
 
 
 def test_without_momenta_nothing_shows_when_something_pushes() -> None:
-    told = refused("card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT)
-    assert "needs a history with the force of that contact or wall" in told
+    message = refused(
+        "card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT
+    )
+    assert "needs a history with the force of that contact or wall" in message

@@ -11,7 +11,7 @@ from d2rpick.deck.switching import read_switching
 PARAMETERS = {"a": 4, "b": 2.5}
 
 
-def lookup(name: str) -> int | float:
+def look_up(name: str) -> int | float:
     try:
         return PARAMETERS[name]
     except KeyError:
@@ -106,7 +106,7 @@ def test_every_double_reads_back(value: float) -> None:
     ],
 )
 def test_expressions(text: str, value: float) -> None:
-    result = evaluate(text, lookup)
+    result = evaluate(text, look_up)
     assert result == pytest.approx(value)
     assert type(result) is type(value)
 
@@ -142,27 +142,29 @@ def test_expressions(text: str, value: float) -> None:
 )
 def test_what_is_no_expression(text: str) -> None:
     with pytest.raises(ExpressionError):
-        evaluate(text, lookup)
+        evaluate(text, look_up)
 
 
 @given(st.text(alphabet="0123456789.+-*/()&abepidt, ", max_size=60))
 def test_any_text_is_a_finite_number_or_refused(text: str) -> None:
     with contextlib.suppress(ExpressionError):
-        assert math.isfinite(evaluate(text, lookup))
+        assert math.isfinite(evaluate(text, look_up))
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6).filter(bool))
 def test_integer_division_drops_the_fraction(x: int, y: int) -> None:
-    quotient = evaluate(f"({x})/({y})", lookup)
+    quotient = evaluate(f"({x})/({y})", look_up)
     assert abs(quotient) == abs(x) // abs(y)
     assert quotient * x * y >= 0
 
 
 def test_texts_that_are_too_long_for_a_number_are_not_kept() -> None:
-    before = plain.cache_info().currsize
+    size_before = plain.cache_info().currsize
     content = b"*DEFORMABLE_TO_RIGID\n" + b"x" * 100 + b",1\n"
     (card,) = read_switching(read_deck("deck.k", content))
     assert (
         next(problem for _, problem in card.problems) == f"{'x' * 40!r} is not a number"
     )
-    assert plain.cache_info().currsize <= before + 1  # the 1 behind it
+    assert (
+        plain.cache_info().currsize <= size_before + 1
+    )  # the digit 1 after the blanks

@@ -1,4 +1,4 @@
-"""Pairs of switch sets that act by a force, in runs of which it is known when something pushes."""
+"""Pairs of switch sets that act by a force, in runs with known contact times."""
 
 from itertools import pairwise
 
@@ -36,7 +36,7 @@ def test_a_delay_after_the_way_back_keeps_chatter_out() -> None:
 def test_a_delay_after_becoming_rigid_misses_a_contact() -> None:
     late = TO_RIGID._replace(
         delay=0.0105
-    )  # the second contact is over when it may switch back
+    )  # the second contact is over when the set may switch back
     assert follow_pair(
         late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1
     ) == [(0.01, 0.05), (0.06, None)]
@@ -74,8 +74,8 @@ def test_windows_follow_each_other_and_no_force_acts_in_them(cuts: list[int]) ->
     windows = follow_pair(TO_RIGID, BACK, contacts, 2000.0)
     assert windows[-1][1] is None
     assert all(
-        before[1] is not None and before[1] < after[0]
-        for before, after in pairwise(windows)
+        window[1] is not None and window[1] < next_window[0]
+        for window, next_window in pairwise(windows)
     )
     for tr, td in windows:
         assert not any(start < (td or 2000.0) and tr < end for start, end in contacts)
@@ -85,7 +85,7 @@ def test_the_delay_that_keeps_chatter_out_does_so() -> None:
     wanted = [(0.01, 0.02), (0.03, 0.06), (0.07, 0.1)]
     wait = find_delay_without_chatter(wanted, BOUNCES)
     assert wait is not None
-    found = follow_pair(TO_RIGID, BACK._replace(delay=wait), BOUNCES, 0.1)
-    assert [tr for tr, _ in found] == pytest.approx([tr for tr, _ in wanted])
-    assert [td for _, td in found] == [0.02, 0.06, None]
+    delay = follow_pair(TO_RIGID, BACK._replace(delay=wait), BOUNCES, 0.1)
+    assert [tr for tr, _ in delay] == pytest.approx([tr for tr, _ in wanted])
+    assert [td for _, td in delay] == [0.02, 0.06, None]
     assert find_delay_without_chatter([(0.0, 0.02)], []) is None

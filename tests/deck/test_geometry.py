@@ -1,4 +1,4 @@
-"""Masses and stable steps of parts, against sizes worked out by hand; where parts lie, and what nodes a run watches."""
+"""Masses, stable time steps and positions of parts, compared with values by hand; watched nodes of a run."""
 
 import math
 from dataclasses import replace
@@ -58,12 +58,12 @@ def test_by_hand(
     tmp_path: Path, section: str, elements: str, mass: float, step: float
 ) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    found = masses_and_steps(
+    masses = masses_and_steps(
         ls_dyna_inventory.read(
             read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")
         )
     )
-    assert list(found[7]) == pytest.approx([mass, step])
+    assert list(masses[7]) == pytest.approx([mass, step])
 
 
 @pytest.mark.parametrize("lost", ["*MAT", "*SECTION", "*NODE"])
@@ -91,27 +91,27 @@ def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
-    found = masses_and_steps(
+    masses = masses_and_steps(
         radioss_inventory.read(read_run(str(tmp_path / "CAR_0000.rad")))
     )
     lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)
     for cells in rows:
-        one = dict(zip(head, cells, strict=True))
-        mass, step = found[int(one["id"])]
-        assert mass == pytest.approx(float(one["mass_kg"]), rel=1e-3)
+        values = dict(zip(head, cells, strict=True))
+        mass, step = masses[int(values["id"])]
+        assert mass == pytest.approx(float(values["mass_kg"]), rel=1e-3)
         assert (
             step is None
             or step == pytest.approx(21.54e-6 / 0.9, rel=0.25)
-            or one["part"] in ("engine", "battery", "wheels")
+            or values["part"] in ("engine", "battery", "wheels")
         )
 
 
 ALONG, ACROSS = 12, 5
 
 
-def plate(far: float = 0.0) -> Inventory:
-    """A plate of 3.6 x 1.5 of one part in shells, turned into the plane x = far, and a part of two springs."""
+def make_plate(far: float = 0.0) -> Inventory:
+    """Return a deck with a plate of shells, 3.6 x 1.5, in the plane x = far, and a part of two springs."""
     y, z = np.meshgrid(
         np.linspace(0, 3.6, ALONG + 1), np.linspace(0, 1.5, ACROSS + 1), indexing="ij"
     )
@@ -138,17 +138,19 @@ def plate(far: float = 0.0) -> Inventory:
 
 @pytest.mark.parametrize("far", [0.0, 1e6])
 def test_a_plate_lies_at_its_middle_and_spreads_as_its_elements_do(far: float) -> None:
-    found = Placement(plate(far)).parts
-    np.testing.assert_allclose(found[3].centre, [far, 1.8, 0.75], rtol=1e-9)
+    placed_parts = Placement(make_plate(far)).parts
+    np.testing.assert_allclose(placed_parts[3].centre, [far, 1.8, 0.75], rtol=1e-9)
     spread = [0.0, 3.6**2 / 12 * (1 - 1 / ALONG**2), 1.5**2 / 12 * (1 - 1 / ACROSS**2)]
-    np.testing.assert_allclose(found[3].spread, np.diag(spread), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(
-        found[4].centre, [far, 0.0, (0.15 + 0.75) / 2], rtol=1e-9
+        placed_parts[3].spread, np.diag(spread), rtol=1e-9, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        placed_parts[4].centre, [far, 0.0, (0.15 + 0.75) / 2], rtol=1e-9
     )
 
 
 def test_watched_nodes_count_once() -> None:
-    deck = Placement(plate())
+    deck = Placement(make_plate())
     np.testing.assert_allclose(
         deck.watched_centre([3, 4]),  # type: ignore[arg-type]
         np.mean([[0, 0, 0], [0, 0, 1.5], [0, 3.6, 1.5]], axis=0),  # type: ignore[arg-type]
@@ -159,13 +161,13 @@ def test_watched_nodes_count_once() -> None:
 
 
 def test_a_part_with_a_node_that_is_nowhere_is_not_placed() -> None:
-    lost = plate()
+    lost = make_plate()
     lost.coordinates[0] = np.nan
     assert Placement(lost).parts.keys() == set()
 
 
 def test_where_elements_are_missing_no_part_is_placed() -> None:
-    assert Placement(replace(plate(), complete=False)).parts == {}
+    assert Placement(replace(make_plate(), complete=False)).parts == {}
 
 
 PART = f"/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 4, 6)}{rad.PROPS}"
@@ -173,14 +175,16 @@ WATCHED = "/TH/NODE/7\nthree points\nDX        VX\n         2         0first\n  
 PLATE = "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3)
 
 
-def places(found: Inventory) -> list[list[float]]:
-    return [where.tolist() for where in found.coordinates[np.sort(found.watched)]]
+def list_coordinates(inventory: Inventory) -> list[list[float]]:
+    return [
+        where.tolist() for where in inventory.coordinates[np.sort(inventory.watched)]
+    ]
 
 
 def test_nodes_of_a_time_history_are_watched(tmp_path: Path) -> None:
-    found = rad.inventory(tmp_path, f"{rad.nodes(8)}{PART}{WATCHED}")
-    assert places(found) == [[2.0, 0.0, 2.0], [4.0, 0.0, 1.0]]
-    assert rad.inventory(tmp_path, f"{rad.nodes(8)}{PART}").watched.size == 0
+    inventory = rad.read_text(tmp_path, f"{rad.write_nodes(8)}{PART}{WATCHED}")
+    assert list_coordinates(inventory) == [[2.0, 0.0, 2.0], [4.0, 0.0, 1.0]]
+    assert rad.read_text(tmp_path, f"{rad.write_nodes(8)}{PART}").watched.size == 0
 
 
 @pytest.mark.parametrize(
@@ -192,13 +196,13 @@ def test_nodes_of_a_time_history_are_watched(tmp_path: Path) -> None:
     ],
 )
 def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> None:
-    text = f"{dyna.HEAD}*NODE\n{dyna.nodes()}{PLATE}*DATABASE_HISTORY_NODE{keyword}\n{ids}*END\n"
-    found = dyna.inventory(tmp_path, text)
-    assert len(places(found)) == (0 if keyword == "_SET" else 2)
-    assert found.complete
+    text = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}*DATABASE_HISTORY_NODE{keyword}\n{ids}*END\n"
+    inventory = dyna.read_text(tmp_path, text)
+    assert len(list_coordinates(inventory)) == (0 if keyword == "_SET" else 2)
+    assert inventory.complete
 
 
-PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.nodes()}{PLATE}"
+PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}"
 
 
 @pytest.mark.parametrize(
@@ -212,39 +216,41 @@ PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.nodes()}{PLATE}"
         (
             f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n     &turn\n*END\n",
             False,
-        ),  # not known, so not at rest
+        ),  # unknown, so not at rest
     ],
 )
 def test_where_a_deck_moves_its_nodes_no_part_is_placed(
     tmp_path: Path, text: str, placed: bool
 ) -> None:
-    found = dyna.inventory(tmp_path, text, mesh=f"*NODE\n{dyna.nodes()}{PLATE}*END\n")
-    assert found.counts == {7: {"shell": 1}}
-    assert ({*Placement(found).parts} == {7}) is placed
+    inventory = dyna.read_text(
+        tmp_path, text, mesh=f"*NODE\n{dyna.write_nodes()}{PLATE}*END\n"
+    )
+    assert inventory.counts == {7: {"shell": 1}}
+    assert ({*Placement(inventory).parts} == {7}) is placed
 
 
 def test_a_starter_that_moves_its_nodes_places_no_part(tmp_path: Path) -> None:
-    text = f"{rad.nodes(8)}{PART}"
-    assert Placement(rad.inventory(tmp_path, text)).parts.keys() == {1}
+    text = f"{rad.write_nodes(8)}{PART}"
+    assert Placement(rad.read_text(tmp_path, text)).parts.keys() == {1}
     moved = f"{text}/TRANSFORM/TRA/1\nshift\n         1                 1.0\n"
-    assert Placement(rad.inventory(tmp_path, moved)).parts.keys() == set()
+    assert Placement(rad.read_text(tmp_path, moved)).parts.keys() == set()
 
 
 def test_the_car_lies_where_its_generator_put_it(tmp_path: Path) -> None:
     deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
-    found = Placement(read_inventory(str(deck)))
+    placed_parts = Placement(read_inventory(str(deck)))
     np.testing.assert_allclose(
-        found.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9
+        placed_parts.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9
     )  # the engine, 0.6 x 0.6 x 0.45
     np.testing.assert_allclose(
-        found.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4
+        placed_parts.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4
     )
     np.testing.assert_allclose(
-        found.watched_centre(range(1, 12)),  # type: ignore[arg-type]
+        placed_parts.watched_centre(range(1, 12)),  # type: ignore[arg-type]
         [2.025, 0.0, 0.7],  # type: ignore[arg-type]
         atol=1e-9,
     )
-    assert found.hanging_together(range(1, 15)) == {
+    assert placed_parts.hanging_together(range(1, 15)) == {
         *range(1, 12),
         13,
     }  # all but engine and wheels

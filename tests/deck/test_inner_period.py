@@ -1,4 +1,4 @@
-"""The longest inner period by masses and springs: what a closed form gives, and what is not known."""
+"""The longest period of masses on springs: values of a closed form, and cases in which it is unknown."""
 
 import math
 from pathlib import Path
@@ -13,10 +13,10 @@ from tests.decks import wide
 from tests.sprung import DENSITY, cubes
 
 
-def period(folder: Path, deck: str) -> tuple[float, ...] | None:
+def find_period(folder: Path, deck: str) -> tuple[float, ...] | None:
     name = put(folder / "box_0000.rad", deck)
-    found = inner_period(read_inventory(str(name)))
-    return found and found[:2]
+    inner = inner_period(read_inventory(str(name)))
+    return inner and inner[:2]
 
 
 @settings(max_examples=15)
@@ -29,27 +29,37 @@ def test_two_masses_on_parallel_springs(
     masses: list[float],
     stiffness: list[float],
 ) -> None:
-    """All act along x: both ends of the bracket are the closed form of two masses."""
-    one, other = masses
-    expected = 2 * math.pi * math.sqrt(one * other / (one + other) / sum(stiffness))
-    found = period(
-        tmp_path_factory.mktemp("deck"),
-        cubes((one, other), [(10, 20, k) for k in stiffness]),
+    """All springs act along x, so the period and its lower limit equal the closed form of two masses."""
+    first_mass, second_mass = masses
+    expected = (
+        2
+        * math.pi
+        * math.sqrt(
+            first_mass * second_mass / (first_mass + second_mass) / sum(stiffness)
+        )
     )
-    assert found is not None
-    assert found == pytest.approx((expected, expected))
+    periods = find_period(
+        tmp_path_factory.mktemp("deck"),
+        cubes((first_mass, second_mass), [(10, 20, k) for k in stiffness]),
+    )
+    assert periods is not None
+    assert periods == pytest.approx((expected, expected))
 
 
 def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -> None:
     deck = cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 1.0)])
-    found = period(tmp_path, deck)
-    assert found
+    periods = find_period(tmp_path, deck)
+    assert periods
     assert (
-        found[0] < 1
-    )  # [s]; the light one on its soft spring swings in 0.6 s and against half of all
-    softer = period(tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)]))
-    assert softer == pytest.approx(found, rel=1e-5)
-    heavier = period(tmp_path, cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)]))
+        periods[0] < 1
+    )  # [s]; the light mass on its soft spring has a period of 0.6 s
+    softer = find_period(
+        tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)])
+    )
+    assert softer == pytest.approx(periods, rel=1e-5)
+    heavier = find_period(
+        tmp_path, cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)])
+    )
     assert heavier
     assert heavier[0] > 1
 
@@ -58,7 +68,7 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
     """Two springs k at an angle: k (1 + cos) where they are stiffest, 2 k is what no direction has more of."""
     side, stiffness = 2.0, 1e5
     mass = DENSITY * side**3
-    found = period(
+    periods = find_period(
         tmp_path, cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)])
     )
     angle = math.atan(side / 10)
@@ -66,7 +76,7 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
         2 * math.pi * math.sqrt(mass / 2 / stiffness / share)
         for share in (1 + math.cos(angle), 2)
     )
-    assert found == pytest.approx(tuple(both))
+    assert periods == pytest.approx(tuple(both))
 
 
 @pytest.mark.parametrize(
@@ -89,4 +99,4 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
     ],
 )
 def test_what_the_deck_does_not_give_is_not_guessed(tmp_path: Path, deck: str) -> None:
-    assert period(tmp_path, deck) is None
+    assert find_period(tmp_path, deck) is None

@@ -1,4 +1,4 @@
-"""What joins parts that share no nodes: in every form that is followed, and what is named because it is not."""
+"""Joints of parts that share no nodes, in every form that d2rpick reads, and notes on those that it cannot read."""
 
 from pathlib import Path
 
@@ -8,14 +8,14 @@ from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck.model import Inventory
 from d2rpick.flight.position_error import RigidBody
 from tests.deck import test_radioss_inventory as rad
-from tests.deck.test_ls_dyna_inventory import inventory, nodes
+from tests.deck.test_ls_dyna_inventory import read_text, write_nodes
 from tests.decks import row, wide
 
 # Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.
 MESH = (
     "*KEYWORD\n"
     + "".join(f"*PART\np{part}\n{part:10d}         1         1\n" for part in (7, 9, 11))
-    + "*NODE\n" + nodes()
+    + "*NODE\n" + write_nodes()
     + "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7) + row(3, 11, 9, 10, 12, 11)
 )  # fmt: skip
 
@@ -39,18 +39,18 @@ JOINTS = {
 }
 
 
-def found(folder: Path, text: str) -> Inventory:
-    return inventory(folder, MESH + text + "*END\n")
+def read_with_mesh(folder: Path, text: str) -> Inventory:
+    return read_text(folder, MESH + text + "*END\n")
 
 
 @pytest.mark.parametrize("form", JOINTS)
 def test_what_joins_two_parts_makes_one_body_of_them(tmp_path: Path, form: str) -> None:
-    read = found(tmp_path, JOINTS[form])
+    inventory = read_with_mesh(tmp_path, JOINTS[form])
     kind = form.partition(" of ")[0]
-    assert read.joined == {7: {9: {kind}}, 9: {7: {kind}}}
-    assert read.groups([7, 9, 11]) == ((7, 9), (11,))
-    assert read.neighbours == {7: frozenset(), 9: frozenset(), 11: frozenset()}
-    assert (read.ties, read.complete) == ((), True)
+    assert inventory.joined == {7: {9: {kind}}, 9: {7: {kind}}}
+    assert inventory.groups([7, 9, 11]) == ((7, 9), (11,))
+    assert inventory.neighbours == {7: frozenset(), 9: frozenset(), 11: frozenset()}
+    assert (inventory.ties, inventory.complete) == ((), True)
 
 
 def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(
@@ -61,17 +61,24 @@ def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(
         "*CONSTRAINED_SPOTWELD\n" + wide(1, 2),
         "*CONSTRAINED_SPOTWELD\n" + wide(4, 999),
     ):
-        read = found(tmp_path, text)
-        assert read.groups([7, 9, 11]) == ((7,), (9,), (11,))
+        inventory = read_with_mesh(tmp_path, text)
+        assert inventory.groups([7, 9, 11]) == ((7,), (9,), (11,))
         assert {
-            part: dict(others) for part, others in read.joined.items() if others
+            part: dict(joined_parts)
+            for part, joined_parts in inventory.joined.items()
+            if joined_parts
         } == {}
 
 
 def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) -> None:
-    read = found(tmp_path, "*CONSTRAINED_SPOTWELD\n" + wide(4, 5) + wide(6, 9))
-    assert read.groups([7, 9, 11]) == ((7, 9, 11),)
-    assert read.groups([7, 11]) == ((7,), (11,))  # what stays deformable joins nothing
+    inventory = read_with_mesh(
+        tmp_path, "*CONSTRAINED_SPOTWELD\n" + wide(4, 5) + wide(6, 9)
+    )
+    assert inventory.groups([7, 9, 11]) == ((7, 9, 11),)
+    assert inventory.groups([7, 11]) == (
+        (7,),
+        (11,),
+    )  # a part that stays deformable joins nothing
 
 
 @pytest.mark.parametrize(
@@ -90,7 +97,7 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
         (
             "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77),
             "nodal rigid body",
-        ),  # of a set that is not there
+        ),  # the set does not exist
         ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
         (
             "*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456),
@@ -104,13 +111,13 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
 def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
     tmp_path: Path, text: str, told: str
 ) -> None:
-    read = found(tmp_path, text)
-    (tie,) = read.ties
+    inventory = read_with_mesh(tmp_path, text)
+    (tie,) = inventory.ties
     assert told in tie
     assert "main.k:" in tie
-    assert bodies_of(read, [7, 9]) == ()
-    assert bodies_of(read, [7]) == (RigidBody((7,)),)
-    assert read.complete  # of its cost all is known
+    assert bodies_of(inventory, [7, 9]) == ()
+    assert bodies_of(inventory, [7]) == (RigidBody((7,)),)
+    assert inventory.complete  # its cost is known
 
 
 RADIOSS = "".join(
@@ -132,12 +139,14 @@ def test_tied_interfaces_of_radioss(
     tmp_path: Path, group: str, surface: str, joined: dict[int, set[int]] | None
 ) -> None:
     tie = f"/INTER/TYPE2/1\ntie\n{wide(5, 6)}"
-    read = rad.inventory(
-        tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + group + surface + tie
+    inventory = rad.read_text(
+        tmp_path, rad.write_nodes(12) + RADIOSS + rad.PROPS + group + surface + tie
     )
-    assert len(read.ties) == (0 if joined else 1)
-    assert {part: {*others} for part, others in read.joined.items()} == (joined or {})
-    assert bool(bodies_of(read, [1, 2])) == bool(joined)
+    assert len(inventory.ties) == (0 if joined else 1)
+    assert {
+        part: {*joined_parts} for part, joined_parts in inventory.joined.items()
+    } == (joined or {})
+    assert bool(bodies_of(inventory, [1, 2])) == bool(joined)
 
 
 @pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
@@ -145,7 +154,7 @@ def test_other_ties_of_radioss_leave_the_bodies_open(
     tmp_path: Path, keyword: str
 ) -> None:
     tie = f"/{keyword}/1\ntie\n{wide(4, 0, 0, 5)}"
-    read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + tie)
-    assert [one.split()[0] for one in read.ties] == [f"/{keyword}/1"]
-    assert bodies_of(read, [1, 2]) == ()
-    assert read.complete
+    inventory = rad.read_text(tmp_path, rad.write_nodes(12) + RADIOSS + rad.PROPS + tie)
+    assert [tie.split()[0] for tie in inventory.ties] == [f"/{keyword}/1"]
+    assert bodies_of(inventory, [1, 2]) == ()
+    assert inventory.complete

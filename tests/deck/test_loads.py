@@ -26,24 +26,24 @@ BODY, WHEEL, OTHER = (
 )  # both wheels have hubs of one part
 
 
-def group(number: int, *nodes: int) -> str:
+def write_group(number: int, *nodes: int) -> str:
     return f"/GRNOD/NODE/{number}\nnodes\n{wide(*nodes)}"
 
 
-def bcs(code: str, group: int, skew: int = 0) -> str:
+def write_support(code: str, group: int, skew: int = 0) -> str:
     return f"/BCS/1\nheld\n   {code}{wide(skew, group)}"
 
 
-def radioss(folder: Path, more: str) -> Inventory:
-    return read_inventory(made_car.starter(folder, more))
+def read_radioss(folder: Path, further_cards: str) -> Inventory:
+    return read_inventory(made_car.starter(folder, further_cards))
 
 
-def ls_dyna(folder: Path, more: str) -> Inventory:
-    return read_inventory(made_car.keywords(folder, more))
+def read_ls_dyna(folder: Path, further_cards: str) -> Inventory:
+    return read_inventory(made_car.keywords(folder, further_cards))
 
 
-def held(inventory: Inventory) -> tuple[set[int], bool]:
-    """Parts that are held, and whether the model is."""
+def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
+    """Return the parts that are held, and True if the model is held."""
     by_part, whole = supports_of(inventory)
     return set(by_part), bool(whole)
 
@@ -51,23 +51,24 @@ def held(inventory: Inventory) -> tuple[set[int], bool]:
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
-        (group(1, 1) + bcs("111 000", 1), (BODY, True)),
-        (group(1, 1) + bcs("000 000", 1), (set(), False)),
-        (group(1, 1) + bcs("000 111", 1), (BODY, True)),  # shells have rotations
-        (group(1, 22) + bcs("111 111", 1), (WHEEL, True)),
-        (group(1, *range(31, 37)) + bcs("111 111", 1), (OTHER, False)),  # fixed all over: an obstacle
-        (group(1, *range(31, 37)) + bcs("110 111", 1), (set(), False)),  # no motion there, free along z
-        ("/GRNOD/PART/1\nparts\n" + wide(9) + bcs("111 000", 1), (OTHER, True)),
-        (group(1, 1) + "/IMPVEL/1\nmoved\n" + wide(1, "Y", 0, 0, 1), (BODY, True)),
+        (write_group(1, 1) + write_support("111 000", 1), (BODY, True)),
+        (write_group(1, 1) + write_support("000 000", 1), (set(), False)),
+        (write_group(1, 1) + write_support("000 111", 1), (BODY, True)),  # shells have rotations
+        (write_group(1, 22) + write_support("111 111", 1), (WHEEL, True)),
+        (write_group(1, *range(31, 37)) + write_support("111 111", 1), (OTHER, False)),  # completely fixed: an obstacle
+        (write_group(1, *range(31, 37)) + write_support("110 111", 1), (set(), False)),  # no motion there, free along z
+        ("/GRNOD/PART/1\nparts\n" + wide(9) + write_support("111 000", 1), (OTHER, True)),
+        (write_group(1, 1) + "/IMPVEL/1\nmoved\n" + wide(1, "Y", 0, 0, 1), (BODY, True)),
         ("/IMPDISP/FGEO/1\nmoved\n" + wide(1, 0) + wide(1.0, width=20) + wide(21, 1.0) + wide(22, 1.0), (WHEEL, True)),
-        (group(1, 99) + bcs("111 000", 1) + group(2, 1, 2) + "/RBODY/1\nbody\n" + wide(99, 0, 0, 0, "", 0, 2),
+        (write_group(1, 99) + write_support("111 000", 1) + write_group(2, 1, 2) + "/RBODY/1\nbody\n" + wide(99, 0, 0,
+         0, "", 0, 2),
          (BODY, True)),
     ],
 )  # fmt: skip
 def test_a_support_holds_what_hangs_together_with_its_nodes(
     tmp_path: Path, more: str, expected: tuple[set[int], bool]
 ) -> None:
-    assert held(radioss(tmp_path, more)) == expected
+    assert find_held_parts(read_radioss(tmp_path, more)) == expected
 
 
 @pytest.mark.parametrize(
@@ -80,17 +81,27 @@ def test_a_support_holds_what_hangs_together_with_its_nodes(
             (1, 2, 3, 4),
             "011 000",
             BODY,
-        ),  # they lie at different heights, where gravity pulls
+        ),  # they lie at different heights along gravity
         ((1, 2, 3, 4), "010 000", set()),
     ],
 )
 def test_a_symmetry_plane_holds_nothing(
     tmp_path: Path, nodes: tuple[int, ...], code: str, expected: set[int]
 ) -> None:
-    assert held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1)))[0] == expected
     assert (
-        held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1, skew=3)))[0] == BODY
-    )  # its plane is not known
+        find_held_parts(
+            read_radioss(tmp_path, write_group(1, *nodes) + write_support(code, 1))
+        )[0]
+        == expected
+    )
+    assert (
+        find_held_parts(
+            read_radioss(
+                tmp_path, write_group(1, *nodes) + write_support(code, 1, skew=3)
+            )
+        )[0]
+        == BODY
+    )  # its plane is unknown
 
 
 def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(
@@ -102,10 +113,10 @@ def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sens
             + wide(1, "X", 0, sensor, 1)
             + wide(0, 1, 0.01, 0.05, width=20)
         )
-        (one,) = radioss(tmp_path, group(1, 1) + moved).boundary.holds
-        assert (one.start, one.end) == times
-    assert "/IMPVEL/1" in one.name
-    assert "MADE_0000.rad:" in one.name
+        (hold,) = read_radioss(tmp_path, write_group(1, 1) + moved).boundary.holds
+        assert (hold.start, hold.end) == times
+    assert "/IMPVEL/1" in hold.name
+    assert "MADE_0000.rad:" in hold.name
 
 
 @pytest.mark.parametrize(
@@ -127,45 +138,47 @@ def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sens
     ],
 )  # fmt: skip
 def test_supports_of_ls_dyna(tmp_path: Path, more: str, expected: set[int]) -> None:
-    assert held(ls_dyna(tmp_path, more))[0] == expected
+    assert find_held_parts(read_ls_dyna(tmp_path, more))[0] == expected
 
 
 def test_birth_and_death(tmp_path: Path) -> None:
     motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + wide(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
     spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + wide(1, 0, 1, 1, 1) + wide(0.0, 0.02)
-    found = ls_dyna(tmp_path, motion + spc).boundary.holds
-    assert {(one.start, one.end) for one in found} == {(0.01, 0.05), (0.0, 0.02)}
+    holds = read_ls_dyna(tmp_path, motion + spc).boundary.holds
+    assert {(hold.start, hold.end) for hold in holds} == {(0.01, 0.05), (0.0, 0.02)}
 
 
 def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
-    found = radioss(
-        tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + bcs("111 000", 1)
+    boundary = read_radioss(
+        tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + write_support("111 000", 1)
     ).boundary
-    assert not found.holds
-    assert "/BCS/1" in found.notes[0]
-    found = ls_dyna(
+    assert not boundary.holds
+    assert "/BCS/1" in boundary.notes[0]
+    boundary = read_ls_dyna(
         tmp_path,
         "*BOUNDARY_SPC_SET\n" + wide(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + wide(1, 1.0),
     ).boundary
-    assert [note.split(" ")[0] for note in found.notes] == [
+    assert [note.split(" ")[0] for note in boundary.notes] == [
         "*BOUNDARY_SPC_SET",
         "*LOAD_BODY_RX",
     ]
-    assert found.gravity is None
+    assert boundary.gravity is None
     (tmp_path / "MADE_0001.rad").write_text("/RUN/MADE/1\n0.1\n/BCSR/TRA/X/1\n1\n")
-    found = radioss(tmp_path, group(1, 1) + bcs("111 000", 1)).boundary
-    assert not found.holds
-    assert "/BCSR" in found.notes[0]
+    boundary = read_radioss(
+        tmp_path, write_group(1, 1) + write_support("111 000", 1)
+    ).boundary
+    assert not boundary.holds
+    assert "/BCSR" in boundary.notes[0]
 
 
-def grav(
+def write_gravity(
     function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z"
 ) -> str:
     return f"/GRAV/2\nmore\n{wide(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
 
 
-def told(inventory: Inventory) -> Surroundings:
-    """What a deck tells of a run of nothing."""
+def find_surroundings(inventory: Inventory) -> Surroundings:
+    """Return the surroundings that a deck defines, for a run without other information."""
     return in_deck(Run((), ()), inventory).surroundings
 
 
@@ -179,12 +192,12 @@ RAMP = "/FUNCT/1\nramp\n" + "".join(
     [
         ("", (9.81,), (9.81,), (9.81,)),
         (
-            grav(0, 3.0, axis="X"),
+            write_gravity(0, 3.0, axis="X"),
             ((9.81**2 + 9) ** 0.5,),
             ((9.81**2 + 9) ** 0.5,),
             ((9.81**2 + 9) ** 0.5,),
         ),
-        (grav(5, 1.0), None, None, None),  # no such function
+        (write_gravity(5, 1.0), None, None, None),  # no such function
     ],
 )
 def test_gravity_by_part(
@@ -194,19 +207,19 @@ def test_gravity_by_part(
     wheel: tuple[float, ...],
     whole: tuple[float, ...],
 ) -> None:
-    found = told(radioss(tmp_path, more)).gravity
+    surroundings = find_surroundings(read_radioss(tmp_path, more)).gravity
     for part, expected in ((1, body), (8, wheel), (None, whole)):
-        assert found.get(part) == (pytest.approx(expected) if expected else None)
+        assert surroundings.get(part) == (pytest.approx(expected) if expected else None)
 
 
 @pytest.mark.parametrize(
     ("card", "expected"),
     [
-        (RAMP + grav(1, -1.62), (0.0, 1.62)),
-        (grav(0, -1.62, sensor=3), (0.0, 1.62)),
+        (RAMP + write_gravity(1, -1.62), (0.0, 1.62)),
+        (write_gravity(0, -1.62, sensor=3), (0.0, 1.62)),
         (
             RAMP.replace(wide(1, 0, width=20), "").replace(wide(3, 1, width=20), "")
-            + grav(1, 1.0),
+            + write_gravity(1, 1.0),
             None,
         ),
         ("", (0.0,)),
@@ -220,7 +233,7 @@ def test_values_that_gravity_keeps(
     (tmp_path / "MADE_0000.rad").write_text(
         text.partition("/GRAV/1\n")[0] + card + "/END\n"
     )
-    assert told(read_inventory(name)).gravity.get(1) == expected
+    assert find_surroundings(read_inventory(name)).gravity.get(1) == expected
 
 
 def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
@@ -229,10 +242,16 @@ def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
     name = made_car.starter(tmp_path)
     text = (tmp_path / "MADE_0000.rad").read_text().partition("/GRAV/1\n")[0]
     (tmp_path / "MADE_0000.rad").write_text(
-        text + group(1, *range(21, 25)) + grav(0, -9.81, group=1) + "/END\n"
+        text
+        + write_group(1, *range(21, 25))
+        + write_gravity(0, -9.81, group=1)
+        + "/END\n"
     )
-    found = told(read_inventory(name)).gravity
-    assert (found[1], found.get(7)) == ((0.0,), None)  # hubs: some of their nodes
+    surroundings = find_surroundings(read_inventory(name)).gravity
+    assert (surroundings[1], surroundings.get(7)) == (
+        (0.0,),
+        None,
+    )  # hubs: some of their nodes
 
 
 @pytest.mark.parametrize(
@@ -249,14 +268,14 @@ def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
 def test_body_loads_of_ls_dyna(
     tmp_path: Path, cards: str, expected: tuple[float, ...] | None
 ) -> None:
-    found = told(ls_dyna(tmp_path, cards)).gravity
-    assert found.get(8) == expected
-    assert (found.get(1) == (9.81,)) is (expected is not None)
+    surroundings = find_surroundings(read_ls_dyna(tmp_path, cards)).gravity
+    assert surroundings.get(8) == expected
+    assert (surroundings.get(1) == (9.81,)) is (expected is not None)
 
 
 def test_the_deck_of_another_model_tells_nothing(tmp_path: Path) -> None:
     history = made_car.t01(tmp_path, 3.0)
-    deck = made_car.starter(tmp_path, group(1, 1) + bcs("111 000", 1))
+    deck = made_car.starter(tmp_path, write_group(1, 1) + write_support("111 000", 1))
     assert in_deck(open_run([history]), read_inventory(deck)).surroundings.supports[1]
-    other = read_inventory("sample_data/rollover_box.k")
-    assert not in_deck(open_run([history]), other).surroundings.supports
+    other_inventory = read_inventory("sample_data/rollover_box.k")
+    assert not in_deck(open_run([history]), other_inventory).surroundings.supports

@@ -18,23 +18,23 @@ from tests.sample_deck import DECK, FLYING, deck, radioss
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 
 
-def nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
-    """Node cards of a row of unit cubes."""
-    places = [(i // 4, i % 2, i // 2 % 2) for i in range(count)]
+def write_nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
+    """Return the node lines of a row of unit cubes."""
+    coordinates = [(i // 4, i % 2, i // 2 % 2) for i in range(count)]
     return "".join(
-        f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in place) + "\n"
-        for n, place in enumerate(places, 1)
+        f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in position) + "\n"
+        for n, position in enumerate(coordinates, 1)
     )
 
 
-def inventory(folder: Path, text: str, **files: str) -> Inventory:
+def read_text(folder: Path, text: str, **files: str) -> Inventory:
     return ls_dyna_inventory.read(
         read(folder, text, {f"{name}.k": content for name, content in files.items()})
     )
 
 
-def counted(found: Inventory) -> dict[int, dict[str, int]]:
-    return {part: dict(counts) for part, counts in found.counts.items()}
+def count_elements(deck_inventory: Inventory) -> dict[int, dict[str, int]]:
+    return {part: dict(counts) for part, counts in deck_inventory.counts.items()}
 
 
 SHELLS = row(1, 7, 1, 2, 4, 3) + row(2, 7, 5, 6, 8, 7)
@@ -42,8 +42,8 @@ WIDE = row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)
 LINES = SHELLS.splitlines(keepends=True)
 
 
-def after_each(line: str) -> str:
-    """Shells, each with a line of an option below."""
+def insert_after_each(line: str) -> str:
+    """Return shells, each followed by a line of an option."""
     return "".join(f"{shell}{line}\n" for shell in LINES)
 
 
@@ -55,10 +55,11 @@ FORMS = {
     "commas and columns": f"*ELEMENT_SHELL\n1,7,1,2,4,3\n{LINES[1]}",
     "parameter": "*PARAMETER\nI      pid         7\n*ELEMENT_SHELL\n"
     + SHELLS.replace("       7", "    &pid", 1),
-    "thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("             1.0" * 4),
+    "thickness": "*ELEMENT_SHELL_THICKNESS\n"
+    + insert_after_each("             1.0" * 4),
     "whole thickness": "*ELEMENT_SHELL_THICKNESS\n"
-    + after_each("               1" * 4),
-    "beta": "*ELEMENT_SHELL_BETA\n" + after_each("             0.0"),
+    + insert_after_each("               1" * 4),
+    "beta": "*ELEMENT_SHELL_BETA\n" + insert_after_each("             0.0"),
     "comments and blank lines": "*ELEMENT_SHELL\n$#   eid     pid\n"
     + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
     "lower case": f"*Element_Shell\n{SHELLS}",
@@ -70,21 +71,21 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None:
-    mesh = f"*NODE %\n{nodes(10)}" if form == "i10" else f"*NODE\n{nodes()}"
-    found = inventory(tmp_path, f"{HEAD}{mesh}{FORMS[form]}*END\n")
-    assert counted(found) == {7: {"shell": 2}}
-    assert found.notes == ()
-    assert found.rigid_nodes([7]) == (6 if form == "triangles" else 8)
+    mesh = f"*NODE %\n{write_nodes(10)}" if form == "i10" else f"*NODE\n{write_nodes()}"
+    read_inventory = read_text(tmp_path, f"{HEAD}{mesh}{FORMS[form]}*END\n")
+    assert count_elements(read_inventory) == {7: {"shell": 2}}
+    assert read_inventory.notes == ()
+    assert read_inventory.rigid_nodes([7]) == (6 if form == "triangles" else 8)
 
 
 def test_long_format(tmp_path: Path) -> None:
     head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20)
     shells = row(1, 7, 1, 2, 4, 3, width=20) + row(2, 7, 5, 6, 8, 7, width=20)
-    found = inventory(
-        tmp_path, f"{head}*NODE\n{nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n"
+    long_inventory = read_text(
+        tmp_path, f"{head}*NODE\n{write_nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n"
     )
-    assert counted(found) == {7: {"shell": 2}}
-    assert found.rigid_nodes([7]) == 8
+    assert count_elements(long_inventory) == {7: {"shell": 2}}
+    assert long_inventory.rigid_nodes([7]) == 8
 
 
 @pytest.mark.parametrize(
@@ -110,9 +111,11 @@ def test_long_format(tmp_path: Path) -> None:
 def test_other_kinds(
     tmp_path: Path, elements: str, expected: dict[int, dict[str, int]]
 ) -> None:
-    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{elements}*END\n")
-    assert counted(found) == expected
-    assert found.notes == ()
+    mixed_inventory = read_text(
+        tmp_path, f"{HEAD}*NODE\n{write_nodes()}{elements}*END\n"
+    )
+    assert count_elements(mixed_inventory) == expected
+    assert mixed_inventory.notes == ()
 
 
 @pytest.mark.slow
@@ -120,27 +123,32 @@ def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
     tmp_path: Path,
 ) -> None:
     text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
-    assert len(text) > 4 << 20  # a piece ends in it
+    assert len(text) > 4 << 20  # a piece ends within the element
     for shift in (
         "",
         "$" * 63 + "\n",
-    ):  # then the other line of an element is the last of a piece
-        found = inventory(
-            tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n"
+    ):  # now a piece ends after the other line of an element
+        solid_inventory = read_text(
+            tmp_path, f"{HEAD}*NODE\n{write_nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n"
         )
-        assert counted(found) == {7: {"solid": 60_000}}
+        assert count_elements(solid_inventory) == {7: {"solid": 60_000}}
 
 
 def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(
     tmp_path: Path,
 ) -> None:
-    other = f"*KEYWORD\n*PART\nc\n         1         1         1\n*ELEMENT_SHELL\n{row(1, 1, 1, 2, 4, 3)}*END\n"
+    included_deck = f"*KEYWORD\n*PART\nc\n         1         1         1\n*ELEMENT_SHELL\n{row(1, 1, 1, 2, 4, 3)}*END\n"
     transform = "*INCLUDE_TRANSFORM\nother.k\n" + row(4, 0, 20, 0, 0, width=10) + "\n\n"
-    main = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 4, 3)}{row(2, 9, 5, 6, 8, 7)}{transform}*END\n"
-    found = inventory(tmp_path, main, other=other)
-    assert counted(found) == {7: {"shell": 1}, 9: {"shell": 1}, 21: {"shell": 1}}
-    assert found.neighbours == {7: frozenset(), 9: {21}, 21: {9}}
-    assert found.groups([7, 9, 21]) == ((7,), (9, 21))
+    elements = row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7)
+    main = f"{HEAD}*NODE\n{write_nodes()}*ELEMENT_SHELL\n{elements}{transform}*END\n"
+    joined_inventory = read_text(tmp_path, main, other=included_deck)
+    assert count_elements(joined_inventory) == {
+        7: {"shell": 1},
+        9: {"shell": 1},
+        21: {"shell": 1},
+    }
+    assert joined_inventory.neighbours == {7: frozenset(), 9: {21}, 21: {9}}
+    assert joined_inventory.groups([7, 9, 21]) == ((7,), (9, 21))
 
 
 def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
@@ -150,17 +158,19 @@ def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
         + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n"
         + row(1, 5, 1, 2, 4, 99)
     )
-    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{strange}       2")
-    assert not found.complete
-    told = " ".join(found.notes)
+    partial_inventory = read_text(
+        tmp_path, f"{HEAD}*NODE\n{write_nodes()}{strange}       2"
+    )
+    assert not partial_inventory.complete
+    notes = " ".join(partial_inventory.notes)
     for words in (
         "ELEMENT_SOLID_STRANGE",
         "absent.k was not read",
-        "is it cut",
+        "may be truncated",
         "part 5, which no *PART",
         "1 nodes of",
     ):
-        assert words in told
+        assert words in notes
 
 
 def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(
@@ -172,26 +182,26 @@ def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(
         2, 7, first, 5, 6, first + 9, width=20
     )
     wide = f"{3:20d}{7:20d}{'9' * 20}{first:20d}{first:20d}\n"
-    found = inventory(tmp_path, f"{head}{shells}{wide}*END\n")
-    assert counted(found) == {7: {"shell": 2}}
-    assert found.rigid_nodes([7]) == 7
+    large_inventory = read_text(tmp_path, f"{head}{shells}{wide}*END\n")
+    assert count_elements(large_inventory) == {7: {"shell": 2}}
+    assert large_inventory.rigid_nodes([7]) == 7
 
 
 def test_a_deck_cut_at_any_byte_of_its_mesh_says_that_it_is_cut(tmp_path: Path) -> None:
-    text = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{SHELLS}"
+    text = f"{HEAD}*NODE\n{write_nodes()}*ELEMENT_SHELL\n{SHELLS}"
     whole = {7: {"shell": 2}}
     for end in range(text.index("*ELEMENT") + 16, len(text) + 1):
-        found = inventory(tmp_path, text[:end])
-        assert sum("is it cut" in note for note in found.notes) == 1
-        assert counted(found) in ({}, {7: {"shell": 1}}, whole)
-        assert not found.complete
-    found = inventory(tmp_path, f"{text}*END\n")
-    assert (counted(found), found.complete) == (whole, True)
+        cut_inventory = read_text(tmp_path, text[:end])
+        assert sum("may be truncated" in note for note in cut_inventory.notes) == 1
+        assert count_elements(cut_inventory) in ({}, {7: {"shell": 1}}, whole)
+        assert not cut_inventory.complete
+    cut_inventory = read_text(tmp_path, f"{text}*END\n")
+    assert (count_elements(cut_inventory), cut_inventory.complete) == (whole, True)
     (tmp_path / "mesh.k").write_text(
         text.removeprefix(HEAD), "utf-8"
-    )  # an include may do without *END
-    found = inventory(tmp_path, f"{HEAD}*INCLUDE\nmesh.k\n")
-    assert (counted(found), found.complete) == (whole, True)
+    )  # an include needs no *END
+    cut_inventory = read_text(tmp_path, f"{HEAD}*INCLUDE\nmesh.k\n")
+    assert (count_elements(cut_inventory), cut_inventory.complete) == (whole, True)
 
 
 def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
@@ -208,15 +218,17 @@ def test_materials_and_sections_are_told(tmp_path: Path) -> None:
     )  # fmt: skip
     parts = "".join(f"*PART\np{n}\n{n:10d}{1:10d}{n:10d}\n" for n in range(1, 6))
     solids = "*ELEMENT_SOLID\n" + "".join(row(n, n, *range(1, 9)) for n in range(1, 6))
-    found = inventory(
-        tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{nodes()}{solids}*END\n"
+    part_data = read_text(
+        tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{write_nodes()}{solids}*END\n"
     )
     kinds = {
-        part: data.material.kind for part, data in found.parts.items() if data.material
+        part: data.material.kind
+        for part, data in part_data.parts.items()
+        if data.material
     }
     assert kinds == {1: "rigid", 2: "spring", 3: "spring", 4: "airbag", 5: "deformable"}
-    assert [found.parts[n].section.damped for n in (1, 2, 3)] == [None, False, True]
-    assert not found.parts[
+    assert [part_data.parts[n].section.damped for n in (1, 2, 3)] == [None, False, True]
+    assert not part_data.parts[
         5
     ].section.turns  # ELFORM 1 keeps its stresses in global axes
 
@@ -235,28 +247,40 @@ def test_counts_and_nodes_agree_with_a_plain_count(
         for n, (part, node) in enumerate(shells, start=1)
     ]
     parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
-    text = f"*KEYWORD\n{parts}*NODE\n{nodes(count=44)}*ELEMENT_SHELL\n{''.join(row(*line) for line in lines)}*END\n"
-    found = ls_dyna_inventory.read(read_deck(write(folder, text)))
-    assert {part: counts["shell"] for part, counts in found.counts.items()} == Counter(
-        part for part, _ in shells
-    )
-    own = {
+    elements = "".join(row(*line) for line in lines)
+    text = f"*KEYWORD\n{parts}*NODE\n{write_nodes(count=44)}*ELEMENT_SHELL\n{elements}*END\n"
+    random_inventory = ls_dyna_inventory.read(read_deck(write(folder, text)))
+    assert {
+        part: counts["shell"] for part, counts in random_inventory.counts.items()
+    } == Counter(part for part, _ in shells)
+    nodes_of_part = {
         part: {n for p, node in shells if p == part for n in range(node, node + 4)}
         for part, _ in shells
     }
-    assert all(found.rigid_nodes([part]) == len(used) for part, used in own.items())
+    assert all(
+        random_inventory.rigid_nodes([part]) == len(used)
+        for part, used in nodes_of_part.items()
+    )
     touching = {
-        part: {other for other in own if other != part and own[other] & own[part]}
-        for part in own
+        part: {
+            other_part
+            for other_part in nodes_of_part
+            if other_part != part and nodes_of_part[other_part] & nodes_of_part[part]
+        }
+        for part in nodes_of_part
     }
-    assert dict(found.neighbours) == touching
+    assert dict(random_inventory.neighbours) == touching
 
 
 def test_the_sample_decks_are_what_their_module_writes() -> None:
     assert DECK.read_text("utf-8") == deck()
     assert {name: (FLYING / name).read_text("utf-8") for name in radioss()} == radioss()
-    found = read_inventory(str(DECK))
-    assert counted(found) == {1: {"shell": 94}, 2: {"shell": 15}, 3: {"shell": 4}}
+    sample_inventory = read_inventory(str(DECK))
+    assert count_elements(sample_inventory) == {
+        1: {"shell": 94},
+        2: {"shell": 15},
+        3: {"shell": 4},
+    }
 
 
 def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
@@ -267,8 +291,9 @@ def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
         (9, 13, 14, 15, 16),
         (9, 16, 17, 18, 18),
     ]
-    mesh = "".join(row(number, *one) for number, one in enumerate(shells, 1))
-    found = inventory(
-        tmp_path, HEAD + "*NODE\n" + nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n"
+    mesh = "".join(row(number, *shell) for number, shell in enumerate(shells, 1))
+    shell_inventory = read_text(
+        tmp_path,
+        HEAD + "*NODE\n" + write_nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n",
     )
-    assert [pieces_of(found, [part]) for part in (7, 9, 3)] == [2, 1, 0]
+    assert [pieces_of(shell_inventory, [part]) for part in (7, 9, 3)] == [2, 1, 0]

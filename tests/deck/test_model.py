@@ -1,4 +1,4 @@
-"""Which rigid bodies parts become: what springs hold, what a rigid body of the deck has, and what nothing joins."""
+"""Rigid bodies that parts form: connected by springs, by a rigid body of the deck, or by nothing."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from d2rpick.flight.position_error import RigidBody
 from tests import made_car
 from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_joints import MESH
-from tests.deck.test_ls_dyna_inventory import inventory
+from tests.deck.test_ls_dyna_inventory import read_text
 from tests.decks import row, wide
 
 # Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
@@ -28,13 +28,15 @@ DISCRETE = (
 )
 
 
-def radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
+def read_radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
     if engine:
         (folder / "TEST_0001.rad").write_text(f"/RUN/TEST/1\n0.1\n{engine}")
-    return rad.inventory(folder, rad.nodes(50) + RADIOSS + rad.PROPS + "".join(more))
+    return rad.read_text(
+        folder, rad.write_nodes(50) + RADIOSS + rad.PROPS + "".join(more)
+    )
 
 
-def body(number: int, *nodes: int) -> str:
+def write_body(number: int, *nodes: int) -> str:
     group = "".join(wide(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
     line = f"{48 + number:10d}{0:10d}{0:10d}{0:10d}{'0':>20}{number:10d}\n"
     return f"/RBODY/{number}\nrb\n{line}/GRNOD/NODE/{number}\ng\n{group}"
@@ -44,57 +46,61 @@ FIRST, SECOND, THIRD = range(1, 41), range(41, 45), range(45, 49)
 
 
 def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> None:
-    """Loose wheels were merged with the car that had three quarters of the nodes."""
-    assert radioss(tmp_path).bodies([1, 2, 3]) == ((1,), (2,), (3,))
+    """Earlier, loose wheels were merged with a car that had three quarters of the nodes."""
+    assert read_radioss(tmp_path).bodies([1, 2, 3]) == ((1,), (2,), (3,))
 
 
 def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
-    found = radioss(tmp_path, SPRING, wide(91, 40, 41))
-    assert found.bodies([1, 2, 3]) == ((1, 2), (3,))
-    assert found.bodies([1, 2, 3, 9]) == ((1, 2, 9), (3,))
-    assert found.bodies([2, 3]) == ((2,), (3,))
-    assert found.bodies([2, 9]) == ((2,),)  # the other end of the spring moves
-    assert found.groups([1, 2, 3]) == (
+    inventory = read_radioss(tmp_path, SPRING, wide(91, 40, 41))
+    assert inventory.bodies([1, 2, 3]) == ((1, 2), (3,))
+    assert inventory.bodies([1, 2, 3, 9]) == ((1, 2, 9), (3,))
+    assert inventory.bodies([2, 3]) == ((2,), (3,))
+    assert inventory.bodies([2, 9]) == ((2,),)  # the other end of the spring moves
+    assert inventory.groups([1, 2, 3]) == (
         (1,),
         (2,),
         (3,),
     )  # each may have a body of its own
-    assert pieces_of(found, [1, 2]) == 1
-    assert bodies_of(found, [1, 2]) == (RigidBody((1, 2)),)
+    assert pieces_of(inventory, [1, 2]) == 1
+    assert bodies_of(inventory, [1, 2]) == (RigidBody((1, 2)),)
 
 
 def test_springs_of_ls_dyna_hold_parts_too(tmp_path: Path) -> None:
-    found = inventory(tmp_path, MESH + DISCRETE + row(91, 15, 4, 5) + "*END\n")
+    found = read_text(tmp_path, MESH + DISCRETE + row(91, 15, 4, 5) + "*END\n")
     assert found.bodies([7, 9, 11]) == ((7, 9), (11,))
 
 
 def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
     tmp_path: Path,
 ) -> None:
-    found = radioss(tmp_path, body(1, *FIRST, *THIRD), engine="/RBODY/OFF\n49\n")
-    assert found.bodies([1, 2, 3]) == ((1, 3), (2,))
-    assert bodies_of(found, [1, 3]) == (RigidBody((1, 3)),)
-    assert found.bodies([2, 3]) == (
+    inventory = read_radioss(
+        tmp_path, write_body(1, *FIRST, *THIRD), engine="/RBODY/OFF\n49\n"
+    )
+    assert inventory.bodies([1, 2, 3]) == ((1, 3), (2,))
+    assert bodies_of(inventory, [1, 3]) == (RigidBody((1, 3)),)
+    assert inventory.bodies([2, 3]) == (
         (2,),
         (3,),
-    )  # it has another part too: it cannot serve these
-    assert found.groups([1, 2, 3]) == ((1,), (2,), (3,))
-    assert found.joined == {}
+    )  # it contains another part too, so it cannot switch these
+    assert inventory.groups([1, 2, 3]) == ((1,), (2,), (3,))
+    assert inventory.joined == {}
 
 
 def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(
     tmp_path: Path,
 ) -> None:
     spring = SPRING + wide(91, 40, 41)
-    found = radioss(
+    inventory = read_radioss(
         tmp_path,
         spring,
-        body(1, *FIRST),
-        body(2, *SECOND),
+        write_body(1, *FIRST),
+        write_body(2, *SECOND),
         engine="/RBODY/OFF\n49 50\n",
     )
-    assert found.bodies([1, 2]) == ((1,), (2,))
-    alone = radioss(tmp_path, spring, body(1, *FIRST), engine="/RBODY/OFF\n49\n")
+    assert inventory.bodies([1, 2]) == ((1,), (2,))
+    alone = read_radioss(
+        tmp_path, spring, write_body(1, *FIRST), engine="/RBODY/OFF\n49\n"
+    )
     assert alone.bodies([1, 2]) == ((1, 2),)
 
 
@@ -107,21 +113,23 @@ def test_a_rigid_body_that_is_always_on_joins_parts(
     tmp_path: Path, engine: str, joined: bool
 ) -> None:
     nodes = (39, 40, 41, 42) if engine != "/RBODY/ON\n49\n" else (*FIRST, 41, 42)
-    found = radioss(tmp_path, body(1, *nodes), engine=engine)
-    assert found.bodies([1, 2, 3]) == (((1, 2), (3,)) if joined else ((1,), (2,), (3,)))
-    assert found.joined.get(1, {}) == ({2: {"rigid body"}} if joined else {})
+    inventory = read_radioss(tmp_path, write_body(1, *nodes), engine=engine)
+    assert inventory.bodies([1, 2, 3]) == (
+        ((1, 2), (3,)) if joined else ((1,), (2,), (3,))
+    )
+    assert inventory.joined.get(1, {}) == ({2: {"rigid body"}} if joined else {})
 
 
 def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_tie(
     tmp_path: Path,
 ) -> None:
-    found = radioss(
+    inventory = read_radioss(
         tmp_path,
-        body(1, 40, 41).replace("/GRNOD/NODE", "/GRNOD/BOX"),
+        write_body(1, 40, 41).replace("/GRNOD/NODE", "/GRNOD/BOX"),
         engine="/PRINT/-100\n",
     )
-    assert [tie.split()[0] for tie in found.ties] == ["/RBODY/1"]
-    assert bodies_of(found, [1, 2]) == ()
+    assert [tie.split()[0] for tie in inventory.ties] == ["/RBODY/1"]
+    assert bodies_of(inventory, [1, 2]) == ()
 
 
 def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) -> None:
@@ -130,12 +138,12 @@ def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) ->
         (made_car.starter(tmp_path), True),
         (made_car.keywords(tmp_path), False),
     ):
-        found = read_inventory(deck)
-        assert bodies_of(found, [*made_car.BODY, *made_car.WHEELS]) == (
+        inventory = read_inventory(deck)
+        assert bodies_of(inventory, [*made_car.BODY, *made_car.WHEELS]) == (
             RigidBody(made_car.BODY), RigidBody(made_car.WHEELS, whole=False)
         )  # fmt: skip
-        assert pieces_of(found, made_car.WHEELS) == pieces_of(found, [7]) == 2
-        assert bodies_of(found, [7]) == (
+        assert pieces_of(inventory, made_car.WHEELS) == pieces_of(inventory, [7]) == 2
+        assert bodies_of(inventory, [7]) == (
             RigidBody((7,), whole),
         )  # Radioss switches each piece by itself
     welded = read_inventory(

@@ -1,6 +1,6 @@
-"""Printed engine files in the hands of the real solver: they run to the end, and the parts are rigid in the window.
+"""Printed engine files run with the real solver to the end, and the parts are rigid in the windows.
 
-Runs only where OPENRADIOSS_PATH names an installation of OpenRadioss; takes some seconds.
+These tests run only if OPENRADIOSS_PATH names an installation of OpenRadioss, and take some seconds.
 """
 
 import os
@@ -39,8 +39,8 @@ ENGINE = f"""\
 WIDE = 20  # columns of a real number
 
 
-def starter() -> str:
-    """A strip of four shells, one end of which is given a velocity; SI units."""
+def write_starter() -> str:
+    """Return a strip of four shells with a velocity at one end; SI units."""
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
     text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide(
         "kg", "m", "s", width=WIDE
@@ -62,7 +62,7 @@ def starter() -> str:
     return text + f"/TH/PART/1\nparts\nDEF       MASS\n{wide(1)}/END\n"
 
 
-def solve(folder: Path, name: str) -> None:
+def run_solver(folder: Path, name: str) -> None:
     """Run the starter and all engine files; the test is skipped where there is no solver."""
     home = os.environ.get("OPENRADIOSS_PATH")
     if not home:
@@ -117,18 +117,18 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
 ) -> None:
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     reference.mkdir()
-    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
-    assert [one.rule for one in checked.findings] == (
+    assert [finding.rule for finding in checked.findings] == (
         [] if vibrates else ["D2R407"]
-    )  # its main node is not moved
+    )  # the velocity does not move its main node
     assert [(window.part, window.tr, window.td) for window in checked.windows] == [
         (1, *times) for times in windows
     ]
-    solve(switched, "strip")
+    run_solver(switched, "strip")
     histories = sorted(map(str, switched.glob("stripT0?")))
     assert len(histories) == len(legs)
     history = open_run(histories).history(Selection(parts=("1",)))
@@ -139,7 +139,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
         assert held.sum() > 50
         assert (
             np.ptp(history.energy[held]) <= 1e-9 * history.energy.max()
-        )  # what is locked in stays as it is
+        )  # the locked-in energy stays constant
         inside |= held
     assert (
         bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
@@ -148,14 +148,14 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
 
 
 def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
-    """Before tr all states are those of the run without switching, bit by bit; in the windows nothing deforms."""
+    """Before tr all states equal those of the reference run bit by bit; in the windows nothing deforms."""
     windows, reference = [(0.003, 0.006), (0.009, 0.014)], tmp_path / "reference"
     reference.mkdir()
-    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     energies = {}
     for solver in ("radioss", "radioss-sensors"):
-        # the cap of one run holds while it is deformable, too, where the step is 1.7e-5
+        # the limit of the only run also applies while it is deformable, with a time step of 1.7e-5
         card = cards(
             windows,
             Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5),
@@ -167,19 +167,23 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
         assert [
             (window.tr, window.td) for window in check_deck(main).windows
         ] == windows
-        solve(tmp_path / solver, "strip")
+        run_solver(tmp_path / solver, "strip")
         histories = sorted(map(str, (tmp_path / solver).glob("stripT0?")))
         energies[solver] = open_run(histories).history(Selection(parts=("1",)))
-    solve(reference, "strip")
+    run_solver(reference, "strip")
     plain = open_run([str(reference / "stripT01")]).history(Selection(parts=("1",)))
     for history in energies.values():
-        before = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
-        assert before > 50
-        np.testing.assert_array_equal(history.energy[:before], plain.energy[:before])
+        leg_energies = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
+        assert leg_energies > 50
+        np.testing.assert_array_equal(
+            history.energy[:leg_energies], plain.energy[:leg_energies]
+        )
         for (
             tr,
             td,
-        ) in windows:  # at which step it becomes rigid differs, and with it the energy that is locked in
+        ) in (
+            windows
+        ):  # the time step of the switch differs, and so does the locked-in energy
             held = history.energy[
                 (history.time > tr + 6e-5) & (history.time < td - 6e-5)
             ]
@@ -189,7 +193,7 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
 
 def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> None:
     """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
-    head, _, rest = starter().partition("/RBODY/1")
+    head, _, body_lines = write_starter().partition("/RBODY/1")
     reals = [
         wide(*row, width=WIDE)
         for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))
@@ -199,7 +203,7 @@ def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> N
     reference = tmp_path / "reference"
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(
-        f"{head}{wall}{thrown}{rest[rest.index('/TH/PART') :]}"
+        f"{head}{wall}{thrown}{body_lines[body_lines.index('/TH/PART') :]}"
     )
     (reference / "strip_0001.rad").write_text(
         f"/RUN/strip/1\n{END}\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n2e-05\n"
@@ -207,11 +211,11 @@ def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> N
     ends = []
     for name in ("one", "other"):
         d2.first(reference / "strip_0000.rad", tmp_path / name, parts=1, wait=0.003)
-        solve(tmp_path / name, "strip")
+        run_solver(tmp_path / name, "strip")
         times = [
             open_run([str(tmp_path / name / f"stripT0{leg}")]).history(Selection()).time
             for leg in (1, 2, 3)
         ]
         ends.append([time[-1] for time in times])
     assert ends[0] == ends[1]
-    assert ends[0] == [pytest.approx(one, abs=5e-5) for one in (0.003, 0.004, END)]
+    assert ends[0] == [pytest.approx(stop, abs=5e-5) for stop in (0.003, 0.004, END)]

@@ -18,7 +18,7 @@ from tests.command import refused, run
 from tests.decks import found, read, spans, write
 
 TIMES = st.floats(1e-9, 1e9)
-# Something pushes from the end of each window in the test to the next one.
+# A contact force acts from the end of each window in the test to the next window.
 ALL = Printing(
     part=(11,),
     node=(1001,),
@@ -39,12 +39,12 @@ def test_few_digits_read_back(digits: int, exponent: int) -> None:
 def test_the_nearest_text_is_taken(value: float) -> None:
     text = shortest(value)
     assert len(text) <= LONGEST
-    others = [f"{value:.{n}f}" for n in range(12)] + [
+    texts = [f"{value:.{n}f}" for n in range(12)] + [
         f"{value:.{n}g}" for n in range(1, 12)
     ]
-    others += [other.removeprefix("0") for other in others if "." in other]
+    texts += [text.removeprefix("0") for text in texts if "." in text]
     assert abs(float(text) - value) <= min(
-        abs(float(other) - value) for other in others if len(other) <= LONGEST
+        abs(float(text) - value) for text in texts if len(text) <= LONGEST
     )
 
 
@@ -116,7 +116,7 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A leg takes the place of those of its number: of a probe that went too far, or of a flight that was left out."""
+    """A leg replaces one with the same number: of a probe that went too far, or of a skipped flight."""
     legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
             ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
             ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip
@@ -127,7 +127,7 @@ def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
     assert read_windows(text, "drive.ndjson") == ((0.06, 0.145), (0.2, 0.3))
     back = "\n".join(
         [*lines, '{"event": "back", "legs": 5}']
-    )  # to before the second flight
+    )  # up to the second flight
     assert read_windows(back, "drive.ndjson") == ((0.06, 0.145),)
     with pytest.raises(DeckError, match="no window was found"):
         read_windows('{"event": "prepared"}\n', "drive.ndjson")
@@ -164,8 +164,8 @@ $#     pid     ptype
 """
 
 
-def rows(text: str) -> list[str]:
-    """Data lines of a card."""
+def list_rows(text: str) -> list[str]:
+    """Return the data lines of a card."""
     return [line for line in text.splitlines() if line[0] not in "$*"]
 
 
@@ -198,7 +198,7 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
     assert all(len(line) <= 100 for line in card.text.split("\n"))
     assert all(
         a == " " or b == " "
-        for row in rows(card.text)
+        for row in list_rows(card.text)
         for a, b in zip(row[9::10], row[10::10], strict=False)
     )
 
@@ -219,7 +219,7 @@ def test_warnings_are_those_that_apply() -> None:
     assert "merged" not in text(MERGED)
     assert "merged" not in text(Printing(part=(11,)))
     assert "already" in text(PARTS._replace(merge=5))
-    assert "    7.0e-5 " in text(PARTS)  # a thousandth of the window
+    assert "    7.0e-5 " in text(PARTS)  # 1/1000 of the window
     assert "    1.0e-5 " in text(PARTS._replace(step_cap=1e-5))
 
 
@@ -259,8 +259,8 @@ def test_three_engine_files() -> None:
 
 def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
     card = radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
-    found = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
-    assert found == [
+    printed_windows = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
+    assert printed_windows == [
         ("1", "0.02", "ON"),
         ("2", "0.05", "OFF"),
         ("3", "0.09", "ON"),
@@ -274,11 +274,11 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
 @pytest.mark.parametrize(
     ("solver", "windows", "printing", "message"),
     [
-        ("ls-dyna", ONE, Printing(), "no id was given"),
+        ("ls-dyna", ONE, Printing(), "no id of a part or body"),
         ("ls-dyna", ONE, Printing(part=(0,)), "id 0 does not fit"),
         ("ls-dyna", ONE, Printing(part=(10**10,)), "id 10000000000 does not fit"),
         ("ls-dyna", ONE, PARTS._replace(merge=10**9), "id 1000000000 does not fit"),
-        ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets are 5"),
+        ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets have id 5"),
         ("ls-dyna", [(1.0000000001, 1.0000000002)], PARTS, "different times"),
         (
             "ls-dyna",
@@ -289,7 +289,7 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
         ("radioss", ONE, LONE._replace(end=0.05), "the run ends at 0.05"),
         ("radioss", ONE, LONE, "not given"),
         ("radioss", ONE, LONE._replace(end=float("inf")), "the run ends"),
-        ("radioss", ONE, Printing(end=1.0), "no id was given"),
+        ("radioss", ONE, Printing(end=1.0), "no id of a part or body"),
         ("radioss", ONE, LONE._replace(end=1.0, name="a/b"), "the name of the run"),
         (
             "radioss",

@@ -1,4 +1,4 @@
-"""Decks made at random: what is written is read, and no bytes whatever bring the check down."""
+"""Random decks: the reader returns what was written, and no bytes make the check fail."""
 
 import contextlib
 import string
@@ -18,7 +18,7 @@ TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)
 
 @dataclass(frozen=True)
 class Written:
-    """Windows, and how the deck that holds them is to be written."""
+    """Windows, and how their deck is written."""
 
     windows: list[tuple[int, float, float | None]] = field(default_factory=list)
     style: str = "fixed"
@@ -30,7 +30,7 @@ class Written:
 
 
 @st.composite
-def decks(draw: st.DrawFn) -> Written:
+def draw_deck(draw: st.DrawFn) -> Written:
     windows: list[tuple[int, float, float | None]] = []
     for part in sorted(draw(st.sets(st.integers(1, 9999), max_size=4))):
         times = sorted(draw(st.sets(TIMES, min_size=1, max_size=6)))
@@ -47,8 +47,8 @@ def decks(draw: st.DrawFn) -> Written:
     )
 
 
-def text_of(written: Written) -> str:
-    """The deck: one card per switch."""
+def write_text(written: Written) -> str:
+    """Return the deck with one card per switch."""
     width = 20 if written.style == "long" else 10
     lines = ["*KEYWORD" + (" LONG=Y" if written.style == "long" else "")]
 
@@ -66,10 +66,10 @@ def text_of(written: Written) -> str:
             if time is None:
                 continue
             swset += 1
-            shown = f"&t{swset}" if written.as_parameters else repr(time)
+            time_text = f"&t{swset}" if written.as_parameters else repr(time)
             if written.as_parameters:
                 lines += ["*PARAMETER", line(f"R t{swset}", repr(time))]
-            lines += ["*DEFORMABLE_TO_RIGID_AUTOMATIC", line(swset, 0, shown)]
+            lines += ["*DEFORMABLE_TO_RIGID_AUTOMATIC", line(swset, 0, time_text)]
             lines += [line("", "", "", "", int(to_rigid), int(not to_rigid))]
             lines += [line(part, 0, "PART") if to_rigid else line(part, "PART")]
     if written.comments:
@@ -78,26 +78,26 @@ def text_of(written: Written) -> str:
     return text if written.upper else text.lower()
 
 
-@given(decks())
+@given(draw_deck())
 def test_what_is_written_is_read(written: Written) -> None:
     with TemporaryDirectory() as folder:
-        deck = read(Path(folder), text_of(written))
+        deck = read(Path(folder), write_text(written))
         assert spans(deck) == written.windows
         checked = check_deck(deck.path)
         assert {finding.rule for finding in checked.findings} <= {"D2R104"}
 
 
-@given(decks())
+@given(draw_deck())
 def test_offsets_move_every_window(written: Written) -> None:
     outer = f"*INCLUDE_TRANSFORM\ninner.k\n{0:10d}{0:10d}{written.offset:10d}\n"
     with TemporaryDirectory() as folder:
-        deck = read(Path(folder), outer, {"inner.k": text_of(written)})
+        deck = read(Path(folder), outer, {"inner.k": write_text(written)})
         assert spans(deck) == [
             (part + written.offset, tr, td) for part, tr, td in written.windows
         ]
 
 
-def survives(content: bytes) -> None:
+def check_survives(content: bytes) -> None:
     with TemporaryDirectory() as folder:
         path = write(Path(folder), content)
         with contextlib.suppress(D2RPickError):
@@ -109,7 +109,7 @@ def survives(content: bytes) -> None:
 
 @given(st.binary(max_size=400))
 def test_any_bytes(content: bytes) -> None:
-    survives(content)
+    check_survives(content)
 
 
 PIECES = [
@@ -126,7 +126,7 @@ PIECES = [
 
 @given(st.lists(st.sampled_from(PIECES), max_size=40))
 def test_any_mix_of_what_decks_are_made_of(pieces: list[str]) -> None:
-    survives("".join(pieces).encode("latin-1"))
+    check_survives("".join(pieces).encode("latin-1"))
 
 
 @given(st.data())
@@ -137,10 +137,10 @@ def test_a_good_deck_with_damage(data: st.DataObject) -> None:
         content[at : at + data.draw(st.integers(0, 12))] = data.draw(
             st.binary(max_size=12)
         )
-    survives(bytes(content))
+    check_survives(bytes(content))
 
 
 @given(st.text(string.printable, max_size=10))
 def test_any_text_in_the_time_field(text: str) -> None:
     card = f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{1:10d}{0:10d}{text:>10s}\n"
-    survives((HEAD + PARTS + card + END).encode("latin-1"))
+    check_survives((HEAD + PARTS + card + END).encode("latin-1"))

@@ -1,4 +1,4 @@
-"""Rigid bodies that a deck lacks: their parts, their main node, and what moves it."""
+"""Rigid bodies that a deck lacks: their parts, their main node, and the velocities and gravity on it."""
 
 from pathlib import Path
 
@@ -21,10 +21,15 @@ ALL = (1, 2, 3, 4)
 BODY = f"/RBODY/7\nbody\n{wide(99, 0, 0, 0, '', 0, 70)}"
 
 
-def quad(part: int, left: float) -> tuple[str, str]:
-    """Nodes and shell of a square part of side 1 from x = left on, and its /PART."""
+def write_quad(part: int, left_edge: float) -> tuple[str, str]:
+    """Return nodes and shell of a square part of side 1 that begins at x = left_edge, and its /PART."""
     ids = [10 * part + i for i in range(4)]
-    corners = ((left, 0.0), (left + 1, 0.0), (left + 1, 1.0), (left, 1.0))
+    corners = (
+        (left_edge, 0.0),
+        (left_edge + 1, 0.0),
+        (left_edge + 1, 1.0),
+        (left_edge, 1.0),
+    )
     nodes = "".join(
         wide(n)[:-1] + wide(x, y, 0.0, width=REAL)
         for n, (x, y) in zip(ids, corners, strict=True)
@@ -35,10 +40,15 @@ def quad(part: int, left: float) -> tuple[str, str]:
     )
 
 
-def starter(more: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)) -> str:
+def write_starter(
+    further_cards: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)
+) -> str:
     """Parts 1 and 2 on springs (part 4), part 3 apart from them."""
     nodes, parts = zip(
-        *(quad(part, left) for part, left in ((1, 0.0), (2, 2.0), (3, 9.0))),
+        *(
+            write_quad(part, left_edge)
+            for part, left_edge in ((1, 0.0), (2, 2.0), (3, 9.0))
+        ),
         strict=True,
     )
     text = (
@@ -61,54 +71,58 @@ def starter(more: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)) -> s
         + "".join(parts)
     )
     return (
-        text + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{more}/END\n"
+        text
+        + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{further_cards}/END\n"
     )
 
 
-def deck(folder: Path, more: str = "", engine: str = ENGINE) -> str:
+def write_run(folder: Path, further_cards: str = "", engine: str = ENGINE) -> str:
     folder.mkdir(exist_ok=True)
     (folder / "box_0001.rad").write_text(engine)
-    main = put(folder / "box_0000.rad", starter(more))
+    main = put(folder / "box_0000.rad", write_starter(further_cards))
     return str(main)
 
 
-def group(number: int, *ids: int, kind: str = "NODE") -> str:
+def write_group(number: int, *ids: int, kind: str = "NODE") -> str:
     return f"/GRNOD/{kind}/{number}\ngroup\n{wide(*ids)}"
 
 
-def velocity(number: int) -> str:
+def write_velocity(number: int) -> str:
     return (
         f"/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(number)}"
     )
 
 
-def gravity(number: int) -> str:
+def write_gravity(number: int) -> str:
     return f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, number)[:-1]}{wide(1.0, -9.81, width=REAL)}"
 
 
-def written(
-    tmp_path: Path, more: str = "", parts: tuple[int, ...] = ALL
+def write_bodies(
+    tmp_path: Path, further_cards: str = "", parts: tuple[int, ...] = ALL
 ) -> tuple[tuple[int, ...], Run, str]:
     """Write the deck with the bodies, and read it again."""
-    main = deck(tmp_path / "deck", more)
-    found = bodies_for(main, parts)
-    printing = Printing(node=found.nodes, end=0.4, name="box", starter=found.cards)
+    main = write_run(tmp_path / "deck", further_cards)
+    bodies = bodies_for(main, parts)
+    printing = Printing(node=bodies.nodes, end=0.4, name="box", starter=bodies.cards)
     name = write_deck(
         main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
     )[0]
-    return found.nodes, read_run(name), name
+    return bodies.nodes, read_run(name), name
 
 
 def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
-    """Springs go with the parts that they join; the copy is the deck with cards before its end."""
-    nodes, run, name = written(tmp_path)
+    """Springs belong to the body of their parts; the copy is the deck with the cards before its end."""
+    nodes, run, name = write_bodies(tmp_path)
     assert run.starter
     bodies = {body.node.value: body for body in run.starter.bodies}
     held = rigid_parts(run.starter, {node: body.group for node, body in bodies.items()})
     assert {node: held[node] for node in nodes} == {100: {1, 2, 4}, 101: {3}}
-    before, after = starter().partition("/END\n")[::2], Path(name).read_text()
-    assert after.startswith(before[0])
-    assert after.endswith("/END\n")
+    part_groups, body_groups = (
+        write_starter().partition("/END\n")[::2],
+        Path(name).read_text(),
+    )
+    assert body_groups.startswith(part_groups[0])
+    assert body_groups.endswith("/END\n")
     checked = check_deck(name)
     assert not checked.findings
     assert {(w.part, w.tr, w.td) for w in checked.windows} == {
@@ -122,27 +136,33 @@ def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
 
 def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
     """Centres of the squares are at 0.5 and 2.5, the second has twice the mass; springs without mass count nothing."""
-    nodes, run, _ = written(tmp_path)
+    nodes, run, _ = write_bodies(tmp_path)
     assert run.starter
-    ids, places = nodes_of(run.starter.named("NODE"))
-    own = [places[ids == node][0].tolist() for node in nodes]
-    assert own == [
+    ids, coordinates = nodes_of(run.starter.named("NODE"))
+    main_coordinates = [coordinates[ids == node][0].tolist() for node in nodes]
+    assert main_coordinates == [
         pytest.approx([(0.5 + 2 * 2.5) / 3, 0.5, 0.0], abs=1e-9),
         pytest.approx([9.5, 0.5, 0.0], abs=1e-9),
     ]
 
 
 def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -> None:
-    """Else the starter puts the bodies at rest (D2R407), and gravity leaves them alone."""
-    everything = group(1, *(10 * part + i for part in (1, 2, 3) for i in range(4)))
+    """Otherwise the starter sets the bodies to rest (D2R407), and gravity does not act on them."""
+    everything = write_group(
+        1, *(10 * part + i for part in (1, 2, 3) for i in range(4))
+    )
     wall = (
         "/RWALL/PLANE/3\nground\n"
         + wide(0, 0, 1, 0)
         + 2 * wide(0.0, 0.0, 0.0, width=REAL)
     )
-    nodes, run, name = written(
+    nodes, run, name = write_bodies(
         tmp_path,
-        everything + velocity(1) + gravity(1) + wall + wide(0.0, 0.0, 1.0, width=REAL),
+        everything
+        + write_velocity(1)
+        + write_gravity(1)
+        + wall
+        + wide(0.0, 0.0, 1.0, width=REAL),
     )
     assert not check_deck(name).findings
     assert run.starter
@@ -152,25 +172,29 @@ def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -
         for number in [card.integer(card.rows[1], 4).value]
     }
     members = [run.starter.group_members(number) for number in sorted(pulled)]
-    assert [one and one[0] for one in members[1:]] == [{node} for node in nodes]
+    assert [group_members and group_members[0] for group_members in members[1:]] == [
+        {node} for node in nodes
+    ]
     ids = [body.id for body in run.starter.bodies]
     assert len(set(ids)) == len(ids)
 
 
 def test_gravity_that_acts_on_all_nodes_needs_nothing_more(tmp_path: Path) -> None:
-    assert "/GRAV" not in bodies_for(deck(tmp_path, gravity(0)), ALL).cards
+    assert "/GRAV" not in bodies_for(write_run(tmp_path, write_gravity(0)), ALL).cards
 
 
 def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
-    main = deck(
-        tmp_path, group(70, 1, 2, 4, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n"
+    main = write_run(
+        tmp_path,
+        write_group(70, 1, 2, 4, kind="PART") + BODY,
+        ENGINE + "/RBODY/OFF\n99\n",
     )
     assert bodies_for(main, (1, 2, 4)) == Bodies((99,))
-    found = bodies_for(main, ALL)
-    assert found.nodes == (99, 100)
-    assert "/RBODY/8\n" in found.cards
-    assert [note.partition(" with ")[0] for note in found.notes] == ["/RBODY"]
-    assert "part 3" in found.notes[0]
+    bodies = bodies_for(main, ALL)
+    assert bodies.nodes == (99, 100)
+    assert "/RBODY/8\n" in bodies.cards
+    assert [note.partition(" with ")[0] for note in bodies.notes] == ["/RBODY"]
+    assert "part 3" in bodies.notes[0]
 
 
 @pytest.mark.parametrize("held", [(1,), (1, 2, 3, 4)])
@@ -178,22 +202,20 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
     tmp_path: Path, held: tuple[int, ...]
 ) -> None:
     """A set of parts can be written whatever bodies the deck has for other sets, if its run never puts these on."""
-    main = deck(
+    main = write_run(
         tmp_path / "deck",
-        group(70, *held, kind="PART") + BODY,
+        write_group(70, *held, kind="PART") + BODY,
         ENGINE + "/RBODY/OFF\n99\n",
     )
-    found = bodies_for(main, (1, 2, 4))
-    assert (found.nodes, found.replaced) == ((100,), (99,))
-    assert (
-        "/RBODY 7, which every leg of the run keeps off, has to go" in found.notes[-1]
-    )
+    bodies = bodies_for(main, (1, 2, 4))
+    assert (bodies.nodes, bodies.replaced) == ((100,), (99,))
+    assert "is off in the whole run and must be removed" in bodies.notes[-1]
     printing = Printing(
-        node=found.nodes,
+        node=bodies.nodes,
         end=0.4,
         name="box",
-        starter=found.cards,
-        replaced=found.replaced,
+        starter=bodies.cards,
+        replaced=bodies.replaced,
     )
     name = write_deck(
         main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
@@ -209,11 +231,11 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
 
 def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
     engine = ENGINE + "/RBODY/OFF\n99\n"
-    main = deck(tmp_path, group(70, 1, kind="PART") + BODY, engine)
+    main = write_run(tmp_path, write_group(70, 1, kind="PART") + BODY, engine)
     (tmp_path / "box_0002.rad").write_text(
         ENGINE.replace("box/1", "box/2") + "/RBODY/ON\n99\n"
     )
-    with pytest.raises(DeckError, match="not these parts alone and whole"):
+    with pytest.raises(DeckError, match="not exactly these parts"):
         bodies_for(main, (1, 2, 4))
 
 
@@ -221,21 +243,22 @@ def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
     ("more", "message"),
     [
         (
-            group(70, 2, kind="PART") + BODY,
-            r"box_0000.rad:\d+: /RBODY 7 holds nodes of parts 1, 2",
+            write_group(70, 2, kind="PART") + BODY,
+            r"box_0000.rad:\d+: /RBODY 7 contains nodes of parts 1, 2",
         ),
-        (group(70, 10, 11) + BODY, "not these parts alone and whole"),
-        (group(70, 1, 2, 3, kind="PART") + BODY, "not these parts alone and whole"),
+        (write_group(70, 10, 11) + BODY, "not exactly these parts"),
+        (write_group(70, 1, 2, 3, kind="PART") + BODY, "not exactly these parts"),
         (
-            group(70, 1, 2, kind="PART") + BODY.replace("99         0", "99         4"),
+            write_group(70, 1, 2, kind="PART")
+            + BODY.replace("99         0", "99         4"),
             "sensor 4 already",
         ),
-        ("/GRNOD/BOX/70\nbox\n         1\n" + BODY, "nodes of /RBODY 7 are not known"),
+        ("/GRNOD/BOX/70\nbox\n         1\n" + BODY, "nodes of /RBODY 7 are unknown"),
         (
-            group(1, 10, 11) + velocity(1),
-            "does not move all nodes of parts 1, 2, 4 as one body",
+            write_group(1, 10, 11) + write_velocity(1),
+            "does not give all nodes of parts 1, 2, 4 one velocity",
         ),
-        ("/INIVEL/NODE/1\nthrown\n" + wide(20), "does not move all nodes"),
+        ("/INIVEL/NODE/1\nthrown\n" + wide(20), "does not give all nodes"),
         ("/TRANSFORM/TRA/1\nmoved\n", "/TRANSFORM moves nodes"),
         ("//SUBMODEL/1\nother\n", "ids of a //SUBMODEL may be moved"),
         ("#include other.inc\n", "other.inc was not read"),
@@ -245,17 +268,17 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     tmp_path: Path, more: str, message: str
 ) -> None:
     with pytest.raises(DeckError, match=message) as refusal:
-        bodies_for(deck(tmp_path, more), (1, 2, 4))
+        bodies_for(write_run(tmp_path, more), (1, 2, 4))
     assert "\n" not in str(refusal.value)
 
 
 def test_parts_without_nodes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(DeckError, match="parts 7, 8 are without nodes"):
-        bodies_for(deck(tmp_path), (1, 7, 8))
+    with pytest.raises(DeckError, match="parts 7, 8 are without elements"):
+        bodies_for(write_run(tmp_path), (1, 7, 8))
 
 
 def test_pieces_that_nothing_joins_are_told(tmp_path: Path) -> None:
-    nodes, shell = quad(5, 20.0)
+    nodes, shell = write_quad(5, 20.0)
     more = "/NODE\n" + nodes + shell.partition("/SHELL/5\n")[2].join(("/SHELL/3\n", ""))
-    (note,) = bodies_for(deck(tmp_path, more), (3,)).notes
-    assert note.endswith("it keeps 2 pieces together that nothing joins")
+    (note,) = bodies_for(write_run(tmp_path, more), (3,)).notes
+    assert note.endswith("it joins 2 pieces that nothing else connects")

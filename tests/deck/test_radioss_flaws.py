@@ -1,4 +1,4 @@
-"""What becomes of the nodes of rigid bodies, held against numbers that OpenRadioss (bd4557ba7) gave for these decks.
+"""Flaws of rigid bodies, compared with numbers that OpenRadioss (bd4557ba7) gave for these decks.
 
 The decks are the strip of four shells of `tests.deck.test_openradioss`: nodes 1 to 10, 0.1 apart, and main node 99.
 """
@@ -11,7 +11,7 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import read_run
-from tests.deck.test_openradioss import MAIN, starter
+from tests.deck.test_openradioss import MAIN, write_starter
 from tests.decks import wide
 
 WIDE = 20
@@ -20,10 +20,12 @@ ALL = f"/GRNOD/NODE/7\nall\n{wide(*range(1, 11))}{wide(MAIN)}"
 SENSOR = f"/SENSOR/TIME/5\nclock\n{wide(0.001, 0.002, width=WIDE)}"
 
 
-def flaws(folder: Path, more: str = "", *legs: str, deck: str = "") -> tuple[Flaw, ...]:
-    """Flaws of the strip with more cards in its starter deck; ``legs`` are the lines of each below /RUN."""
+def find_run_flaws(
+    folder: Path, further_cards: str = "", *legs: str, deck: str = ""
+) -> tuple[Flaw, ...]:
+    """Return the flaws of the strip with further cards; ``legs`` are the lines of each leg below /RUN."""
     (folder / "strip_0000.rad").write_text(
-        (deck or starter()).replace("/TH/PART/1", f"{more}/TH/PART/1")
+        (deck or write_starter()).replace("/TH/PART/1", f"{further_cards}/TH/PART/1")
     )
     for number, text in enumerate(legs or (OFF,), start=1):
         (folder / f"strip_{number:04d}.rad").write_text(
@@ -32,11 +34,11 @@ def flaws(folder: Path, more: str = "", *legs: str, deck: str = "") -> tuple[Fla
     return flaws_of(read_run(str(folder / "strip_0000.rad")), {MAIN})
 
 
-def codes(found: tuple[Flaw, ...]) -> list[str]:
-    return [flaw.code for flaw in found]
+def list_codes(run_flaws: tuple[Flaw, ...]) -> list[str]:
+    return [flaw.code for flaw in run_flaws]
 
 
-def wall(
+def write_wall(
     kind: str,
     reach: float,
     *points: tuple[float, ...],
@@ -45,22 +47,22 @@ def wall(
 ) -> str:
     sizes = wide(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + wide(0)
     return f"/RWALL/{kind}\nwall\n{fields or wide(0, 0, 0, 0)}{sizes}" + "".join(
-        wide(*one, width=WIDE) for one in points
+        wide(*point, width=WIDE) for point in points
     )
 
 
 @pytest.mark.parametrize(
     ("text", "taken"),
     [
-        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
-        (wall("PLANE/1", 0.15, (0.35, 0, 0), (0, 0, 0)), 4),
-        (wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=wide(0, 0, 0, 2)), 4),
-        (wall("CYL/1", 0.15, (0.2, 0.05, 0), (0.2, 0.05, 1), diameter=0.05), 6),
-        (wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
-        (wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
-        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 1, -1), (0.15, 0, 1)), 2),
+        (write_wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
+        (write_wall("PLANE/1", 0.15, (0.35, 0, 0), (0, 0, 0)), 4),
+        (write_wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=wide(0, 0, 0, 2)), 4),
+        (write_wall("CYL/1", 0.15, (0.2, 0.05, 0), (0.2, 0.05, 1), diameter=0.05), 6),
+        (write_wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
+        (write_wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
+        (write_wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 1, -1), (0.15, 0, 1)), 2),
         (
-            wall(
+            write_wall(
                 "PARAL/1",
                 0.1,
                 (0.15, 0, -1),
@@ -71,7 +73,7 @@ def wall(
             4,
         ),
         (
-            wall(
+            write_wall(
                 "PLANE/1",
                 0.25,
                 (1, 0, 0, 0),
@@ -80,77 +82,79 @@ def wall(
             ),
             6,
         ),
-        (wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
+        (write_wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
         (
             "/GRNOD/PART/77\nall\n"
             + wide(1)
-            + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)),
+            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)),
             10,
         ),
         (
-            wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)),
+            write_wall(
+                "PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)
+            ),
             4,
-        ),  # Iform is none before 2026
+        ),  # before 2026 there is no Iform
     ],
     ids=lambda text: text.split("\n", 1)[0] if isinstance(text, str) else "",
 )
 def test_as_many_nodes_are_taken_from_a_wall_as_the_starter_reports(
     tmp_path: Path, text: str, taken: int
 ) -> None:
-    (found,) = flaws(tmp_path, text)
-    assert found.code == THROUGH_WALL
-    assert f"takes {taken} of" in found.message
-    assert found.place.file.endswith("strip_0000.rad")
+    (run_flaws,) = find_run_flaws(tmp_path, text)
+    assert run_flaws.code == THROUGH_WALL
+    assert f"removes {taken} of" in run_flaws.message
+    assert run_flaws.place.file.endswith("strip_0000.rad")
 
 
-GROUND = wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0))
+GROUND = write_wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0))
 
 
-def with_ikrem(deck: str, value: int = 1) -> str:
+def set_ikrem(deck: str, value: int = 1) -> str:
     return deck.replace(wide(1, 0, 0, 0), wide(1, value, 0, 0))
 
 
 def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(
     tmp_path: Path,
 ) -> None:
-    other = (
+    second_body = (
         "/NODE\n"
         + wide(98)[:-1]
         + wide(0.2, 0.05, 0.05, width=WIDE)
         + "/RBODY/{}\nother\n"
         + wide(98)
     )
-    assert codes(flaws(tmp_path, GROUND)) == [THROUGH_WALL]
-    assert flaws(tmp_path, GROUND, deck=with_ikrem(starter())) == ()
-    higher, lower = other.format(2), other.format(2)
-    assert codes(flaws(tmp_path, GROUND + higher, deck=with_ikrem(starter()))) == [
-        THROUGH_WALL
-    ]
-    deck = with_ikrem(starter()).replace("/RBODY/1", "/RBODY/3")
-    assert flaws(tmp_path, GROUND + lower, deck=deck) == ()
+    assert list_codes(find_run_flaws(tmp_path, GROUND)) == [THROUGH_WALL]
+    assert find_run_flaws(tmp_path, GROUND, deck=set_ikrem(write_starter())) == ()
+    higher, lower = second_body.format(2), second_body.format(2)
+    assert list_codes(
+        find_run_flaws(tmp_path, GROUND + higher, deck=set_ikrem(write_starter()))
+    ) == [THROUGH_WALL]
+    deck = set_ikrem(write_starter()).replace("/RBODY/1", "/RBODY/3")
+    assert find_run_flaws(tmp_path, GROUND + lower, deck=deck) == ()
 
 
 def test_a_wall_keeps_the_nodes_of_a_body_with_a_sensor(tmp_path: Path) -> None:
-    deck = starter().replace(wide(MAIN, 0, 0, 0)[:-1], wide(MAIN, 5, 0, 0)[:-1])
-    assert flaws(tmp_path, SENSOR + GROUND, deck=deck) == ()
+    deck = write_starter().replace(wide(MAIN, 0, 0, 0)[:-1], wide(MAIN, 5, 0, 0)[:-1])
+    assert find_run_flaws(tmp_path, SENSOR + GROUND, deck=deck) == ()
 
 
 def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> None:
-    deck = starter().replace(wide(2022, 0), wide(2026, 0))
+    deck = write_starter().replace(wide(2022, 0), wide(2026, 0))
     assert (
-        flaws(
+        find_run_flaws(
             tmp_path, GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 0, 1)), deck=deck
         )
         == ()
     )
-    assert codes(flaws(tmp_path, GROUND, deck=deck)) == [THROUGH_WALL]
+    assert list_codes(find_run_flaws(tmp_path, GROUND, deck=deck)) == [THROUGH_WALL]
 
 
-def velocity(group: int, kind: str = "TRA") -> str:
+def write_velocity(group: int, kind: str = "TRA") -> str:
     return f"/INIVEL/{kind}/1\nthrown\n{wide(10.0, 0.0, 0.0, width=WIDE)[:-1]}{wide(group, 0)}"
 
 
-def spin(group: int) -> str:
+def write_spin(group: int) -> str:
     return f"/INIVEL/AXIS/1\nspin\n{wide('Z', 0, group)}{wide(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
 
 
@@ -163,31 +167,36 @@ MAINS = f"/GRNOD/NODE/98\nmain\n{wide(MAIN)}"
 @pytest.mark.parametrize(
     ("text", "moves"),  # whether the kinetic energy at the start was above 0 in OpenRadioss
     [
-        (velocity(1), False), (velocity(7) + ALL, True), (velocity(98) + MAINS, True), (velocity(2), False),
-        (spin(1), False), (spin(7) + ALL, True), (LISTED, False), (velocity(1, "T+G"), False),
-        (velocity(1) + velocity(98) + MAINS, True),
+        (write_velocity(1), False), (write_velocity(7) + ALL, True), (write_velocity(98) + MAINS, True),
+         (write_velocity(2), False),
+        (write_spin(1), False), (write_spin(7) + ALL, True), (LISTED, False), (write_velocity(1, "T+G"), False),
+        (write_velocity(1) + write_velocity(98) + MAINS, True),
     ],
 )  # fmt: skip
 def test_a_body_that_the_starter_lets_rest_is_found(
     tmp_path: Path, text: str, moves: bool
 ) -> None:
     for legs in ((OFF, ON), (ON, OFF)):
-        assert codes(flaws(tmp_path, text, *legs)) == ([] if moves else [AT_REST])
+        assert list_codes(find_run_flaws(tmp_path, text, *legs)) == (
+            [] if moves else [AT_REST]
+        )
 
 
 def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(
     tmp_path: Path,
 ) -> None:
-    assert flaws(tmp_path, velocity(1) + wide(0.0005, width=WIDE)) == ()
-    assert flaws(tmp_path, velocity(1) + wide("", "", 5)) == ()
-    assert flaws(tmp_path, velocity(1).replace("10.0", " 0.0")) == ()
+    assert find_run_flaws(tmp_path, write_velocity(1) + wide(0.0005, width=WIDE)) == ()
+    assert find_run_flaws(tmp_path, write_velocity(1) + wide("", "", 5)) == ()
+    assert find_run_flaws(tmp_path, write_velocity(1).replace("10.0", " 0.0")) == ()
     assert (
-        flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE))
+        find_run_flaws(
+            tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE)
+        )
         == ()
     )
 
 
-def start(*nodes: int, type_: int = 1) -> str:
+def write_start(*nodes: int, type_: int = 1) -> str:
     return f"/INIV/TRA/X/{type_}\n10.0\n{' '.join(map(str, nodes))}\n"
 
 
@@ -197,25 +206,28 @@ CAP = "/DTIX\n1e-5 1e-5\n"
 @pytest.mark.parametrize(
     ("legs", "moves"),  # as above, in the leg of the /INIV
     [
-        ((ON + CAP + start(MAIN, MAIN), OFF), True), ((ON + CAP + start(1, 10), OFF), False),
-        ((ON + CAP + start(1, MAIN), OFF), True), ((CAP + start(1, 10), OFF), False),
-        ((OFF, ON + CAP + start(1, 10)), False), ((OFF + start(1, 10), ON), True),
-        ((ON + CAP + start(2, type_=2), OFF), False), ((ON + CAP + start(7, type_=2), OFF), True),
-        ((ON + CAP + start(1, 2, 3, type_=0), OFF), False), ((ON + CAP + start(1, MAIN, type_=0), OFF), True),
+        ((ON + CAP + write_start(MAIN, MAIN), OFF), True), ((ON + CAP + write_start(1, 10), OFF), False),
+        ((ON + CAP + write_start(1, MAIN), OFF), True), ((CAP + write_start(1, 10), OFF), False),
+        ((OFF, ON + CAP + write_start(1, 10)), False), ((OFF + write_start(1, 10), ON), True),
+        ((ON + CAP + write_start(2, type_=2), OFF), False), ((ON + CAP + write_start(7, type_=2), OFF), True),
+        ((ON + CAP + write_start(1, 2, 3, type_=0), OFF), False), ((ON + CAP + write_start(1, MAIN, type_=0), OFF),
+         True),
         ((ON + CAP + "/INIV/AXIS/Z/1\n0\n0 0 0 10.0\n1 10\n", OFF), False),
     ],
 )  # fmt: skip
 def test_a_body_that_an_engine_file_lets_rest_is_found(
     tmp_path: Path, legs: tuple[str, ...], moves: bool
 ) -> None:
-    assert codes(flaws(tmp_path, ALL, *legs)) == ([] if moves else [AT_REST])
+    assert list_codes(find_run_flaws(tmp_path, ALL, *legs)) == (
+        [] if moves else [AT_REST]
+    )
 
 
 def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
     tmp_path: Path,
 ) -> None:
-    """Of a body that is off its nodes are moved, whatever velocity the starter gave them."""
-    assert flaws(tmp_path, velocity(1), OFF + start(1, 10)) == ()
+    """/INIV moves the nodes of a body that is off, whatever velocity the starter gave them."""
+    assert find_run_flaws(tmp_path, write_velocity(1), OFF + write_start(1, 10)) == ()
 
 
 @pytest.mark.parametrize(
@@ -224,19 +236,22 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
         (
             "/GRNOD/BOX/8\nbox\n"
             + wide(1)
-            + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)),
+            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)),
             (),
         ),
         (GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 8)), ()),
         ("/TRANSFORM/TRA/1\n" + GROUND, ()),
-        (wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
-        (wall("PLANE/1", 0.1, (0, 0, 0), (0, 0, 0)), ()),
-        (wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=wide(97, 0, 0, 0)), ()),
-        (velocity(8), ()),
-        ("", (ON + CAP + start(8, type_=2), OFF)),
-        ("//SUBMODEL/1\nmoved\n" + velocity(1), ()),
+        (write_wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
+        (write_wall("PLANE/1", 0.1, (0, 0, 0), (0, 0, 0)), ()),
         (
-            f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{velocity(8)}",
+            write_wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=wide(97, 0, 0, 0)),
+            (),
+        ),
+        (write_velocity(8), ()),
+        ("", (ON + CAP + write_start(8, type_=2), OFF)),
+        ("//SUBMODEL/1\nmoved\n" + write_velocity(1), ()),
+        (
+            f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{write_velocity(8)}",
             (),
         ),
     ],
@@ -244,29 +259,31 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
 def test_what_cannot_be_resolved_is_said_and_not_judged(
     tmp_path: Path, text: str, legs: tuple[str, ...]
 ) -> None:
-    assert set(codes(flaws(tmp_path, text, *legs))) == {NOT_FOLLOWED}
+    assert set(list_codes(find_run_flaws(tmp_path, text, *legs))) == {NOT_FOLLOWED}
 
 
 def test_a_body_whose_nodes_are_not_known_is_said(tmp_path: Path) -> None:
-    deck = starter().replace("/GRNOD/NODE/1\n", "/GRNOD/BOX/1\n")
-    (found,) = flaws(tmp_path, velocity(7) + ALL, deck=deck)
-    assert found.code == NOT_FOLLOWED
-    assert found.message.startswith("the nodes of group 1 of /RBODY 1 are not known")
+    deck = write_starter().replace("/GRNOD/NODE/1\n", "/GRNOD/BOX/1\n")
+    (run_flaws,) = find_run_flaws(tmp_path, write_velocity(7) + ALL, deck=deck)
+    assert run_flaws.code == NOT_FOLLOWED
+    assert run_flaws.message.startswith("the nodes of group 1 of /RBODY 1 are unknown")
 
 
 def test_no_body_rests_for_certain_where_an_include_is_missing(tmp_path: Path) -> None:
-    assert flaws(tmp_path, velocity(1) + "#include velocities.inc\n") == ()
+    assert (
+        find_run_flaws(tmp_path, write_velocity(1) + "#include velocities.inc\n") == ()
+    )
 
 
 def test_the_inventory_has_the_flaws_and_what_the_run_keeps_off(tmp_path: Path) -> None:
-    flaws(tmp_path, velocity(1) + GROUND, OFF)
-    found = read_inventory(str(tmp_path / "strip_0000.rad"))
-    assert codes(found.flaws) == [THROUGH_WALL, AT_REST]
-    assert found.kept_off == (MAIN,)
-    flaws(tmp_path, velocity(1), OFF, ON)
+    find_run_flaws(tmp_path, write_velocity(1) + GROUND, OFF)
+    inventory = read_inventory(str(tmp_path / "strip_0000.rad"))
+    assert list_codes(inventory.flaws) == [THROUGH_WALL, AT_REST]
+    assert inventory.kept_off == (MAIN,)
+    find_run_flaws(tmp_path, write_velocity(1), OFF, ON)
     assert read_inventory(str(tmp_path / "strip_0000.rad")).kept_off == ()
     for name in ("strip_0001.rad", "strip_0002.rad"):
         (tmp_path / name).unlink()
-    assert codes(read_inventory(str(tmp_path / "strip_0000.rad")).flaws) == [
+    assert list_codes(read_inventory(str(tmp_path / "strip_0000.rad")).flaws) == [
         AT_REST
     ]  # any body may be switched

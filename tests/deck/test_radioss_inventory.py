@@ -9,7 +9,7 @@ from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.rules import check_deck
 from tests.computed import starter, stored
-from tests.deck.test_ls_dyna_inventory import counted
+from tests.deck.test_ls_dyna_inventory import count_elements
 from tests.decks import wide
 
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
@@ -23,12 +23,12 @@ PROPS = (
 )
 
 
-def inventory(folder: Path, text: str) -> Inventory:
+def read_text(folder: Path, text: str) -> Inventory:
     (folder / "TEST_0000.rad").write_text(BEGIN + text + "/END\n")
     return radioss_inventory.read(read_run(str(folder / "TEST_0000.rad")))
 
 
-def nodes(count: int) -> str:
+def write_nodes(count: int) -> str:
     return "/NODE\n" + "".join(
         f"{n:10d}{n:20d}{n % 2:20d}{n % 3:20d}\n" for n in range(1, count + 1)
     )
@@ -64,22 +64,24 @@ def nodes(count: int) -> str:
     ],
 )
 def test_two_elements_of_every_kind(tmp_path: Path, elements: str, kind: str) -> None:
-    found = inventory(tmp_path, f"{nodes(24)}/PART/1\na\n{wide(1, 1)}{elements}{PROPS}")
-    assert counted(found) == {1: {kind: 2}}
-    assert found.notes == ()
+    read_inventory = read_text(
+        tmp_path, f"{write_nodes(24)}/PART/1\na\n{wide(1, 1)}{elements}{PROPS}"
+    )
+    assert count_elements(read_inventory) == {1: {kind: 2}}
+    assert read_inventory.notes == ()
 
 
 def test_flags_of_properties_are_read(tmp_path: Path) -> None:
     parts = "".join(f"/PART/{n}\np{n}\n{wide(n, 1)}" for n in range(1, 6))
     bricks = "".join(f"/BRICK/{n}\n{wide(n, *range(1, 9))}" for n in (4, 5))
     springs = "".join(f"/SPRING/{n}\n{wide(10 + n, 1, 2)}" for n in (2, 3))
-    found = inventory(
+    read_inventory = read_text(
         tmp_path,
-        f"{nodes(9)}{parts}/SHELL/1\n{wide(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}",
+        f"{write_nodes(9)}{parts}/SHELL/1\n{wide(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}",
     )
-    assert found.formulation(1, "shell").cost == "QEPH"
-    assert [found.parts[n].section.damped for n in (2, 3)] == [True, False]
-    assert [found.parts[n].section.turns for n in (4, 5)] == [False, True]
+    assert read_inventory.formulation(1, "shell").cost == "QEPH"
+    assert [read_inventory.parts[n].section.damped for n in (2, 3)] == [True, False]
+    assert [read_inventory.parts[n].section.turns for n in (4, 5)] == [False, True]
 
 
 def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) -> None:
@@ -87,69 +89,77 @@ def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) 
     shells = "".join(
         f"/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2)
     )
-    found = inventory(
-        tmp_path, f"{nodes(9)}{parts}{shells}/SHELL/3\n{wide(3, 1, 2, 5, 6)}{PROPS}"
+    read_inventory = read_text(
+        tmp_path,
+        f"{write_nodes(9)}{parts}{shells}/SHELL/3\n{wide(3, 1, 2, 5, 6)}{PROPS}",
     )
-    assert found.groups([1, 2]) == ((1,), (2,))
-    assert set(found.elements_within([1, 2])) == {
+    assert read_inventory.groups([1, 2]) == ((1,), (2,))
+    assert set(read_inventory.elements_within([1, 2])) == {
         1,
         2,
-    }  # two bodies: what is between them bends
-    assert set(found.elements_within([1, 3])) == {1, 3}
-    assert set(found.elements_within([1, 2, 3])) == {1, 2, 3}
+    }  # two bodies: the elements between them deform
+    assert set(read_inventory.elements_within([1, 3])) == {1, 3}
+    assert set(read_inventory.elements_within([1, 2, 3])) == {1, 2, 3}
 
 
 @pytest.mark.parametrize(
     ("without", "complete"), [("", True), ("/PART/1", False), ("/NODE", False)]
 )
 def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -> None:
-    text = f"{nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}"
-    found = inventory(tmp_path, text.replace(without, "/OTHER") if without else text)
-    assert found.complete == complete
-    assert bool(found.notes) != complete
+    text = f"{write_nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}"
+    partial_inventory = read_text(
+        tmp_path, text.replace(without, "/OTHER") if without else text
+    )
+    assert partial_inventory.complete == complete
+    assert bool(partial_inventory.notes) != complete
 
 
 def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
-    found = read_inventory(str(tmp_path / "CAR_0000.rad"))
+    car_inventory = read_inventory(str(tmp_path / "CAR_0000.rad"))
     head, *rows = (
         line.split(",")
         for line in Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     )
     table = [dict(zip(head, cells, strict=True)) for cells in rows]
-    assert {int(one["id"]): int(one["elements"]) for one in table} == {
-        part: counts.total() for part, counts in found.counts.items() if part != 18
+    assert {int(row["id"]): int(row["elements"]) for row in table} == {
+        part: counts.total()
+        for part, counts in car_inventory.counts.items()
+        if part != 18
     }
     sets = {"all": range(1, 15), "notfirst": [n for n in range(1, 18) if n != 3], "heavy": [12, 13, 14],
             "stopped": [1, 4, 5, 7, 11]}  # fmt: skip
     for name, parts in sets.items():
         rigid = {
             part: counts.total()
-            for part, counts in found.elements_within(list(parts)).items()
+            for part, counts in car_inventory.elements_within(list(parts)).items()
         }
         assert rigid == {
-            int(one["id"]): int(one[f"rigid_in_{name}"])
-            for one in table
-            if one[f"rigid_in_{name}"] != "0"
+            int(row["id"]): int(row[f"rigid_in_{name}"])
+            for row in table
+            if row[f"rigid_in_{name}"] != "0"
         }
 
 
 def test_an_include_that_is_absent_is_told(tmp_path: Path) -> None:
-    text = f"{nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
-    found = inventory(tmp_path, text)
-    assert not found.complete
-    assert any("absent.inc was not read" in note for note in found.notes)
+    text = f"{write_nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
+    partial_inventory = read_text(tmp_path, text)
+    assert not partial_inventory.complete
+    assert any("absent.inc was not read" in note for note in partial_inventory.notes)
 
 
 def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> None:
-    text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
+    text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{write_nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
     deck = tmp_path / "TEST_0000.rad"
     for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
         deck.write_text(text[:end])
-        found = radioss_inventory.read(read_run(str(deck)))
-        assert (sum("is it cut" in note for note in found.notes), found.complete) == (
+        cut_inventory = radioss_inventory.read(read_run(str(deck)))
+        assert (
+            sum("may be truncated" in note for note in cut_inventory.notes),
+            cut_inventory.complete,
+        ) == (
             1,
             False,
         )
@@ -161,8 +171,8 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
 
 
 def test_titles_may_be_empty(tmp_path: Path) -> None:
-    part = inventory(
+    part = read_text(
         tmp_path,
-        f"{nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}",
+        f"{write_nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}",
     ).parts[1]
     assert (part.title, part.section.formulations["shell"].name) == ("", "QEPH")

@@ -1,4 +1,4 @@
-"""Radioss runs: which files belong together, and when which part is rigid."""
+"""Radioss runs: which files belong together, and when each part is rigid."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ BODY = "      1808         0         0         0                   0         7\n
 Spans = list[tuple[int, str, float, float | None]]
 
 
-def place(
+def write_run(
     folder: Path,
     starter: str = EXAMPLE.deck,
     legs: tuple[tuple[str, str], ...] | None = None,
@@ -30,16 +30,17 @@ def place(
     if legs is None:
         return write(folder, starter, EXAMPLE.files, EXAMPLE.name)
     files = {
-        f"box_{n:04d}.rad": f"/RUN/box/{n}\n{stop}\n{more}"
-        for n, (stop, more) in enumerate(legs, start=1)
+        f"box_{n:04d}.rad": f"/RUN/box/{n}\n{stop}\n{starter_deck}"
+        for n, (stop, starter_deck) in enumerate(legs, start=1)
     }
     return write(folder, starter, files, EXAMPLE.name)
 
 
-def spans(path: str) -> Spans:
-    found = find_run_windows(read_run(path)).windows.windows
+def read_spans(path: str) -> Spans:
+    run_windows = find_run_windows(read_run(path)).windows.windows
     return [
-        (window.unit.id, window.unit.kind, window.tr, window.td) for window in found
+        (window.unit.id, window.unit.kind, window.tr, window.td)
+        for window in run_windows
     ]
 
 
@@ -66,7 +67,7 @@ def test_the_parts_of_a_body_are_those_that_lie_whole_in_its_group(
 ) -> None:
     subset = "/PART/4\nin a subset\n         1         1         3\n"
     starter = EXAMPLE.deck.replace(GROUP, SHELLS + subset + group)
-    assert spans(place(tmp_path, starter)) == [(part, "part", 0.02, 0.09)]
+    assert read_spans(write_run(tmp_path, starter)) == [(part, "part", 0.02, 0.09)]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,7 @@ def test_a_body_whose_parts_are_not_known_is_named_by_its_main_node(
     tmp_path: Path, group: str
 ) -> None:
     starter = EXAMPLE.deck.replace(GROUP, group)
-    assert spans(place(tmp_path, starter)) == [(1808, "main node", 0.02, 0.09)]
+    assert read_spans(write_run(tmp_path, starter)) == [(1808, "main node", 0.02, 0.09)]
 
 
 ON, OFF = "/RBODY/ON\n1808\n", "/RBODY/OFF\n1808\n"
@@ -115,26 +116,26 @@ def test_windows_follow_the_legs(
     legs: tuple[tuple[str, str], ...],
     expected: list[tuple[float, float | None]],
 ) -> None:
-    assert spans(place(tmp_path, legs=legs)) == [
+    assert read_spans(write_run(tmp_path, legs=legs)) == [
         (1, "part", tr, td) for tr, td in expected
     ]
 
 
-def clock(number: int, start: float, stop: float | None = None) -> str:
+def write_clock(number: int, start: float, stop: float | None = None) -> str:
     return f"/SENSOR/TIME/{number}\nclock\n{start:20}\n" + (
         f"{stop:20}\n" if stop is not None else ""
     )
 
 
-def either(number: int, one: int, other: int, kind: str = "OR") -> str:
-    return f"/SENSOR/{kind}/{number}\nboth\n{0:20}\n{one:10}{other:10}\n"
+def write_either(number: int, first: int, second: int, kind: str = "OR") -> str:
+    return f"/SENSOR/{kind}/{number}\nboth\n{0:20}\n{first:10}{second:10}\n"
 
 
-def neither(number: int, one: int) -> str:
-    return f"/SENSOR/NOT/{number}\nnot\n{0:20}\n{one:10}\n"
+def write_neither(number: int, input_sensor: int) -> str:
+    return f"/SENSOR/NOT/{number}\nnot\n{0:20}\n{input_sensor:10}\n"
 
 
-def sensed(
+def read_sensed_spans(
     folder: Path,
     sensor: str,
     sensor_id: int = 5,
@@ -144,33 +145,39 @@ def sensed(
     """Write the run with one leg, in which a sensor switches the body."""
     body = BODY.replace("         0", f"{sensor_id:10}", 1)
     starter = EXAMPLE.deck.replace(BODY, body).replace("/END", f"{sensor}/END")
-    return place(folder, starter, ((end, cap),))
+    return write_run(folder, starter, ((end, cap),))
 
 
 @pytest.mark.parametrize(
     ("sensor", "expected"),
     [
-        (clock(5, 0.05), [(0.0, 0.05)]),
-        (clock(5, 0.05, 0.09), [(0.0, 0.05), (0.09, None)]),
-        (clock(1, 0, 0.02) + clock(2, 0.09) + either(5, 1, 2), [(0.02, 0.09)]),
-        (clock(1, 0.02, 0.09) + neither(5, 1), [(0.02, 0.09)]),
-        (clock(1, 0.02) + clock(2, 0, 0.09) + either(3, 1, 2, "AND") + neither(5, 3), [(0.02, 0.09)]),
-        (clock(1, 0, 0.02) + clock(2, 0.05, 0.07) + clock(3, 0.09) + either(4, 1, 2) + either(5, 3, 4),
+        (write_clock(5, 0.05), [(0.0, 0.05)]),
+        (write_clock(5, 0.05, 0.09), [(0.0, 0.05), (0.09, None)]),
+        (write_clock(1, 0, 0.02) + write_clock(2, 0.09) + write_either(5, 1, 2), [(0.02, 0.09)]),
+        (write_clock(1, 0.02, 0.09) + write_neither(5, 1), [(0.02, 0.09)]),
+        (write_clock(1, 0.02) + write_clock(2, 0, 0.09) + write_either(3, 1, 2, "AND") + write_neither(5, 3), [(0.02,
+         0.09)]),
+        (write_clock(1, 0, 0.02) + write_clock(2, 0.05, 0.07) + write_clock(3, 0.09) + write_either(4, 1,
+         2) + write_either(5, 3, 4),
          [(0.02, 0.05), (0.07, 0.09)]),
     ],
 )  # fmt: skip
 def test_a_body_is_rigid_while_its_sensor_is_not_active(
     tmp_path: Path, sensor: str, expected: list[tuple[float, float | None]]
 ) -> None:
-    path = sensed(tmp_path, sensor)
-    assert spans(path) == [(1, "part", tr, td) for tr, td in expected]
-    found = {finding.rule for finding in check_deck(path).findings}
-    assert found == ({"D2R104"} if expected[-1][1] is None else set())
+    path = read_sensed_spans(tmp_path, sensor)
+    assert read_spans(path) == [(1, "part", tr, td) for tr, td in expected]
+    rigid_spans = {finding.rule for finding in check_deck(path).findings}
+    assert rigid_spans == ({"D2R104"} if expected[-1][1] is None else set())
 
 
 def test_a_step_without_a_cap_is_told_of_sensors_too(tmp_path: Path) -> None:
     (finding,) = check_deck(
-        sensed(tmp_path, clock(1, 0, 0.02) + clock(2, 0.09) + either(5, 1, 2), cap="")
+        read_sensed_spans(
+            tmp_path,
+            write_clock(1, 0, 0.02) + write_clock(2, 0.09) + write_either(5, 1, 2),
+            cap="",
+        )
     ).findings
     assert finding.rule == "D2R404"
 
@@ -183,9 +190,9 @@ def test_a_step_without_a_cap_is_told_of_sensors_too(tmp_path: Path) -> None:
             "sensor 5 (/SENSOR/DIST), which is not a time sensor",
         ),
         ("", "sensor 5, which the deck has not"),
-        (neither(5, 5), "sensor 5, of sensor 5, which asks for itself"),
+        (write_neither(5, 5), "sensor 5, of sensor 5, which asks for itself"),
         (
-            clock(1, 0) + either(5, 1, 2),
+            write_clock(1, 0) + write_either(5, 1, 2),
             "sensor 5, of sensor 2, which the deck has not",
         ),
         (
@@ -198,7 +205,7 @@ def test_a_step_without_a_cap_is_told_of_sensors_too(tmp_path: Path) -> None:
 def test_a_sensor_that_cannot_be_followed_is_told(
     tmp_path: Path, sensor: str, told: str
 ) -> None:
-    (finding,) = check_deck(sensed(tmp_path, sensor)).findings
+    (finding,) = check_deck(read_sensed_spans(tmp_path, sensor)).findings
     assert finding.rule == "D2R302"
     assert told in finding.message
 
@@ -212,20 +219,20 @@ def test_a_sensor_that_cannot_be_followed_is_told(
 def test_printed_sensors_hold_their_windows(
     tmp_path_factory: pytest.TempPathFactory, cuts: list[int]
 ) -> None:
-    times = sorted(one / 1000 for one in cuts)
+    times = sorted(cut / 1000 for cut in cuts)
     windows = list(zip(times[::2], times[1::2], strict=True))
     card = cards(
         windows,
         Printing(node=(1808,), end=windows[-1][1] + 1, sensor=5),
         "radioss-sensors",
     )
-    path = sensed(
+    path = read_sensed_spans(
         tmp_path_factory.mktemp("run"),
         card.starter,
         sensor_id=card.sensors[1808],
         end="2",
     )
-    assert spans(path) == [(1, "part", tr, td) for tr, td in windows]
+    assert read_spans(path) == [(1, "part", tr, td) for tr, td in windows]
 
 
 SOLID = (
@@ -251,7 +258,7 @@ BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) 
         (
             f"{SOLID}{BRICK}/DEF_SOLID\n{'':70}         2\n/DEF_SOLID\n         1\n",
             False,
-        ),  # the first one counts
+        ),  # the first card is used
         (SOLID + BRICK.replace("BRICK", "PENTA6"), False),
         (f"/PROP/TYPE20/1\nthick shell\n\n{BRICK}", False),  # HA8 is its default
         ("/TETRA4/1\n         9         1         2         3         4\n", True),
@@ -260,26 +267,26 @@ BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) 
 def test_stresses_of_solids_without_a_frame_do_not_turn(
     tmp_path: Path, more: str, found: bool
 ) -> None:
-    path = place(tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"))
+    path = write_run(tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"))
     assert {finding.rule for finding in check_deck(path).findings} == (
         {"D2R116"} if found else set()
     )
-    start = place(
+    start = write_run(
         tmp_path,
         EXAMPLE.deck.replace("/END", f"{more}/END"),
         (("0.09", f"{ON}/DTIX\n1e-6 1e-6\n"), ("0.2", OFF)),
     )
     (tmp_path / "box_0003.rad").unlink()
-    assert check_deck(start).findings == ()  # without stress there is nothing to turn
+    assert check_deck(start).findings == ()  # without stress nothing can rotate wrongly
 
 
 def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
-    path = place(tmp_path)
+    path = write_run(tmp_path)
     files = [str(tmp_path / f"box_000{n}.rad") for n in range(4)]
     assert run_files(path) == run_files(files[2]) == files
-    other = put(tmp_path / "starter.rad", EXAMPLE.deck)
+    other_file = put(tmp_path / "starter.rad", EXAMPLE.deck)
     (tmp_path / "box_0000.rad").unlink()
-    assert run_files(str(other)) == [str(other), *files[1:]]
+    assert run_files(str(other_file)) == [str(other_file), *files[1:]]
     assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []
 
 
@@ -287,15 +294,15 @@ def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -
 def test_an_engine_file_that_ends_within_a_line_seems_to_be_cut(
     tmp_path: Path, cut: int
 ) -> None:
-    path, engine = place(tmp_path), tmp_path / "box_0002.rad"
+    path, engine = write_run(tmp_path), tmp_path / "box_0002.rad"
     text = engine.read_text()[:-cut]
     engine.write_text(text)
-    found = [
+    checked = [
         finding.file
         for finding in check_deck(path).findings
         if finding.rule == "D2R011"
     ]
-    assert found == ([] if text.endswith("\n") else [str(engine)])
+    assert checked == ([] if text.endswith("\n") else [str(engine)])
     engine.write_text(f"{text}\n/END")
     assert "D2R011" not in {finding.rule for finding in check_deck(path).findings}
 
@@ -304,31 +311,31 @@ def test_an_include_that_is_asked_for_twice_is_read_once(tmp_path: Path) -> None
     head = EXAMPLE.deck.split("/PART")[0]
     (tmp_path / "inner.inc").write_text("#\n")
     _, *inner = read_run(
-        place(tmp_path, f"{head}#include inner.inc\n#include inner.inc\n/END\n")
+        write_run(tmp_path, f"{head}#include inner.inc\n#include inner.inc\n/END\n")
     ).deck.sources[:3]
-    assert [Path(one.name).name for one in inner] == ["inner.inc", "inner.inc"]
-    assert inner[0] is inner[1]  # both are of one state
+    assert [Path(source.name).name for source in inner] == ["inner.inc", "inner.inc"]
+    assert inner[0] is inner[1]  # both have the same state of the file
 
 
 def test_an_include_of_the_starter_deck_is_read(tmp_path: Path) -> None:
     head, body, tail = EXAMPLE.deck.partition("/RBODY")
-    path = place(tmp_path, f"{head}#include inner.inc\n/END\n")
+    path = write_run(tmp_path, f"{head}#include inner.inc\n/END\n")
     assert {finding.rule for finding in check_deck(path).findings} == {"D2R003"}
     (tmp_path / "inner.inc").write_text(body + tail)
-    assert spans(path) == [(1, "part", 0.02, 0.09)]
+    assert read_spans(path) == [(1, "part", 0.02, 0.09)]
     assert check_deck(path).findings == ()
     (tmp_path / "inner.inc").write_text("#include inner.inc\n")
     assert {finding.rule for finding in check_deck(path).findings} == {"D2R003"}
 
 
 def test_ids_of_a_submodel_are_not_followed(tmp_path: Path) -> None:
-    path = place(
+    path = write_run(
         tmp_path,
         EXAMPLE.deck.replace(
             "/RBODY", "//SUBMODEL/1\nmoved\n      1000\n/RBODY"
         ).replace("1808", " 808"),
     )
-    assert spans(path) == [(1808, "main node", 0.02, 0.09)]
+    assert read_spans(path) == [(1808, "main node", 0.02, 0.09)]
     assert check_deck(path).findings == ()
 
 
@@ -342,7 +349,9 @@ def test_a_run_that_switches_nobody_may_have_any_legs(tmp_path: Path) -> None:
 
 def test_a_comment_silences_a_rule(tmp_path: Path) -> None:
     legs = (("0.02", ""), ("0.09", f"/DTIX\n1e-6 1e-5\n{ON}"), ("0.2", OFF))
-    assert {one.rule for one in check_deck(place(tmp_path, legs=legs)).findings} == {
+    assert {
+        finding.rule for finding in check_deck(write_run(tmp_path, legs=legs)).findings
+    } == {
         "D2R403",
         "D2R404",
     }
@@ -351,9 +360,9 @@ def test_a_comment_silences_a_rule(tmp_path: Path) -> None:
         ("0.09", f"/DTIX\n1e-6 1e-5\n# d2rpick: ignore D2R403\n{ON}"),
         legs[2],
     )
-    assert {one.rule for one in check_deck(place(tmp_path, legs=legs)).findings} == {
-        "D2R404"
-    }
+    assert {
+        finding.rule for finding in check_deck(write_run(tmp_path, legs=legs)).findings
+    } == {"D2R404"}
 
 
 def test_a_run_cut_anywhere_is_checked_or_refused() -> None:
@@ -410,5 +419,5 @@ def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) ->
 def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
     checked = check_deck(stored(f"{name}_0001.rad"))
     assert checked.findings == ()
-    found = [(window.unit.id, window.tr, window.td) for window in checked.windows]
-    assert found == [(node, 0.0496, 0.1464) for node in nodes]
+    run_windows = [(window.unit.id, window.tr, window.td) for window in checked.windows]
+    assert run_windows == [(node, 0.0496, 0.1464) for node in nodes]

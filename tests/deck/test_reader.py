@@ -1,4 +1,4 @@
-"""The reader: where keywords and fields stand, formats, comments, parameters, includes, and what tells of a cut."""
+"""The reader: places of keywords and fields, formats, comments, parameters, includes and truncated files."""
 
 import gzip
 from pathlib import Path
@@ -77,9 +77,9 @@ def test_fields_know_their_place(tmp_path: Path) -> None:
     assert first
     assert second
     lines = GOOD.split("\n")
-    place = first.time1.field
-    assert lines[place.line - 1][place.column - 1 :].startswith("0.02")
-    assert place.file == deck.path
+    time_field = first.time1.field
+    assert lines[time_field.line - 1][time_field.column - 1 :].startswith("0.02")
+    assert time_field.file == deck.path
     assert lines[second.swset.field.line - 1][second.swset.field.column - 1] == "2"
 
 
@@ -107,8 +107,10 @@ def test_no_cut_between_chunks_hides_a_keyword(chunk: int) -> None:
     assert [*find_marks(Held(text.encode()), chunk)] == [*whole]
 
 
-def transform(offsets: str = "", rest: str = "", factors: str = "") -> str:
-    return f"*INCLUDE_TRANSFORM\ncards.k\n{offsets}\n{rest}\n{factors}\n{'0':>10s}\n"
+def write_transform(
+    offsets: str = "", further_offsets: str = "", factors: str = ""
+) -> str:
+    return f"*INCLUDE_TRANSFORM\ncards.k\n{offsets}\n{further_offsets}\n{factors}\n{'0':>10s}\n"
 
 
 CARDS = {"cards.k": THERE + BACK}
@@ -122,17 +124,18 @@ INCLUDES = {
     "include path": ("*INCLUDE_PATH\nfar/away\n*INCLUDE\ncards.k\n", {"far/away/cards.k": THERE + BACK}, WINDOW),
     "relative path": ("*INCLUDE_PATH_RELATIVE\nfar\n*INCLUDE\ncards.k\n", {"far/cards.k": THERE + BACK}, WINDOW),
     "beside the include": ("*INCLUDE\nsub/a.k\n", {"sub/a.k": "*INCLUDE\nb.k\n", "sub/b.k": THERE + BACK}, WINDOW),
-    "parts move": (transform(f"{0:10d}{0:10d}{100:10d}"), CARDS, [(101, 0.02, 0.09)]),
-    "times scale": (transform(factors=f"{'1.0':>10s}{'0.5':>10s}"), CARDS, [(1, 0.01, 0.045)]),
-    "factor 0 is 1": (transform(factors=f"{'0.0':>10s}{'0.0':>10s}"), CARDS, WINDOW),
+    "parts move": (write_transform(f"{0:10d}{0:10d}{100:10d}"), CARDS, [(101, 0.02, 0.09)]),
+    "times scale": (write_transform(factors=f"{'1.0':>10s}{'0.5':>10s}"), CARDS, [(1, 0.01, 0.045)]),
+    "factor 0 is 1": (write_transform(factors=f"{'0.0':>10s}{'0.0':>10s}"), CARDS, WINDOW),
     "transforms nest": (
-        transform(f"{0:10d}{0:10d}{100:10d}", factors=f"{'':10s}{'0.5':>10s}"),
-        {"cards.k": transform(f"{0:10d}{0:10d}{10:10d}", factors=f"{'':10s}{'0.1':>10s}").replace("cards", "inner"),
+        write_transform(f"{0:10d}{0:10d}{100:10d}", factors=f"{'':10s}{'0.5':>10s}"),
+        {"cards.k": write_transform(f"{0:10d}{0:10d}{10:10d}", factors=f"{'':10s}{'0.1':>10s}").replace("cards",
+         "inner"),
          "inner.k": THERE + BACK},
         [(111, 0.001, pytest.approx(0.0045))],
     ),
     "sets move": (
-        PARTS + "*SET_PART\n        57\n         1\n" + transform(f"{0:40d}{50:10d}"),
+        PARTS + "*SET_PART\n        57\n         1\n" + write_transform(f"{0:40d}{50:10d}"),
         {"cards.k": (THERE + BACK).replace("         1         0      PART", "         7         0      PSET").replace(
             "         1      PART", "         7      PSET")},
         WINDOW,
@@ -278,9 +281,9 @@ def test_a_parameter_without_a_value_is_named_with_its_place(
     tmp_path: Path, deck: str, told: str, place: str
 ) -> None:
     ((field, problem),) = (
-        found
+        problems
         for card in read_switching(read(tmp_path, deck))
-        for found in card.problems
+        for problems in card.problems
     )
     assert field.text == "&a"
     assert told in problem
@@ -289,5 +292,5 @@ def test_a_parameter_without_a_value_is_named_with_its_place(
 
 @pytest.mark.parametrize("keyword", [*KINDS, *sorted(NOT_COUNTED), "NODE"])
 def test_all_elements_of_radioss_are_mesh(keyword: str) -> None:
-    """Their names stand twice: a check does without the inventory, which takes time to load."""
+    """The names are defined twice, because a check does not load the inventory."""
     assert holds_mesh(Block(SourceFile("run_0000.rad", b""), 0, None, f"/{keyword}/1"))

@@ -13,17 +13,17 @@ import pytest
 
 from d2rpick.deck import read_inventory
 from d2rpick.rules import check_deck
-from tests.deck.test_openradioss import solve
+from tests.deck.test_openradioss import run_solver
 from tests.decks import wide
 
 WIDE = 20  # columns of a real number
-STEP = 1e-5  # of a cycle
+STEP = 1e-5  # duration of a cycle
 OFF, ON, RESET = "/RBODY/OFF\n", "/RBODY/ON\n", "/SENS/RESET\n"
 Spans = Mapping[int, Sequence[tuple[float, float | None]]]
 
 
 class Listed(NamedTuple):
-    """A run: what its starter deck has beside three plates, what its legs say, and when which part is rigid."""
+    """A run: its starter cards besides three plates, the cards of its legs, and when each part is rigid."""
 
     starter: str
     legs: tuple[str, ...]
@@ -31,10 +31,10 @@ class Listed(NamedTuple):
     version: int = 2023
     parts: Mapping[
         int, str
-    ] = {}  # lines of /PART below the title, of plates that have others
+    ] = {}  # lines of /PART below the title, for plates with other than the default lines
 
 
-def head(version: int) -> str:
+def write_head(version: int) -> str:
     text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(version, 0)}" + 2 * wide(
         "kg", "m", "s", width=WIDE
     )
@@ -45,17 +45,18 @@ def head(version: int) -> str:
     )
 
 
-def plates(lines: Mapping[int, str]) -> str:
+def write_plates(lines: Mapping[int, str]) -> str:
     """Write three plates that share no nodes: part i has nodes 10 i + 1 to 4; nodes 101 to 103 lie above them."""
     corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-    places = {
+    coordinates = {
         10 * part + at: (3.0 * part + x, y, 0.0)
         for part in (1, 2, 3)
         for at, (x, y) in enumerate(corners, 1)
     }
-    places |= {100 + part: (3.0 * part + 0.5, 0.5, 0.2) for part in (1, 2, 3)}
+    coordinates |= {100 + part: (3.0 * part + 0.5, 0.5, 0.2) for part in (1, 2, 3)}
     text = "/NODE\n" + "".join(
-        wide(node)[:-1] + wide(*place, width=WIDE) for node, place in places.items()
+        wide(node)[:-1] + wide(*position, width=WIDE)
+        for node, position in coordinates.items()
     )
     for part in (1, 2, 3):
         text += f"/PART/{part}\nplate\n{lines.get(part, wide(1, 1))}"
@@ -65,42 +66,42 @@ def plates(lines: Mapping[int, str]) -> str:
     )
 
 
-def body(number: int, node: int, part: int, sensor: int = 0) -> str:
+def write_body(number: int, node: int, part: int, sensor: int = 0) -> str:
     first = (
         wide(node, sensor, 0, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(part, 0, 0, 0)
     )
     return f"/RBODY/{number}\nbody\n{first}{2 * wide(0.0, 0.0, 0.0, width=WIDE)}{wide(0, 0, 0)}"
 
 
-def merge(*lines: tuple[int, ...]) -> str:
+def write_merge(*lines: tuple[int, ...]) -> str:
     return "/MERGE/RBODY/1\nmerged\n" + "".join(wide(*line) for line in lines)
 
 
-def clock(number: int, delay: float, stop: float | None = None) -> str:
+def write_clock(number: int, delay: float, stop: float | None = None) -> str:
     return f"/SENSOR/TIME/{number}\nclock\n{wide(delay, width=WIDE)}" + (
         wide(stop, width=WIDE) if stop else ""
     )
 
 
-def logic(kind: str, number: int, *others: int, delay: float = 0.0) -> str:
+def write_logic(kind: str, number: int, *others: int, delay: float = 0.0) -> str:
     return (
         f"/SENSOR/{kind}/{number}\nof others\n{wide(delay, width=WIDE)}{wide(*others)}"
     )
 
 
-def irigid(node: int = 0, sensor: int = 0) -> str:
+def write_rigid_part(node: int = 0, sensor: int = 0) -> str:
     first = wide(1, 1, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(1)
     second = wide(node, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide("", sensor)
     return first + second + 2 * wide(0.0, 0.0, 0.0, width=WIDE)
 
 
-THREE = body(1, 101, 1) + body(2, 102, 2) + body(3, 103, 3)
-TWICE = clock(5, 0.0, 0.002) + clock(6, 0.004) + logic("OR", 7, 5, 6)
+THREE = write_body(1, 101, 1) + write_body(2, 102, 2) + write_body(3, 103, 3)
+TWICE = write_clock(5, 0.0, 0.002) + write_clock(6, 0.004) + write_logic("OR", 7, 5, 6)
 MIDDLE = [(0.002, 0.004)]
-ALONE = body(1, 101, 1, 5)
+ALONE = write_body(1, 101, 1, 5)
 
 
-def fourth(*nodes: int) -> str:
+def write_fourth(*nodes: int) -> str:
     """Write a further part of one element, on nodes of the plates."""
     return f"/PART/4\nfurther\n{wide(1, 1)}/SHELL/4\n{wide(4, *nodes)}"
 
@@ -108,35 +109,37 @@ def fourth(*nodes: int) -> str:
 BOTH = f"/GRNOD/PART/9\nboth\n{wide(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
-        THREE + merge((1, 1, 2, 1)),
+        THREE + write_merge((1, 1, 2, 1)),
         (OFF + "101 103", ON + "101", OFF + "101"),
         {1: MIDDLE, 2: MIDDLE},
     ),
     "the engine does not know the main node of a merged body": Listed(
-        THREE + merge((1, 1, 2, 1)), (OFF + "101 102", ON + "102", OFF + "102"), {}
+        THREE + write_merge((1, 1, 2, 1)),
+        (OFF + "101 102", ON + "102", OFF + "102"),
+        {},
     ),
     "merges follow each other": Listed(
-        THREE + merge((1, 1, 2, 1), (2, 1, 3, 1)),
+        THREE + write_merge((1, 1, 2, 1), (2, 1, 3, 1)),
         (OFF + "101", ON + "101", OFF + "101"),
         dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "kinds of a merge are bodies where they are left out": Listed(
-        THREE + merge((1, 0, 2, 0), (1, 0, 3)),
+        THREE + write_merge((1, 0, 2, 0), (1, 0, 3)),
         (OFF + "101", ON + "101", OFF + "101"),
         dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "a group of nodes is merged": Listed(
-        body(1, 101, 1) + merge((1, 1, 2, 3)),
+        write_body(1, 101, 1) + write_merge((1, 1, 2, 3)),
         (OFF + "101", ON + "101", OFF + "101"),
         {1: MIDDLE, 2: MIDDLE},
     ),
     "a body beside merged ones is apart": Listed(
-        THREE + merge((1, 1, 2, 1)),
+        THREE + write_merge((1, 1, 2, 1)),
         (OFF + "101 102 103", ON + "101 103", OFF + "103"),
         {1: [(0.002, None)], 2: [(0.002, None)], 3: MIDDLE},
     ),
     "the starter numbers main nodes by the ids of the bodies": Listed(
-        body(7, 0, 1) + body(2, 0, 2),
+        write_body(7, 0, 1) + write_body(2, 0, 2),
         (OFF + "104", ON + "104", OFF + "104 105"),
         {1: [(0.0, 0.004)], 2: MIDDLE},
     ),
@@ -144,93 +147,98 @@ LISTED = {
         "/NODE\n"
         + wide(5000)[:-1]
         + wide(9.0, 9.0, 9.0, width=WIDE)
-        + body(7, 0, 1)
-        + body(2, 103, 2)
-        + body(3, 0, 3),
+        + write_body(7, 0, 1)
+        + write_body(2, 103, 2)
+        + write_body(3, 0, 3),
         (OFF + "5001 5002", ON + "5001", OFF + "5001 103"),
         {2: [(0.0, 0.004)], 3: MIDDLE},
     ),
     "0 in a leg names no body": Listed(
-        body(1, 0, 1) + body(2, 102, 2),
+        write_body(1, 0, 1) + write_body(2, 102, 2),
         (OFF + "102 0", ON + "0 102", OFF + "102 104"),
         {1: [(0.0, 0.004)], 2: MIDDLE},
     ),
     "a skin on the nodes of a part is rigid with it": Listed(
-        fourth(11, 12, 13, 14) + body(1, 101, 1),
+        write_fourth(11, 12, 13, 14) + write_body(1, 101, 1),
         (OFF + "101", ON + "101", OFF + "101"),
         {1: MIDDLE, 4: MIDDLE},
     ),
     "a part between two of a body is rigid with them": Listed(
-        fourth(12, 21, 24, 13) + BOTH + body(1, 101, 9),
+        write_fourth(12, 21, 24, 13) + BOTH + write_body(1, 101, 9),
         (OFF + "101", ON + "101", OFF + "101"),
         dict.fromkeys((1, 2, 4), MIDDLE),
     ),
     "a part beside one of a body is not": Listed(
-        fourth(12, 21, 24, 13) + body(1, 101, 1),
+        write_fourth(12, 21, 24, 13) + write_body(1, 101, 1),
         (OFF + "101", ON + "101", OFF + "101"),
         {1: MIDDLE},
     ),
     "a group of a range of nodes": Listed(
-        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + body(1, 101, 9),
+        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + write_body(1, 101, 9),
         (OFF + "101", ON + "101", OFF + "101"),
         {1: MIDDLE, 2: MIDDLE},
     ),
     "groups of materials and properties": Listed(
-        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}" + body(1, 101, 9),
+        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}"
+        + write_body(1, 101, 9),
         (OFF + "101", ON + "101", OFF + "101"),
         dict.fromkeys((1, 2, 3), MIDDLE),
     ),
-    "sensors of time join": Listed(body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}),
+    "sensors of time join": Listed(
+        write_body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}
+    ),
     "formats before 2023 know Tstop": Listed(
-        body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}, version=2018
+        write_body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}, version=2018
     ),
     "a second number on the line of Tdelay is no Tstop": Listed(
         ALONE + f"/SENSOR/TIME/5\nclock\n{wide(0.0, 0.002, width=WIDE)}", ("",), {}
     ),
     "a restart keeps sensors": Listed(
-        body(1, 101, 1, 7) + TWICE, ("", "", ""), {1: MIDDLE}
+        write_body(1, 101, 1, 7) + TWICE, ("", "", ""), {1: MIDDLE}
     ),
     "a delay of a sensor of others has no effect": Listed(
-        body(1, 101, 1, 7)
-        + clock(5, 0.001, 0.003)
-        + clock(6, 0.004)
-        + logic("OR", 7, 5, 6, delay=0.0005),
+        write_body(1, 101, 1, 7)
+        + write_clock(5, 0.001, 0.003)
+        + write_clock(6, 0.004)
+        + write_logic("OR", 7, 5, 6, delay=0.0005),
         ("",),
         {1: [(0.0, 0.001), (0.003, 0.004)]},
     ),
     "not of or": Listed(
-        body(1, 101, 1, 9)
-        + clock(5, 0.001, 0.002)
-        + clock(6, 0.003, 0.004)
-        + logic("OR", 8, 5, 6)
-        + logic("NOT", 9, 8),
+        write_body(1, 101, 1, 9)
+        + write_clock(5, 0.001, 0.002)
+        + write_clock(6, 0.003, 0.004)
+        + write_logic("OR", 8, 5, 6)
+        + write_logic("NOT", 9, 8),
         ("",),
         {1: [(0.001, 0.002), (0.003, 0.004)]},
     ),
     "and": Listed(
-        body(1, 101, 1, 7)
-        + clock(5, 0.001, 0.003)
-        + clock(6, 0.002)
-        + logic("AND", 7, 5, 6),
+        write_body(1, 101, 1, 7)
+        + write_clock(5, 0.001, 0.003)
+        + write_clock(6, 0.002)
+        + write_logic("AND", 7, 5, 6),
         ("",),
         {1: [(0.0, 0.002), (0.003, None)]},
     ),
     "a stop before the delay": Listed(
-        ALONE + clock(5, 0.003, 0.001), ("",), {1: [(0.0, None)]}
+        ALONE + write_clock(5, 0.003, 0.001), ("",), {1: [(0.0, None)]}
     ),
     "a sensor that is reset ends": Listed(
-        ALONE + clock(5, 0.001, 0.006),
+        ALONE + write_clock(5, 0.001, 0.006),
         ("", RESET + "5", ""),
         {1: [(0.0, 0.001), (0.002, None)]},
     ),
     "a sensor that is reset before it begins never does": Listed(
-        ALONE + clock(5, 0.003), ("", RESET + "5", ""), {1: [(0.0, None)]}
+        ALONE + write_clock(5, 0.003), ("", RESET + "5", ""), {1: [(0.0, None)]}
     ),
     "a reset of all needs their numbers": Listed(
-        ALONE + clock(5, 0.001), ("", RESET, ""), {1: [(0.0, 0.001)]}
+        ALONE + write_clock(5, 0.001), ("", RESET, ""), {1: [(0.0, 0.001)]}
     ),
     "a sensor overrules the legs": Listed(
-        ALONE + clock(5, 0.003), (OFF + "101", "", ON + "101"), {1: [(0.0, 0.003)]}
+        ALONE + write_clock(5, 0.003),
+        (OFF + "101", "", ON + "101"),
+        {1: [(0.0, 0.003)]},
     ),
 }
 RIGID_PARTS = {
@@ -239,30 +247,38 @@ RIGID_PARTS = {
         ("",),
         {1: [(0.0, None)], 3: [(0.0, None)]},
         2612,
-        {1: irigid(), 3: irigid()},
+        {1: write_rigid_part(), 3: write_rigid_part()},
     ),
     "rigid parts with a sensor": Listed(
-        TWICE, ("",), {1: MIDDLE}, 2612, {1: irigid(0, 7)}
+        TWICE, ("",), {1: MIDDLE}, 2612, {1: write_rigid_part(0, 7)}
     ),
     "legs switch a rigid part by its main node": Listed(
-        "", (OFF + "101", ON + "101", OFF + "101"), {1: MIDDLE}, 2612, {1: irigid(101)}
+        "",
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE},
+        2612,
+        {1: write_rigid_part(101)},
     ),
     "a rigid part merged into a body": Listed(
-        body(9, 103, 3) + merge((9, 1, 1, 4)),
+        write_body(9, 103, 3) + write_merge((9, 1, 1, 4)),
         (OFF + "103", ON + "103", OFF + "103"),
         {1: MIDDLE, 3: MIDDLE},
         2612,
-        {1: irigid(101)},
+        {1: write_rigid_part(101)},
     ),
-    "formats before 2612 have none": Listed("", ("",), {}, 2026, {1: irigid()}),
+    "formats before 2612 have none": Listed(
+        "", ("",), {}, 2026, {1: write_rigid_part()}
+    ),
 }
 
 
-def place(folder: Path, run: Listed) -> str:
+def write_run(folder: Path, run: Listed) -> str:
     """Write a run of legs of 2 ms each, or of one of 6 ms."""
     end = f"/TH/PART/1\nparts\nDEF\n{wide(1, 2, 3)}/END\n"
     main = folder / "X_0000.rad"
-    main.write_text(head(run.version) + plates(run.parts) + run.starter + end)
+    main.write_text(
+        write_head(run.version) + write_plates(run.parts) + run.starter + end
+    )
     length = 6 // len(run.legs)
     for number, text in enumerate(run.legs, start=1):
         leg = f"/RUN/X/{number}\n{length * number / 1000}\n/VERS/{run.version}\n/DT\n0.9 0.0\n{text}\n"
@@ -272,12 +288,12 @@ def place(folder: Path, run: Listed) -> str:
     return str(main)
 
 
-def rigid_by_check(main: str) -> dict[int, list[tuple[float, float | None]]]:
-    found: dict[int, list[tuple[float, float | None]]] = {}
+def find_spans_by_check(main: str) -> dict[int, list[tuple[float, float | None]]]:
+    rigid_spans: dict[int, list[tuple[float, float | None]]] = {}
     for window in check_deck(main).windows:
         assert window.part is not None
-        found.setdefault(window.part, []).append((window.tr, window.td))
-    return found
+        rigid_spans.setdefault(window.part, []).append((window.tr, window.td))
+    return rigid_spans
 
 
 @pytest.mark.parametrize("name", [*LISTED, *RIGID_PARTS])
@@ -285,11 +301,11 @@ def test_check_gives_the_spans_and_parts_of_the_listings(
     tmp_path: Path, name: str
 ) -> None:
     run = (LISTED | RIGID_PARTS)[name]
-    assert rigid_by_check(place(tmp_path, run)) == run.rigid
+    assert find_spans_by_check(write_run(tmp_path, run)) == run.rigid
 
 
-def events(folder: Path) -> Iterator[tuple[int, bool, float]]:
-    """Parts that become rigid or deformable, and when, by the listings of the engine: element i is that of part i."""
+def read_events(folder: Path) -> Iterator[tuple[int, bool, float]]:
+    """Yield part, True if it becomes rigid, and time from the listings of the engine; element i belongs to part i."""
     length = 0.0
     for listing in sorted(folder.glob("X_000[1-9].out")):
         now = length
@@ -300,33 +316,33 @@ def events(folder: Path) -> Iterator[tuple[int, bool, float]]:
                 yield int(event[2]), bool(event[1]), now
 
 
-def rigid_by_listing(folder: Path) -> dict[int, list[tuple[float, float]]]:
-    """Spans by part, those of a few cycles left out: a part whose first event is an activation was rigid before."""
-    found: dict[int, list[tuple[float, float]]] = {}
-    for part, rigid, now in events(folder):
-        spans = found.setdefault(part, [])
+def find_spans_by_listing(folder: Path) -> dict[int, list[tuple[float, float]]]:
+    """Return the rigid spans by part without those of a few cycles; an activation first means rigid before."""
+    rigid_spans: dict[int, list[tuple[float, float]]] = {}
+    for part, rigid, now in read_events(folder):
+        spans = rigid_spans.setdefault(part, [])
         if rigid:
             if spans and now - spans[-1][1] < 4 * STEP:
-                spans[-1] = spans[-1][0], inf  # the sensor changed its mind
+                spans[-1] = spans[-1][0], inf  # the sensor changed its state again
             elif not spans or spans[-1][1] < inf:
                 spans.append((now, inf))
         elif not spans:
             spans.append((0.0, now))
         elif spans[-1][1] == inf:
             spans[-1] = spans[-1][0], now
-    kept = {
+    lasting_spans = {
         part: [span for span in spans if span[1] - span[0] > 4 * STEP]
-        for part, spans in found.items()
+        for part, spans in rigid_spans.items()
     }
-    return {part: spans for part, spans in kept.items() if spans}
+    return {part: spans for part, spans in lasting_spans.items() if spans}
 
 
 @pytest.mark.parametrize("name", LISTED)
 def test_the_listings_of_the_solver_say_so(tmp_path: Path, name: str) -> None:
     run = LISTED[name]
-    main = place(tmp_path, run)
-    solve(tmp_path, "X")
-    listed, checked = rigid_by_listing(tmp_path), rigid_by_check(main)
+    main = write_run(tmp_path, run)
+    run_solver(tmp_path, "X")
+    listed, checked = find_spans_by_listing(tmp_path), find_spans_by_check(main)
     assert listed.keys() == checked.keys()
     for part, spans in checked.items():
         ends = [
@@ -342,29 +358,31 @@ def test_the_listings_of_the_solver_say_so(tmp_path: Path, name: str) -> None:
 def test_a_main_node_that_the_starter_makes_is_named_by_its_number(
     tmp_path: Path,
 ) -> None:
-    main = place(
+    main = write_run(
         tmp_path,
         Listed(
-            body(7, 0, 1) + body(2, 102, 2), (OFF + "102", ON + "102", OFF + "102"), {}
+            write_body(7, 0, 1) + write_body(2, 102, 2),
+            (OFF + "102", ON + "102", OFF + "102"),
+            {},
         ),
     )
     (finding,) = check_deck(main).findings
     assert finding.rule == "D2R408"
     assert (
-        "name main node 104 in the /RBODY/OFF of every leg (the starter makes node 104: see its listing)"
+        "list main node 104 in the /RBODY/OFF of every engine file (the starter makes node 104: see its listing)"
         in finding.message
     )
 
 
 def test_the_main_node_of_a_merged_body_is_none(tmp_path: Path) -> None:
-    found = check_deck(
-        place(
+    findings = check_deck(
+        write_run(
             tmp_path, LISTED["the engine does not know the main node of a merged body"]
         )
     ).findings
-    assert {one.rule for one in found} == {"D2R402"}
+    assert {finding.rule for finding in findings} == {"D2R402"}
     assert (
-        "its body is merged into /RBODY 1, whose main node is 101" in found[0].message
+        "its body is merged into /RBODY 1: write main node 101" in findings[0].message
     )
 
 
@@ -373,17 +391,17 @@ def test_parts_that_stay_rigid_are_rigid_in_the_inventory(
     tmp_path: Path, name: str
 ) -> None:
     run = (LISTED | RIGID_PARTS)[name]
-    found = read_inventory(place(tmp_path, run)).parts
+    inventory = read_inventory(write_run(tmp_path, run)).parts
     always = {part for part, spans in run.rigid.items() if spans == [(0.0, None)]}
     assert {
         part
-        for part, data in found.items()
+        for part, data in inventory.items()
         if data.material and data.material.kind == "rigid"
     } == always
 
 
 def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> None:
-    main = place(tmp_path, Listed(body(7, 101, 1), ("",), {}))
+    main = write_run(tmp_path, Listed(write_body(7, 101, 1), ("",), {}))
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "rigid"
@@ -398,19 +416,19 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
 def test_main_nodes_of_rigid_parts_follow_the_order_of_the_deck(tmp_path: Path) -> None:
     """Nodes 101 to 103 are the last of the deck; the body of an /RBODY comes before those of parts."""
     legs = (OFF + "104 105 106", ON + "105", OFF + "105")
-    parts = {1: irigid(), 3: irigid()}
-    main = Path(place(tmp_path, Listed(body(9, 0, 2), legs, {}, 2612, parts)))
+    parts = {1: write_rigid_part(), 3: write_rigid_part()}
+    main = Path(write_run(tmp_path, Listed(write_body(9, 0, 2), legs, {}, 2612, parts)))
     before, first, *others = main.read_text().partition("/PART/1\n")
     middle, third, rest = others[0].partition("/PART/3\n")
     block, groups, after = rest.partition("/GRNOD/")
     main.write_text(before + third + block + first + middle + groups + after)
-    assert rigid_by_check(str(main)) == {3: MIDDLE}
+    assert find_spans_by_check(str(main)) == {3: MIDDLE}
 
 
 @pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])
 def test_parts_that_a_sensor_switches_already_are_not_switched_again(
     tmp_path: Path, name: str
 ) -> None:
-    found = read_inventory(place(tmp_path, (LISTED | RIGID_PARTS)[name])).parts
-    assert found[1].unswitchable == "the deck switches it by sensor 7 already"
-    assert found[2].unswitchable == ""
+    inventory = read_inventory(write_run(tmp_path, (LISTED | RIGID_PARTS)[name])).parts
+    assert inventory[1].unswitchable == "the deck switches it by sensor 7 already"
+    assert inventory[2].unswitchable == ""

@@ -1,4 +1,4 @@
-"""Where keywords stand: found alike in memory and on a disk, in pieces of any size, by any number of threads."""
+"""Places of keywords are the same in memory and on disk, for any size of pieces and any number of threads."""
 
 from __future__ import annotations
 
@@ -57,21 +57,21 @@ FRAGMENTS = [
 FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
 
 
-def line_by_line(data: bytes) -> Iterator[int]:
-    """Offsets as a look at every line finds them."""
+def find_marks_by_line(data: bytes) -> Iterator[int]:
+    """Yield the offsets of keywords by checking every line."""
     start = len(MARK) if data.startswith(MARK) else 0
     for line in (
         data[start:].splitlines(keepends=True)
         if b"\r" not in data
         else re.split(rb"(?<=\n)", data[start:])
     ):
-        if found := re.match(rb" {0,31}\*|" + HEAD, line):
-            yield start + (found.end() - 1 if found[0].endswith(b"*") else 0)
+        if match := re.match(rb" {0,31}\*|" + HEAD, line):
+            yield start + (match.end() - 1 if match[0].endswith(b"*") else 0)
         start += len(line)
 
 
-def on_disk(file: Path, window: int = 64) -> OnDisk:
-    """A file that stays on its disk, and is read in small pieces."""
+def open_on_disk(file: Path, window: int = 64) -> OnDisk:
+    """Return a file that stays on disk and is read in small pieces."""
     with file.open("rb", buffering=0) as opened:
         return OnDisk(str(file), FileState.of(opened), window)
 
@@ -86,20 +86,20 @@ def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
     file: Path, data: bytes, piece: int, helpers: int, window: int
 ) -> None:
     file.write_bytes(data)
-    expected = [*line_by_line(data)]
+    expected = [*find_marks_by_line(data)]
     assert [*find_marks(Held(data))] == expected
     blocks = [
-        (one.start, one.end, one.head, one.line, [*one.lines()])
-        for one in SourceFile("held", data).blocks()
+        (block.start, block.end, block.head, block.line, [*block.lines()])
+        for block in SourceFile("held", data).blocks()
     ]
-    there = on_disk(file, window)
-    for content in (there, Held(data)):
+    disk_file = open_on_disk(file, window)
+    for content in (disk_file, Held(data)):
         assert [*find_marks(content, piece, alone=0, helpers=helpers)] == expected
-    source = SourceFile(str(file), there, piece)
+    source = SourceFile(str(file), disk_file, piece)
     assert [*source.marks] == expected
     assert [
-        (one.start, one.end, one.head, one.line, [*one.lines()])
-        for one in source.blocks()
+        (block.start, block.end, block.head, block.line, [*block.lines()])
+        for block in source.blocks()
     ] == blocks
 
 
@@ -108,14 +108,16 @@ def test_pieces_are_whole_lines(
     file: Path, data: bytes, size: int, start: int, end: int | None
 ) -> None:
     file.write_bytes(data)
-    pieces = [*SourceFile(str(file), on_disk(file, 2 * size), size).pieces(start, end)]
+    pieces = [
+        *SourceFile(str(file), open_on_disk(file, 2 * size), size).pieces(start, end)
+    ]
     assert b"".join(pieces) == data[start:end]
     assert all(piece.endswith(b"\n") for piece in pieces[:-1])
     assert all(pieces)
 
 
 class Sparing(io.FileIO):
-    """A file that gives three bytes at a time."""
+    """A file that returns three bytes per read."""
 
     def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
         return super().readinto(room[:3])
@@ -126,17 +128,17 @@ def test_a_call_of_the_system_that_gives_less_is_repeated(
 ) -> None:
     path = tmp_path / "deck.k"
     path.write_bytes(b"0123456789")
-    there = on_disk(path, window=1)
+    disk_file = open_on_disk(path, window=1)
     monkeypatch.delattr("os.preadv", raising=False)  # not every system has it
     monkeypatch.setattr(builtins, "open", lambda name, mode, **_: Sparing(name, mode))
-    assert there.read(1, 9) == b"12345678"
+    assert disk_file.read(1, 9) == b"12345678"
     os.truncate(path, 6)
     with pytest.raises(DeckError, match="rewritten"):
-        there.read(1, 9)
+        disk_file.read(1, 9)
 
 
 class Failing(Held):
-    """Bytes that a disk gives up to a place."""
+    """Bytes that can be read only up to an offset."""
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
@@ -165,7 +167,7 @@ def test_where_no_more_threads_are_allowed_one_searches_all(
 
 
 class Short(Held):
-    """Bytes for which threads beside the first one find no memory."""
+    """Bytes for which only the main thread gets memory."""
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
@@ -185,7 +187,7 @@ def test_what_a_thread_has_no_memory_for_the_first_one_searches(
 
 
 class Counting(Held):
-    """Bytes that count how many of them are asked for."""
+    """Bytes that count how many of them are read."""
 
     asked = 0
 
@@ -210,7 +212,7 @@ def test_lines_are_counted_once_in_whatever_order_they_are_asked_for() -> None:
 
 
 class Interrupted(Held):
-    """Bytes of which the main thread reads none: it is interrupted before."""
+    """Bytes whose read interrupts the main thread."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__(data)

@@ -1,4 +1,4 @@
-"""Parts, part sets and the windows they are rigid in."""
+"""Parts, part sets and their rigid windows."""
 
 from pathlib import Path
 
@@ -12,38 +12,51 @@ from tests.decks import read, spans, wide, windows
 Spans = list[tuple[int | None, float, float | None]]
 
 
-def there(time: str, *parts: str, swset: int = 1) -> str:
+def write_rigid_card(time: str, *parts: str, swset: int = 1) -> str:
     return automatic(swset, time, rigid=parts)
 
 
-def back(time: str, *parts: str, swset: int = 2) -> str:
+def write_back_card(time: str, *parts: str, swset: int = 2) -> str:
     return automatic(swset, time, deformable=parts)
 
 
 PLAIN = "*DEFORMABLE_TO_RIGID\n         1\n"
 CASES: dict[str, tuple[str, Spans]] = {
-    "one": (there("0.02", "1") + back("0.09", "1"), [(1, 0.02, 0.09)]),
-    "cards in any order": (back("0.09", "1") + there("0.02", "1"), [(1, 0.02, 0.09)]),
-    "from the start": (PLAIN + back("0.09", "1"), [(1, 0.0, 0.09)]),
-    "to the end": (there("0.02", "1"), [(1, 0.02, None)]),
+    "one": (
+        write_rigid_card("0.02", "1") + write_back_card("0.09", "1"),
+        [(1, 0.02, 0.09)],
+    ),
+    "cards in any order": (
+        write_back_card("0.09", "1") + write_rigid_card("0.02", "1"),
+        [(1, 0.02, 0.09)],
+    ),
+    "from the start": (PLAIN + write_back_card("0.09", "1"), [(1, 0.0, 0.09)]),
+    "to the end": (write_rigid_card("0.02", "1"), [(1, 0.02, None)]),
     "two parts": (
-        there("0.02", "1", "2") + back("0.09", "2", "1"),
+        write_rigid_card("0.02", "1", "2") + write_back_card("0.09", "2", "1"),
         [(1, 0.02, 0.09), (2, 0.02, 0.09)],
     ),
     "parts apart": (
-        there("1", "1", "2") + back("2", "1") + back("3", "2"),
+        write_rigid_card("1", "1", "2")
+        + write_back_card("2", "1")
+        + write_back_card("3", "2"),
         [(1, 1, 2), (2, 1, 3)],
     ),
     "two windows": (
-        PLAIN + back("1", "1") + there("2", "1") + back("3", "1"),
+        PLAIN
+        + write_back_card("1", "1")
+        + write_rigid_card("2", "1")
+        + write_back_card("3", "1"),
         [(1, 0, 1), (1, 2, 3)],
     ),
     "merged again while rigid": (
-        there("1", "1") + there("2", "1") + back("3", "1"),
+        write_rigid_card("1", "1")
+        + write_rigid_card("2", "1")
+        + write_back_card("3", "1"),
         [(1, 1, 3)],
     ),
-    "inverted": (there("2", "1") + back("1", "1"), [(1, 2, 1)]),
-    "at once": (there("1", "1") + back("1", "1"), [(1, 1, 1)]),
+    "inverted": (write_rigid_card("2", "1") + write_back_card("1", "1"), [(1, 2, 1)]),
+    "at once": (write_rigid_card("1", "1") + write_back_card("1", "1"), [(1, 1, 1)]),
     "by force": (
         automatic(1, "0", rigid=["1"], code=2)
         + automatic(2, "0", deformable=["1"], code=4),
@@ -65,13 +78,18 @@ def test_windows(tmp_path: Path, deck: str, expected: Spans) -> None:
 
 def test_what_nothing_made_rigid_is_an_orphan(tmp_path: Path) -> None:
     (orphan,) = windows(
-        read(tmp_path, back("1", "1") + there("2", "1") + back("3", "1"))
+        read(
+            tmp_path,
+            write_back_card("1", "1")
+            + write_rigid_card("2", "1")
+            + write_back_card("3", "1"),
+        )
     ).orphans
     assert orphan.unit.id == 1
     assert orphan.by.time == 1
 
 
-def of_set(set_id: int) -> str:
+def write_set_card(set_id: int) -> str:
     return f"*DEFORMABLE_TO_RIGID\n{set_id:10d}         0      PSET\n"
 
 
@@ -101,13 +119,13 @@ def test_part_sets_are_resolved(
     tmp_path: Path, cards: str, expected: list[int]
 ) -> None:
     assert [
-        part for part, _, _ in spans(read(tmp_path, PARTS + cards + of_set(9)))
+        part for part, _, _ in spans(read(tmp_path, PARTS + cards + write_set_card(9)))
     ] == expected
 
 
 @pytest.mark.parametrize("cards", ["", "*SET_PART_GENERAL\n         9\nALL\n"])
 def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> None:
-    (window,) = windows(read(tmp_path, PARTS + cards + of_set(9))).windows
+    (window,) = windows(read(tmp_path, PARTS + cards + write_set_card(9))).windows
     assert window.part is None
     assert (window.unit.id, window.unit.kind) == (9, "part set")
 
@@ -146,22 +164,24 @@ def test_rigid_materials_move_with_their_include(tmp_path: Path, name: str) -> N
     assert not parts.is_rigid(1)
 
 
-def shell(*ids: int, width: int = 8) -> str:
+def write_shell(*ids: int, width: int = 8) -> str:
     return "".join(f"{number:{width}d}" for number in ids) + "\n"
 
 
 ELEMENTS: dict[str, str] = {
-    "shells": "*ELEMENT_SHELL\n" + shell(1, 1, 1, 2, 3, 4) + shell(2, 2, 3, 4, 5, 6),
+    "shells": "*ELEMENT_SHELL\n" + write_shell(1, 1, 1, 2, 3, 4) + write_shell(2, 2, 3, 4, 5, 6),
     "thickness": "*ELEMENT_SHELL_THICKNESS\n"
-    + shell(1, 1, 1, 2, 3, 4) + f"{'0.1':>16s}\n" + shell(2, 2, 3, 4, 5, 6) + f"{'0.1':>16s}\n",
-    "solids": "*ELEMENT_SOLID\n" + shell(1, 1, 1, 2, 3, 8) + shell(2, 2, 3, 4, 5, 6),
+    + write_shell(1, 1, 1, 2, 3, 4) + f"{'0.1':>16s}\n" + write_shell(2, 2, 3, 4, 5, 6) + f"{'0.1':>16s}\n",
+    "solids": "*ELEMENT_SOLID\n" + write_shell(1, 1, 1, 2, 3, 8) + write_shell(2, 2, 3, 4, 5, 6),
     "ten nodes": "*ELEMENT_SOLID (ten nodes format)\n"
-    + shell(1, 1) + shell(1, 2, 3, 8, 9, 10, 11, 12, 13, 14)
-    + shell(2, 2) + shell(21, 22, 23, 24, 25, 26, 27, 28, 29, 3),
-    "ten columns": "*ELEMENT_SHELL%\n" + shell(1, 1, 1, 2, 3, 4, width=10) + shell(2, 2, 3, 4, 5, 6, width=10),
-    "long": "*ELEMENT_SHELL+\n" + shell(1, 1, 1, 2, 3, 4, width=20) + shell(2, 2, 3, 4, 5, 6, width=20),
+    + write_shell(1, 1) + write_shell(1, 2, 3, 8, 9, 10, 11, 12, 13, 14)
+    + write_shell(2, 2) + write_shell(21, 22, 23, 24, 25, 26, 27, 28, 29, 3),
+    "ten columns": "*ELEMENT_SHELL%\n" + write_shell(1, 1, 1, 2, 3, 4, width=10) + write_shell(2, 2, 3, 4, 5, 6,
+    width=10),
+    "long": "*ELEMENT_SHELL+\n" + write_shell(1, 1, 1, 2, 3, 4, width=20) + write_shell(2, 2, 3, 4, 5, 6, width=20),
     "comma": "*ELEMENT_SHELL\n1,1,1,2,3,4\n2,2,3,4,5,6\n",
-    "beam and shell": "*ELEMENT_BEAM\n" + shell(1, 1, 3, 9, 5) + "*ELEMENT_SHELL\n" + shell(2, 2, 3, 4, 6, 7),
+    "beam and shell": "*ELEMENT_BEAM\n" + write_shell(1, 1, 3, 9, 5) + "*ELEMENT_SHELL\n" + write_shell(2, 2, 3, 4, 6,
+    7),
 }  # fmt: skip
 
 
@@ -176,9 +196,9 @@ def test_shared_nodes(tmp_path: Path, deck: str) -> None:
 def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
     deck = (
         "*ELEMENT_BEAM\n"
-        + shell(1, 1, 8, 9, 3)
+        + write_shell(1, 1, 8, 9, 3)
         + "*ELEMENT_SHELL\n"
-        + shell(2, 2, 3, 4, 6, 7)
+        + write_shell(2, 2, 3, 4, 6, 7)
     )
     assert (
         first_shared_nodes(

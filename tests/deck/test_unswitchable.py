@@ -28,8 +28,10 @@ CARD = """\
 """
 
 
-def bricks(folder: Path, elform: int, law: str = "*MAT_ELASTIC", more: str = "") -> str:
-    """Write the deck of the sample run with a brick for each part, the first of which is made of ``law``."""
+def write_bricks(
+    folder: Path, elform: int, law: str = "*MAT_ELASTIC", further_cards: str = ""
+) -> str:
+    """Write the deck of the sample run with a brick for each part; the first part has the material ``law``."""
     text = "*KEYWORD\n*CONTROL_TERMINATION\n      0.42\n*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n"
     text += f"{law}\n         7    1000.0   1.0e+06       0.3\n*MAT_ELASTIC\n         8    7850.0   2.1e+11       0.3\n"
     text += f"*SECTION_SOLID\n         1{elform:10d}\n*SECTION_SOLID\n         2         0\n"
@@ -39,18 +41,23 @@ def bricks(folder: Path, elform: int, law: str = "*MAT_ELASTIC", more: str = "")
             f"{first + at:8d}{x + first:16}{y:16}{z:16}\n"
             for at, (x, y, z) in enumerate(NODES)
         )
-    rows = ([one, one, *range(first, first + 8)] for one, first in ((1, 1), (2, 11)))
+    rows = (
+        [element, element, *range(first, first + 8)]
+        for element, first in ((1, 1), (2, 11))
+    )
     text += "*ELEMENT_SOLID\n" + "".join(wide(*row, width=8) for row in rows)
-    return str(put(folder / "main.k", f"{text}{more}*END\n"))
+    return str(put(folder / "main.k", f"{text}{further_cards}*END\n"))
 
 
 def test_material_that_flows_is_kept_and_warned_of(tmp_path: Path) -> None:
-    run, deck = d2.read(MATSUM), bricks(tmp_path, 11)
+    run, deck = d2.read(MATSUM), write_bricks(tmp_path, 11)
     first = d2.parts(run, deck=deck).rows[0]
     assert first.verdict == "keep"
     assert "its material flows through the mesh (ALE, ELFORM 11)" in first.reasons
     warnings = d2.plan(run, parts=1, deck=deck, replay=False).warnings
-    (message,) = [one.message for one in warnings if one.code == "unswitchable-part"]
+    (message,) = [
+        warning.message for warning in warnings if warning.code == "unswitchable-part"
+    ]
     assert (
         message
         == "part 1: its material flows through the mesh (ALE, ELFORM 11); leave it out"
@@ -59,12 +66,14 @@ def test_material_that_flows_is_kept_and_warned_of(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("elform", [5, 6, 7, 11, 12])
 def test_material_that_flows_is_found(tmp_path: Path, elform: int) -> None:
-    found = {
-        one.rule: one
-        for one in check_deck(bricks(tmp_path, elform, more=CARD)).findings
+    findings = {
+        finding.rule: finding
+        for finding in check_deck(
+            write_bricks(tmp_path, elform, further_cards=CARD)
+        ).findings
     }
-    assert str(found["D2R118"].severity) == "error"
-    assert f"ELFORM {elform})" in found["D2R118"].message
+    assert str(findings["D2R118"].severity) == "error"
+    assert f"ELFORM {elform})" in findings["D2R118"].message
 
 
 @pytest.mark.parametrize(
@@ -79,10 +88,10 @@ def test_material_that_flows_is_found(tmp_path: Path, elform: int) -> None:
     ],
 )
 def test_a_law_with_a_reference_is_kept_and_found(tmp_path: Path, law: str) -> None:
-    data = read_inventory(bricks(tmp_path, 0, law)).parts
+    data = read_inventory(write_bricks(tmp_path, 0, law)).parts
     assert f"stress-free reference ({law})" in data[1].unswitchable
     assert data[2].unswitchable == ""
-    (finding,) = check_deck(bricks(tmp_path, 0, law, CARD)).findings
+    (finding,) = check_deck(write_bricks(tmp_path, 0, law, CARD)).findings
     assert (finding.rule, str(finding.severity)) == ("D2R119", "warning")
 
 
@@ -98,8 +107,8 @@ def test_a_law_with_a_reference_is_kept_and_found(tmp_path: Path, law: str) -> N
     ],
 )
 def test_other_laws_and_elements_are_switched(tmp_path: Path, law: str) -> None:
-    assert read_inventory(bricks(tmp_path, 0, law)).parts[1].unswitchable == ""
-    assert check_deck(bricks(tmp_path, 0, law, CARD)).findings == ()
+    assert read_inventory(write_bricks(tmp_path, 0, law)).parts[1].unswitchable == ""
+    assert check_deck(write_bricks(tmp_path, 0, law, CARD)).findings == ()
 
 
 @pytest.mark.parametrize(
@@ -122,5 +131,7 @@ def test_parts_of_radioss_that_must_not_be_switched(
     ).items():
         put(tmp_path / name, text)
     main = str(put(tmp_path / "box_0000.rad", starter_deck(more=cards)))
-    assert [one.rule for one in check_deck(main).findings] == [rule] * bool(rule)
+    assert [finding.rule for finding in check_deck(main).findings] == [rule] * bool(
+        rule
+    )
     assert bool(read_inventory(main).parts[1].unswitchable) == bool(rule)

@@ -1,4 +1,4 @@
-"""Decks written with cards in them: nothing else changes, and what is there is never lost."""
+"""Decks written with cards: nothing else changes, and no existing file is lost."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +21,7 @@ INCLUDE = "*INCLUDE\nswitches.k\n"
 RUN = RULES["D2R401"].passing[0]
 
 
-def windows(path: str) -> list[tuple[int, float, float | None]]:
+def list_windows(path: str) -> list[tuple[int, float, float | None]]:
     checked = check_deck(path)
     assert [finding for finding in checked.findings if finding.severity != "info"] == []
     return [(window.unit.id, window.tr, window.td) for window in checked.windows]
@@ -32,15 +32,18 @@ def windows(path: str) -> list[tuple[int, float, float | None]]:
 def test_the_deck_is_the_same_but_for_one_include(
     tmp_path: Path, end: str, newline: str
 ) -> None:
-    before, after = ((HEAD + PARTS).replace("\n", newline), end.replace("\n", newline))
-    main = write(tmp_path, (before + after).encode())
+    text_before, text_after = (
+        (HEAD + PARTS).replace("\n", newline),
+        end.replace("\n", newline),
+    )
+    main = write(tmp_path, (text_before + text_after).encode())
     written, switches = write_deck(main, CARD, str(tmp_path / "next"))
     assert (
         Path(written).read_bytes()
-        == (before + INCLUDE.replace("\n", newline) + after).encode()
+        == (text_before + INCLUDE.replace("\n", newline) + text_after).encode()
     )
     assert Path(switches).read_text() == CARD.text
-    assert windows(written) == [(1, tr, td) for tr, td in WINDOWS]
+    assert list_windows(written) == [(1, tr, td) for tr, td in WINDOWS]
 
 
 def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
@@ -57,10 +60,10 @@ def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
     )
     written = write_deck(main, CARD, str(tmp_path / "next"))
     assert [Path(name).name for name in written] == ["main.k", "switches.k", "all.k"]
-    assert windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
+    assert list_windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-IS_CUT = r"main\.k: the .* is it cut\? The cards behind it would hide that: .*"
+IS_CUT = r"main\.k: the .* may be truncated\. The added cards would hide this: .*"
 OTHER_SET = THERE.replace(
     "         1         0  ", "       901         0  ", 1
 ).replace("         1         0      PART", "         2         0      PART")
@@ -74,26 +77,26 @@ OTHER_SET = THERE.replace(
         (
             HEAD + INCLUDE + END,
             {"switches.k": PARTS},
-            "with the name of the cards, 'switches.k'",
+            "with the name of the card file, 'switches.k'",
         ),
         (
             HEAD + "*INCLUDE\n../parts.k\n" + END,
             {"../parts.k": PARTS},
-            "outside the folder",
+            "from outside its folder",
         ),
         ((HEAD + PARTS).rstrip("\n"), {}, IS_CUT + "end its last line"),
-        (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + "add that line"),
+        (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + r"add \*END"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_anything_is(
     tmp_path: Path, deck: str, files: dict[str, str], message: str
 ) -> None:
     (tmp_path / "deep").mkdir()
-    refused(write(tmp_path / "deep", deck, files), CARD, message)
+    check_refused(write(tmp_path / "deep", deck, files), CARD, message)
 
 
-def refused(main: str, card: PrintedCard, message: str) -> None:
-    """The deck is not written, and nothing else either."""
+def check_refused(main: str, card: PrintedCard, message: str) -> None:
+    """Check that the deck is refused with this message, and that no file is written."""
     folder = Path(main).parent / "next"
     with pytest.raises(DeckError, match=message):
         write_deck(main, card, str(folder))
@@ -134,11 +137,11 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
         ("all.k", "parts"),
     ):
         with pytest.raises(
-            DeckError, match=rf"{name}: leads out of {folder}, by a link"
+            DeckError, match=rf"{name}: lies outside {folder}, because of a link"
         ):
             write_deck(main, CARD, str(folder), overwrite=True)
         (folder / link).unlink()
-        assert [one.name for one in mine.iterdir()] == ["kept.k"]
+        assert [path.name for path in mine.iterdir()] == ["kept.k"]
     assert (mine / "kept.k").read_text() == "mine"
     (tmp_path / "named").symlink_to(folder)  # a link that was asked for
     assert (folder / "parts" / "all.k").samefile(
@@ -152,7 +155,7 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
 ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/RBODY/OFF\n1808\n/INIV/TRA/X/2\n6.0\n2\n/TFILE/4\n1e-5\n/DTIX\n1e-6 1e-4\n"
 
 
-def radioss_run(folder: Path, engine: str = ENGINE) -> str:
+def write_radioss_run(folder: Path, engine: str = ENGINE) -> str:
     folder.mkdir(exist_ok=True)
     (folder / "box_0001.rad").write_text(engine)
     return write(folder, RUN.deck, name=RUN.name)
@@ -161,10 +164,10 @@ def radioss_run(folder: Path, engine: str = ENGINE) -> str:
 def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
     card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
     starter, *legs = write_deck(
-        radioss_run(tmp_path / "ref"), card, str(tmp_path / "next")
+        write_radioss_run(tmp_path / "ref"), card, str(tmp_path / "next")
     )
     assert Path(starter).read_text() == RUN.deck
-    assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
+    assert list_windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
     texts = [Path(leg).read_text() for leg in legs]
     assert ["/INIV" in text for text in texts] == [True, False, False, False, False]
     assert all("/TFILE/4\n1e-5\n" in text and "/VERS/2022" in text for text in texts)
@@ -175,24 +178,27 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
     tmp_path: Path,
 ) -> None:
     """Source: runs computed with OpenRadioss, whose engine looks for NAME_0001.rst beside NAME_0002.rad."""
-    main = radioss_run(tmp_path / "ref")
+    main = write_radioss_run(tmp_path / "ref")
     for file in (tmp_path / "ref").iterdir():
         file.rename(file.with_name(file.name.replace("box_", "heavy_box_")))
     main = main.replace("box_0000", "heavy_box_0000")
-    for name in ("box", "heavy_box"):  # that in /RUN, or that of the files
+    for name in ("box", "heavy_box"):  # the name in /RUN, or that of the files
         card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
-        names = [Path(one).name for one in write_deck(main, card, str(tmp_path / name))]
+        names = [
+            Path(written_file).name
+            for written_file in write_deck(main, card, str(tmp_path / name))
+        ]
         assert names == [f"heavy_box_{number:04d}.rad" for number in range(6)]
     card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss")
-    refused(main, card, "the cards are for run 'other', the run is 'box'")
+    check_refused(main, card, "the cards are for run 'other', but this is run 'box'")
 
 
 def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
     tmp_path: Path,
 ) -> None:
-    """A later leg may leave out keywords of the first, as velocities at the start, but has none of its own."""
+    """A later leg may lack keywords of the first one, such as initial velocities, but has none of its own."""
     card = cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
-    ref = radioss_run(tmp_path / "ref")
+    ref = write_radioss_run(tmp_path / "ref")
     (tmp_path / "ref" / "box_0002.rad").write_text(
         "/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n"
     )
@@ -213,37 +219,39 @@ def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
 
 
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
-    """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
+    """Otherwise they would be rigid from time 0, like the wheels of a car of which only the body is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"
-    for own, name in (
+    for starter_deck, name in (
         ((), "a"),
         ((1810, 1809), "b"),
     ):  # a card that knows them, and one that does not
         card = cards(
-            WINDOWS, Printing(node=(1808,), off=own, end=0.4, name="box"), "radioss"
+            WINDOWS,
+            Printing(node=(1808,), off=starter_deck, end=0.4, name="box"),
+            "radioss",
         )
         starter, *legs = write_deck(
-            radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name)
+            write_radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name)
         )
-        found = [dict(_states(leg)) for leg in read_run(starter).legs]
+        leg_states = [dict(list_states(leg)) for leg in read_run(starter).legs]
         rigid = [
             {1808: False, 1809: False, 1810: False},
             {1808: True, 1809: False, 1810: False},
         ]
-        assert found == [rigid[0], rigid[1], rigid[0], rigid[1], rigid[0]]
+        assert leg_states == [rigid[0], rigid[1], rigid[0], rigid[1], rigid[0]]
         blocks = [Path(leg).read_text().count("/RBODY/OFF") for leg in legs]
         assert blocks == [1] * len(
-            found
-        )  # the starter overlooks a second one that follows the first
+            leg_states
+        )  # the starter ignores a second block that follows the first
 
 
-def _states(leg: Leg) -> Iterator[tuple[int, bool]]:
+def list_states(leg: Leg) -> Iterator[tuple[int, bool]]:
     for _, rigid, nodes in leg.switched:
         yield from ((node.value, rigid) for node in nodes)
 
 
 def test_a_card_names_all_that_is_off_in_one_block() -> None:
-    """The starter of OpenRadioss overlooks the second of two blocks that follow each other."""
+    """The starter of OpenRadioss ignores the second of two consecutive blocks."""
     card = cards(
         WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss"
     )
@@ -253,7 +261,7 @@ def test_a_card_names_all_that_is_off_in_one_block() -> None:
     assert "/RBODY/OFF\n1808 1809\n" in texts[0]
 
 
-def sensed(**more: object) -> PrintedCard:
+def print_sensor_card(**more: object) -> PrintedCard:
     printing = Printing(node=(1808,), end=0.4, name="box", **more)  # type: ignore[arg-type]
     return cards(WINDOWS, printing, "radioss-sensors")
 
@@ -262,16 +270,16 @@ def sensed(**more: object) -> PrintedCard:
 def test_all_windows_fit_one_engine_run_by_sensors(
     tmp_path: Path, newline: str
 ) -> None:
-    main = radioss_run(tmp_path / "ref", ENGINE.replace("1808\n", "1808 1809\n"))
+    main = write_radioss_run(tmp_path / "ref", ENGINE.replace("1808\n", "1808 1809\n"))
     Path(main).write_bytes(RUN.deck.replace("\n", newline).encode())
-    starter, engine = write_deck(main, sensed(), str(tmp_path / "next"))
-    assert [(one.part, one.tr, one.td) for one in check_deck(starter).windows] == [
-        (1, tr, td) for tr, td in WINDOWS
-    ]
+    starter, engine = write_deck(main, print_sensor_card(), str(tmp_path / "next"))
+    assert [
+        (first.part, first.tr, first.td) for first in check_deck(starter).windows
+    ] == [(1, tr, td) for tr, td in WINDOWS]
     text = Path(engine).read_text()
     assert (
         "/RBODY/OFF\n1809\n" in text
-    )  # what the run keeps off; the one with a sensor has no leg
+    )  # bodies that the run keeps off; one with a sensor has no leg
     assert (
         text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1
     )  # of the shortest window
@@ -279,11 +287,13 @@ def test_all_windows_fit_one_engine_run_by_sensors(
     deck = Path(starter).read_bytes().decode()
     assert deck.count(newline) == deck.count("\n")
     same = [
-        one == other
-        for one, other in zip(RUN.deck.splitlines(), deck.splitlines(), strict=False)
+        first == second
+        for first, second in zip(RUN.deck.splitlines(), deck.splitlines(), strict=False)
     ]
     changed = [
-        line for line, kept in zip(deck.splitlines(), same, strict=False) if not kept
+        line
+        for line, is_same in zip(deck.splitlines(), same, strict=False)
+        if not is_same
     ]
     assert changed[:2] == [
         "      2023         0",
@@ -293,15 +303,15 @@ def test_all_windows_fit_one_engine_run_by_sensors(
 
 
 def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
-    head, _, behind = RUN.deck.partition("/RBODY/1\n")
-    _, _, rest = behind.partition("7\n")
-    main = radioss_run(tmp_path / "ref", ENGINE.replace("/RBODY/OFF\n1808\n", ""))
-    Path(main).write_text(head + rest)
+    head, _, after_keyword = RUN.deck.partition("/RBODY/1\n")
+    _, _, after_group = after_keyword.partition("7\n")
+    main = write_radioss_run(tmp_path / "ref", ENGINE.replace("/RBODY/OFF\n1808\n", ""))
+    Path(main).write_text(head + after_group)
     body = "/RBODY/1\nbox\n      1808         0         0         0                   0         7\n"
     starter, _ = write_deck(
-        main, sensed(starter=body, sensor=4), str(tmp_path / "next")
+        main, print_sensor_card(starter=body, sensor=4), str(tmp_path / "next")
     )
-    assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
+    assert list_windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
 
 
 LEGS = Printing(node=(1808,), end=0.4, name="box")
@@ -311,21 +321,21 @@ LEGS = Printing(node=(1808,), end=0.4, name="box")
     ("deck", "engine", "card", "message"),
     [
         (RUN.deck, ENGINE.replace("OFF", "ON"), cards(WINDOWS, LEGS, "radioss"), "switches main node 1808 already"),
-        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "run 'other', the run is 'box'"),
-        (RUN.deck.replace("      1808         0", "      1808         4"), ENGINE, sensed(),
+        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "but this is run 'box'"),
+        (RUN.deck.replace("      1808         0", "      1808         4"), ENGINE, print_sensor_card(),
          "sensor 4 switches this /RBODY already"),
-        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), ENGINE, sensed(),
+        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), ENGINE, print_sensor_card(),
          "has sensor 903 of the cards already"),
-        (RUN.deck.replace("      1808 ", "      1807 "), ENGINE, sensed(), "main node 1808: no /RBODY"),
+        (RUN.deck.replace("      1808 ", "      1807 "), ENGINE, print_sensor_card(), "main node 1808: no /RBODY"),
         (RUN.deck, ENGINE, CARD, "another solver"),
     ],
 )  # fmt: skip
 def test_a_run_that_does_not_suit_is_refused(
     tmp_path: Path, deck: str, engine: str, card: PrintedCard, message: str
 ) -> None:
-    main = radioss_run(tmp_path / "ref", engine)
+    main = write_radioss_run(tmp_path / "ref", engine)
     Path(main).write_text(deck)
-    refused(main, card, message)
+    check_refused(main, card, message)
 
 
 @pytest.mark.parametrize("solver", ["radioss", "radioss-sensors"])
@@ -333,4 +343,4 @@ def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(
     tmp_path: Path, solver: str
 ) -> None:
     message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
-    refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)
+    check_refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)

@@ -46,7 +46,10 @@ def bouncing(
 @settings(max_examples=15)
 @example(0.028825, 2.97249461311557)
 @over(st.floats(0.0, 1.0), st.floats(0.2, 3.0))
-def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -> None:
+def test_every_contact_is_seen_within_half_an_interval(
+    shift: float, length: float
+) -> None:
+    """A push that shows in one interval alone is placed in its middle third: two thirds off at most."""
     interval = 1e-3
     sliver = 0.01 * interval  # so short a push in an interval does not show
     contacts = [
@@ -57,8 +60,9 @@ def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -
     assert found is not None
     assert len(found.spans) == 2
     for span, contact in zip(found.spans, contacts, strict=True):
-        assert span[0] <= contact[0] + sliver <= span[0] + interval + 2 * sliver
-        assert span[1] - interval - 2 * sliver <= contact[1] - sliver <= span[1]
+        is_short = contact[1] - contact[0] < interval + 2 * sliver
+        most = interval * (2 / 3 if is_short else 1 / 2) + sliver
+        assert span == pytest.approx(contact, abs=most)
     assert found.interval == pytest.approx(interval)
 
 

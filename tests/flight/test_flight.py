@@ -284,4 +284,5 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
         )
         < 1e-4
     )
-    assert sure(answer.better_pair).residual == pytest.approx(0.0, abs=1e-6)
+    # in noise of 1 % a peak is not exact: the middle of what the noise leaves
+    assert 0 < sure(sure(answer.better_pair).residual) < 1e-3

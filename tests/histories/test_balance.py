@@ -1,4 +1,4 @@
-"""Energy of springs and dampers: found where energies add up, left out of the level, kept where there is no other."""
+"""Energy of springs and dampers: found if energies add up, left out of the level unless it is the only energy."""
 
 from dataclasses import dataclass, field
 
@@ -37,30 +37,36 @@ class Made:
         return self.springs if name.startswith("spring") else self.whole
 
 
-def found(database: Made, energies: Samples = ENERGIES) -> tuple[int, ...]:
+def find_spring_ids(database: Made, energies: Samples = ENERGIES) -> tuple[int, ...]:
     return tuple(part.id for part in springs_among([database], PARTS, energies, TIME))  # type: ignore[list-item]
 
 
 def test_the_parts_that_add_up_to_the_energy_of_the_springs_are_springs() -> None:
-    assert found(Made(ENERGIES[:, [1, 3]].sum(axis=1))) == (2, 4)
+    assert find_spring_ids(Made(ENERGIES[:, [1, 3]].sum(axis=1))) == (2, 4)
     printed = np.array([[float(f"{value:.4e}") for value in row] for row in ENERGIES])
-    assert found(Made(ENERGIES[:, 2]), printed) == (3,)
+    assert find_spring_ids(Made(ENERGIES[:, 2]), printed) == (3,)
 
 
 def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
-    assert found(Made(0.5 * ENERGIES[:, 0])) == ()
+    assert find_spring_ids(Made(0.5 * ENERGIES[:, 0])) == ()
     assert (
-        found(Made(ENERGIES[:, 0] + 0.1)) == ()
-    )  # a spring that has no history of its own
-    assert found(Made(np.full(TIME.size, 1e-20))) == ()  # where LS-DYNA begins to count
+        find_spring_ids(Made(ENERGIES[:, 0] + 0.1)) == ()
+    )  # a spring without its own history
     assert (
-        found(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()
-    )  # more than all there is
+        find_spring_ids(Made(np.full(TIME.size, 1e-20))) == ()
+    )  # LS-DYNA prints 1e-20 for zero
     assert (
-        found(Made(ENERGIES[:, 0], format="csv")) == ()
-    )  # a table may mean something else by the name
+        find_spring_ids(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()
+    )  # more than the energy of all parts
+    assert (
+        find_spring_ids(Made(ENERGIES[:, 0], format="csv")) == ()
+    )  # in a table the name may mean something else
     twins = ENERGIES[:, [0, 0, 2, 3]]
-    assert found(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in ((), (1,), (2,))
+    assert find_spring_ids(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in (
+        (),
+        (1,),
+        (2,),
+    )
 
 
 def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
@@ -79,7 +85,9 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     assert whole.channel == "internal_energy - spring_energy"
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
-    assert len(sure(parts.parts)) == 17  # they are switched all the same
+    assert (
+        len(sure(parts.parts)) == 17
+    )  # the springs are switched although their energy is left out
     assert [
         note
         for note in parts.notes
@@ -88,12 +96,12 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     answer = suggest(parts, 0.1464, Settings())
     assert sure(answer.recommended).tr == pytest.approx(
         0.0386, abs=5e-4
-    )  # with them, 0.0496 or, at another td, 0.0824
+    )  # with the springs the result is 0.0496 or, at another td, 0.0824
 
 
 def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:
-    named = read([CAR], Selection(energy=("internal_energy",))).history
-    assert named.channel == "internal_energy"
+    history = read([CAR], Selection(energy=("internal_energy",))).history
+    assert history.channel == "internal_energy"
     only = read([CAR], Selection(parts=("15-17",))).history
     assert only.energy[-1] == pytest.approx(2407.6, rel=1e-4)
     assert not only.springs
@@ -101,7 +109,7 @@ def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:
 
 def test_parts_that_are_said_to_be_springs_are() -> None:
     run = open_run([CAR], Selection())
-    told = run.history(Selection(parts=("12-15",), springs=("15",)))
-    assert [part.id for part in told.springs] == [15]
+    history = run.history(Selection(parts=("12-15",), springs=("15",)))
+    assert [part.id for part in history.springs] == [15]
     none = run.history(Selection(parts=("12-15",), springs=()))
-    assert none.energy[-1] > told.energy[-1] + 100
+    assert none.energy[-1] > history.energy[-1] + 100

@@ -1,4 +1,4 @@
-"""Forces of contacts and rigid walls from every file that tells them."""
+"""Forces of contacts and rigid walls from every kind of file that contains them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TIMES = np.arange(40) / 8
 ACTS = (TIMES >= 1) & (TIMES <= 2)  # forces at the states
 FORCE = np.where(ACTS, 3.0, 0.0)
-SEEN = ((0.875, 2.125),)  # to one output interval
+SEEN = ((0.875, 2.125),)  # to within one output interval
 ENERGY = glstat_text(TIMES, 1 + TIMES)
 
 
@@ -83,9 +83,11 @@ def test_an_rcforc_tells_when_a_contact_acts_whichever_side_is_asked(
 
 
 def test_an_rwforc_tells_it_of_each_wall(tmp_path: Path) -> None:
-    one, other = open_run(put(tmp_path, glstat=ENERGY, rwforc=rwforc())).contact_forces
-    assert (one.name, one.times) == ("rigid wall 1", ())
-    assert (other.name, other.times) == ("rigid wall 2", SEEN)
+    first_wall, second_wall = open_run(
+        put(tmp_path, glstat=ENERGY, rwforc=rwforc())
+    ).contact_forces
+    assert (first_wall.name, first_wall.times) == ("rigid wall 1", ())
+    assert (second_wall.name, second_wall.times) == ("rigid wall 2", SEEN)
 
 
 def test_a_folder_is_read_with_its_forces(tmp_path: Path) -> None:
@@ -103,7 +105,7 @@ def test_a_folder_is_read_with_its_forces(tmp_path: Path) -> None:
 def test_forces_alone_are_no_history(tmp_path: Path) -> None:
     with pytest.raises(
         FormatError,
-        match=r"rcforc: an rcforc or rwforc of LS-DYNA, which holds forces .* name the gls",
+        match=r"rcforc: an rcforc or rwforc of LS-DYNA, which has forces .* name the gls",
     ):
         open_run(put(tmp_path, rcforc=rcforc()))
 
@@ -138,36 +140,36 @@ def test_a_later_leg_of_an_rcforc_goes_on(tmp_path: Path) -> None:
 
 
 def binout(acts: np.ndarray = FORCE) -> bytes:
-    """glstat, rcforc of both sides of contacts 7 and 9 in no order, and rwforc with its inner directory."""
-    made = LsdaWriter()
-    made.cd("/rcforc/metadata")
-    made.put("ids", [9, 7, 7, 9], "i4")
-    made.put("side", [0, 1, 0, 1], "i4")
-    made.put("legend_ids", [7, 9], "i4")
-    made.put(
+    """A binout with glstat, rcforc (both sides of contacts 7 and 9 in no order) and rwforc with its inner directory."""
+    writer = LsdaWriter()
+    writer.cd("/rcforc/metadata")
+    writer.put("ids", [9, 7, 7, 9], "i4")
+    writer.put("side", [0, 1, 0, 1], "i4")
+    writer.put("legend_ids", [7, 9], "i4")
+    writer.put(
         "legend",
         b"".join(name.ljust(70) for name in (b"body on floor", b"others")),
         "i1",
     )
-    made.cd("/rwforc/forces/metadata")
-    made.put("ids", [1], "i4")
+    writer.cd("/rwforc/forces/metadata")
+    writer.put("ids", [1], "i4")
     for number, (time, force) in enumerate(zip(TIMES, acts, strict=True), start=1):
-        made.cd(f"/glstat/d{number:06d}")
+        writer.cd(f"/glstat/d{number:06d}")
         for name in GLSTAT:
-            made.put(name, [time if name == "time" else 1.0], "f4")
+            writer.put(name, [time if name == "time" else 1.0], "f4")
         for branch, count, values in (
             ("rcforc", 4, [0, -force, force, 0]),
             ("rwforc/forces", 1, [2 * force]),
         ):
-            made.cd(f"/{branch}/d{number:06d}")
-            made.put("time", [time], "f4")
+            writer.cd(f"/{branch}/d{number:06d}")
+            writer.put("time", [time], "f4")
             for axis in "xyz":
-                made.put(
+                writer.put(
                     f"{axis}_force", values if axis == "z" else [0.0] * count, "f4"
                 )
-        made.cd(f"/rwforc/transducer/d{number:06d}")
-        made.put("time", [time], "f4")
-    return bytes(made.data)
+        writer.cd(f"/rwforc/transducer/d{number:06d}")
+        writer.put("time", [time], "f4")
+    return bytes(writer.data)
 
 
 def test_a_binout_has_them_in_its_branches(tmp_path: Path) -> None:
@@ -196,15 +198,15 @@ def test_a_binout_of_forces_alone_counts_beside_others(tmp_path: Path) -> None:
 def t01(groups: Sequence[MadeGroup], values: Samples) -> bytes:
     """States whose groups have these values (n, members, 6) each."""
     parts = (MadePart(3, "box", (1,)),)
-    made: T01Writer = headed(parts, globals_=12, groups=groups)
+    writer: T01Writer = headed(parts, globals_=12, groups=groups)
     for time, of_groups in zip(TIMES.tolist(), values.tolist(), strict=True):
-        made.state(
+        writer.state(
             time,
             [1 + time] * 12,
             [1 + time],
             groups=[np.ravel(members).tolist() for members in of_groups],
         )
-    return bytes(made.data)
+    return bytes(writer.data)
 
 
 def test_a_t01_has_impulses_which_stay_where_no_force_acts(tmp_path: Path) -> None:
@@ -234,10 +236,10 @@ def test_a_group_of_other_things_has_no_forces(tmp_path: Path) -> None:
         MadeGroup(101, {1: "floor"}, variables=(7, 8)),
     ]
     values = np.zeros((TIMES.size, 1, 6))
-    made = headed((MadePart(3, "box", (1,)),), globals_=12, groups=groups)
+    writer = headed((MadePart(3, "box", (1,)),), globals_=12, groups=groups)
     for time in TIMES.tolist():
-        made.state(time, [1 + time] * 12, [1 + time], groups=[[0.0] * 6, [0.0] * 2])
-    run = open_run(put(tmp_path, runT01=bytes(made.data)))
+        writer.state(time, [1 + time] * 12, [1 + time], groups=[[0.0] * 6, [0.0] * 2])
+    run = open_run(put(tmp_path, runT01=bytes(writer.data)))
     assert run.contact_forces == ()
     assert run.databases[0].time.size == len(values)
 
@@ -303,9 +305,16 @@ def test_round_off_is_no_force() -> None:
 
 def test_info_lists_them(tmp_path: Path) -> None:
     names = put(tmp_path, glstat=ENERGY, rwforc=rwforc())
-    found = survey(open_run(names), Selection())
-    told = [value for name, value in overview.facts(found) if name == "contact force"]
-    assert told == ["rigid wall 1 never acts", "rigid wall 2 acts from 0.875 to 2.125"]
+    survey_of_run = survey(open_run(names), Selection())
+    lines_on_forces = [
+        value
+        for name, value in overview.facts(survey_of_run)
+        if name == "contact force"
+    ]
+    assert lines_on_forces == [
+        "rigid wall 1 never acts",
+        "rigid wall 2 acts from 0.875 to 2.125",
+    ]
     assert answer("info", *names)["contact_forces"] == [
         {"name": "rigid wall 1", "acts": []},
         {"name": "rigid wall 2", "acts": [{"start": 0.875, "end": 2.125}]},

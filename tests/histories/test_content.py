@@ -62,58 +62,60 @@ def test_bytes_on_a_disk_are_those_in_memory(
     size: int,
 ) -> None:
     file = put(tmp_path_factory.getbasetemp() / "bytes", data)
-    held, there = Content(data), on_disk(file)
+    held, disk_content = Content(data), on_disk(file)
     addresses = np.array(
         [place % (len(data) - width + 1) for place in places], dtype=np.int64
     )
     assert (
-        there.fields(addresses, width).tolist()
+        disk_content.fields(addresses, width).tolist()
         == held.fields(addresses, width).tolist()
     )
-    assert (len(there), bytes(there), there[begin:size]) == (
+    assert (len(disk_content), bytes(disk_content), disk_content[begin:size]) == (
         len(held),
         data,
         held[begin:size],
     )
-    assert there.view(0, len(data)).tobytes() == data
-    assert there.find(data[-5:], len(data) // 3) == data.find(data[-5:], len(data) // 3)
-    assert there.find(b"not there") == -1
+    assert disk_content.view(0, len(data)).tobytes() == data
+    assert disk_content.find(data[-5:], len(data) // 3) == data.find(
+        data[-5:], len(data) // 3
+    )
+    assert disk_content.find(b"not there") == -1
     for begin in (0, size // 3):
         assert (
-            there.rfind(data[:1], begin, size)
+            disk_content.rfind(data[:1], begin, size)
             == held.rfind(data[:1], begin, size)
             == data.rfind(data[:1], begin, size)
         )
-    assert there.rfind(data[:1], 0, 0) == -1
-    assert there.sha256() == hashlib.sha256(data).hexdigest()
+    assert disk_content.rfind(data[:1], 0, 0) == -1
+    assert disk_content.sha256() == hashlib.sha256(data).hexdigest()
 
 
 def test_threads_that_read_one_file_together_get_each_what_it_asks_for(
     tmp_path: Path,
 ) -> None:
     data = np.random.default_rng(5).bytes(2000)
-    there = on_disk(put(tmp_path / "bytes", data))
-    places = np.arange(0, 1960, 40)
+    disk_content = on_disk(put(tmp_path / "bytes", data))
+    starts = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:
-        """How many readings of another length by each thread differ from the data."""
+        """Count, for each thread, the readings that differ from the data."""
         found = [
-            there[at : at + 7 * step] == data[at : at + 7 * step]
+            disk_content[at : at + 7 * step] == data[at : at + 7 * step]
             for at in range(0, 1900, 9)
         ]
-        fields = there.fields(places, step).tobytes() == b"".join(
-            data[at : at + step] for at in places.tolist()
+        fields = disk_content.fields(starts, step).tobytes() == b"".join(
+            data[at : at + step] for at in starts.tolist()
         )
         return found.count(False) + (not fields)
 
-    before = sys.getswitchinterval()
+    switch_interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     try:
         with ThreadPoolExecutor(4) as threads:
             assert not any(threads.map(wrong, range(1, 31)))
     finally:
-        sys.setswitchinterval(before)
-    there.check()
+        sys.setswitchinterval(switch_interval)
+    disk_content.check()
 
 
 @pytest.mark.parametrize("kind", CONTENTS)
@@ -121,27 +123,27 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(
     kind: str, tmp_path: Path
 ) -> None:
     file = put(tmp_path / "run", CONTENTS[kind])
-    held, there = run_of_file(file), run_on_disk(file)
-    assert (held.notes, held.parts) == (there.notes, there.parts)
-    for found, expected in zip(there.databases, held.databases, strict=True):
-        assert found.channels == expected.channels
+    held, disk_run = run_of_file(file), run_on_disk(file)
+    assert (held.notes, held.parts) == (disk_run.notes, disk_run.parts)
+    for database, expected in zip(disk_run.databases, held.databases, strict=True):
+        assert database.channels == expected.channels
         for name in expected.channels:
-            assert found.channel(name).tolist() == expected.channel(name).tolist()
+            assert database.channel(name).tolist() == expected.channel(name).tolist()
         ids = [part.id for part in expected.parts]
         for wanted in (ids, ids[::-1]) if ids else ():
             columns = [
                 one.part_channel("internal_energy", wanted).tolist()
-                for one in (found, expected)
+                for one in (database, expected)
             ]
             assert columns[0] == columns[1]
-    assert there.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
+    assert disk_run.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
 
 
 def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
     file = put(tmp_path / "glstat", ONE)
     run = run_on_disk(file)
-    with file.open("ab") as more:
-        more.write(OTHER)
+    with file.open("ab") as appending:
+        appending.write(OTHER)
     history = run.history(Selection())
     assert history.energy.tolist() == (1000.0 + STATES).tolist()
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
@@ -203,18 +205,20 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(
 def test_a_write_under_way_is_no_file_written_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The system shows the time of a write before its size."""
+    """The system updates the time of a file before its size."""
     file = put(tmp_path / "glstat", ONE)
-    there = on_disk(file)
+    disk_content = on_disk(file)
     os.utime(file)
     monkeypatch.setattr(time, "sleep", lambda _: file.write_bytes(ONE + b" "))
-    there.check()
-    assert bytes(there) == ONE
+    disk_content.check()
+    assert bytes(disk_content) == ONE
 
 
 @pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
 @pytest.mark.slow
-@pytest.mark.usefixtures("new_files")  # of one that looks old no half can be told
+@pytest.mark.usefixtures(
+    "new_files"
+)  # if a file looks old, half of a write cannot be detected
 @OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
     opened: Callable[[Path], Run],
@@ -224,13 +228,13 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 ) -> None:
     monkeypatch.setattr(
         time, "sleep", sleep
-    )  # shorter pauses end before a write does that a busy machine holds up
+    )  # shorter pauses would end before a write that a busy machine delays
     file, done = tmp_path / "run", Event()
-    one, other = contents
-    file.write_bytes(one)
+    first_content, second_content = contents
+    file.write_bytes(first_content)
 
     def write() -> None:
-        for data in cycle((other, one)):
+        for data in cycle((second_content, first_content)):
             with file.open("r+b", buffering=0) as target:
                 target.write(data)
             if done.wait(0.0005):
@@ -322,7 +326,7 @@ def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(
 def fixed_times(
     monkeypatch: pytest.MonkeyPatch, modified: int, changed: int
 ) -> list[float]:
-    """Let files have these times for ever [ns before now]; the pauses that are made."""
+    """Give files constant times [ns before now]; return the list of pauses that are made."""
     pauses: list[float] = []
     now, fstat = time.time_ns(), os.fstat
 

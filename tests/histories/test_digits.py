@@ -1,4 +1,4 @@
-"""Times as they are read and typed again."""
+"""Times as a user reads and types them."""
 
 from hypothesis import example, given, strategies as st
 

@@ -1,4 +1,4 @@
-"""What a history refuses, and what it tells of one time is what it tells of many."""
+"""What a history refuses; energies at many times are those at each time alone."""
 
 import pickle
 
@@ -27,10 +27,10 @@ def read_only(values: Samples) -> Samples:
 def test_what_could_change_is_copied() -> None:
     energy = np.array([1.0, 3.0, 2.0, 5.0])
     for values in (energy, energy.view(), read_only(energy.view())):
-        kept = history(values).energy
+        energy_of_history = history(values).energy
         energy[0] += 1
-        assert kept[0] == energy[0] - 1
-        assert not kept.flags.writeable
+        assert energy_of_history[0] == energy[0] - 1
+        assert not energy_of_history.flags.writeable
 
 
 def test_what_cannot_change_is_not_copied_unless_it_holds_more_than_itself() -> None:
@@ -48,10 +48,10 @@ def test_what_cannot_change_is_not_copied_unless_it_holds_more_than_itself() -> 
 def test_many_energies_are_those_of_single_times(
     energy: list[float], shares: list[float]
 ) -> None:
-    found = history(energy, np.arange(len(energy)) * 0.5)
-    times = np.array([*shares, 0.0, 1.0]) * found.time[-1]
-    assert found.energies_at(times).tolist() == pytest.approx(
-        [found.energy_at(t) for t in times.tolist()]
+    record = history(energy, np.arange(len(energy)) * 0.5)
+    times = np.array([*shares, 0.0, 1.0]) * record.time[-1]
+    assert record.energies_at(times).tolist() == pytest.approx(
+        [record.energy_at(t) for t in times.tolist()]
     )
 
 
@@ -71,19 +71,19 @@ def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(
 ) -> None:
     rng = np.random.default_rng(3)
     time, energy = np.cumsum(rng.uniform(0.1, 1, states)), rng.normal(size=states)
-    found = history(energy, time)
+    record = history(energy, time)
     for t in (*time, *rng.uniform(time[0], time[-1], 20)):
-        assert found.energy_at(float(t)) == np.interp(t, time, energy)
+        assert record.energy_at(float(t)) == np.interp(t, time, energy)
     for outside in (time[0] - 0.01, time[-1] + 0.01):
         with pytest.raises(RangeError, match="lies outside the record"):
-            found.energy_at(float(outside))
+            record.energy_at(float(outside))
 
 
 def test_what_was_found_in_a_record_is_made_once_and_stays_behind_when_it_goes_to_another_process() -> (
     None
 ):
-    record, made = history(np.ones(3)), iter((1, 2))
-    assert [record.known.once("one", lambda: next(made)) for _ in range(2)] == [1, 1]
+    record, numbers = history(np.ones(3)), iter((1, 2))
+    assert [record.known.once("one", lambda: next(numbers)) for _ in range(2)] == [1, 1]
     record.known.once("not for other processes", lambda: lambda: None)
     sent = pickle.loads(pickle.dumps(record))
-    assert sent.known.once("one", lambda: next(made)) == 2
+    assert sent.known.once("one", lambda: next(numbers)) == 2

@@ -17,7 +17,7 @@ ENERGIES = {
 }
 
 
-def read(
+def read_table(
     rows: list[str], head: str = "time,part_id,part_name,internal_energy"
 ) -> History:
     return history_of(csv_table, "\n".join([head, *rows, ""]), name="table")
@@ -37,7 +37,7 @@ def test_a_row_for_each_time_and_part_is_refused_with_the_column_that_tells(
     parts: int,
 ) -> None:
     with pytest.raises(FormatError) as error:
-        read(rows_by_time(parts))
+        read_table(rows_by_time(parts))
     reason = f"each time stands {parts} times with different energies, .*column 'part_id' tells the parts apart"
     assert error.match(reason)
     assert "sort" not in str(error.value)
@@ -49,7 +49,7 @@ def test_sorted_by_part_it_is_refused_without_the_advice_to_sort() -> None:
         FormatError,
         match="another curve or part begins here: put each into its own file",
     ) as error:
-        read(rows)
+        read_table(rows)
     assert "sort" not in str(error.value)
 
 
@@ -58,7 +58,7 @@ def test_without_a_column_that_tells_the_jumps_of_the_energy_do() -> None:
     with pytest.raises(
         FormatError, match="each time stands 3 times with different energies"
     ):
-        read(rows, "time,internal_energy")
+        read_table(rows, "time,internal_energy")
 
 
 def test_parts_that_come_and_go_are_refused_too() -> None:
@@ -66,11 +66,11 @@ def test_parts_that_come_and_go_are_refused_too() -> None:
         row for row in rows_by_time() if not (row.startswith("0.2") and "frame" in row)
     ]
     with pytest.raises(FormatError, match="each time stands 3 times"):
-        read(rows)
+        read_table(rows)
 
 
 def test_the_rows_of_one_part_are_read() -> None:
-    history = read([row for row in rows_by_time() if "cabin" in row])
+    history = read_table([row for row in rows_by_time() if "cabin" in row])
     np.testing.assert_allclose(history.energy, ENERGIES["cabin"], atol=1e-3)
 
 
@@ -85,14 +85,14 @@ def test_coarsely_printed_times_of_one_energy_are_read(rows: int, noise: float) 
         f"{np.floor(time * 100) / 100:.2f},{energy:.6g}"
         for time, energy in zip(times, energies, strict=True)
     ]
-    history = read(printed, "time,internal_energy")
+    history = read_table(printed, "time,internal_energy")
     assert history.time.size == 40
     assert "have the same printed time" in " ".join(history.notes)
 
 
 def test_rows_that_stand_twice_are_read() -> None:
     rows = [row for row in rows_by_time(1) for _ in range(2)]
-    assert read(rows).time.size == TIMES.size
+    assert read_table(rows).time.size == TIMES.size
 
 
 def test_hdf5_is_refused_in_the_same_way() -> None:

@@ -1,4 +1,4 @@
-"""What solvers print beside the histories: the engine, what a run took, the smallest steps."""
+"""Listings next to the histories: the engine, the CPU time of a run, the smallest time steps."""
 
 from pathlib import Path
 
@@ -38,7 +38,9 @@ def listing(owner: str = "2026 Siemens", tag: str = "", ran: str = "2026/11/22")
     ) + TAIL.format(ran=ran)
 
 
-def told(folder: Path, text: str, leg: int = 2, history: str = "") -> list[str]:
+def find_wrong_listings(
+    folder: Path, text: str, leg: int = 2, history: str = ""
+) -> list[str]:
     (folder / f"CAR_{leg:04d}.out").write_text(text)
     return list(wrong_energies([str(folder / (history or f"CART{leg:02d}"))]))
 
@@ -62,18 +64,21 @@ BEFORE, FIX, AFTER = (
             "built in 2022",
         ),
         (listing("1986-2026 Altair Engineering, Inc.", BEFORE), "commit 6068aa23d"),
-        (listing(tag=FIX), "commit 2b7ab50b7"),  # with the regression of the fix
+        (
+            listing(tag=FIX),
+            "commit 2b7ab50b7",
+        ),  # the first fix, which had an error of its own
         (listing(ran="2026/01/12"), "run on 2026-01-12"),
         (listing(ran="2026/01/13"), ""),
         (listing(tag=AFTER), ""),
         (listing(tag="bd4557ba7"), ""),
-        (listing(), ""),  # a build of 2026 that names no commit
+        (listing(), ""),  # a build of 2026 without the name of its commit
         (
             listing("1986-2025 Altair Engineering, Inc.").replace(
                 "OpenRadioss", "Radioss"
             ),
             "",
-        ),  # not known of others
+        ),  # other programs: nothing is known of this error
         (
             listing("1986-2025 Altair Engineering, Inc.").replace(
                 "SET ON", "LOCAL SKEW"
@@ -86,18 +91,25 @@ BEFORE, FIX, AFTER = (
 def test_an_engine_from_before_the_fix_is_told(
     tmp_path: Path, text: str, why: str
 ) -> None:
-    assert told(tmp_path, text) == (
+    assert find_wrong_listings(tmp_path, text) == (
         [f"{tmp_path / 'CAR_0002.out'}: {why}"] if why else []
     )
 
 
 def test_the_first_leg_is_no_restart(tmp_path: Path) -> None:
-    assert told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), leg=1) == []
+    assert (
+        find_wrong_listings(
+            tmp_path, listing("1986-2025 Altair Engineering, Inc."), leg=1
+        )
+        == []
+    )
 
 
 @pytest.mark.parametrize("name", ["CART02.gz", "CART02.csv", "CART02"])
 def test_the_listing_lies_beside_the_history(tmp_path: Path, name: str) -> None:
-    assert told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name)
+    assert find_wrong_listings(
+        tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,16 +117,18 @@ def test_the_listing_lies_beside_the_history(tmp_path: Path, name: str) -> None:
 )
 def test_a_history_without_a_listing_tells_nothing(tmp_path: Path, name: str) -> None:
     assert (
-        told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name)
+        find_wrong_listings(
+            tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name
+        )
         == []
     )
 
 
 def test_the_middle_of_a_long_listing_is_not_read(tmp_path: Path) -> None:
     head, tail = listing(ran="2025/06/01").split("\n EXECUTION", 1)
-    assert told(tmp_path, f"{head}\n{' ' * 3_000_000}\n EXECUTION{tail}") == [
-        f"{tmp_path / 'CAR_0002.out'}: run on 2025-06-01"
-    ]
+    assert find_wrong_listings(
+        tmp_path, f"{head}\n{' ' * 3_000_000}\n EXECUTION{tail}"
+    ) == [f"{tmp_path / 'CAR_0002.out'}: run on 2025-06-01"]
 
 
 D3HSP = """
@@ -145,7 +159,7 @@ D3HSP = """
 def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothing(
     tmp_path: Path, elements: str, total: str, found: tuple[float, float]
 ) -> None:
-    """What came before the run does not count."""
+    """Time before the run is not included."""
     timing = read_timing(str(put(tmp_path / "d3hsp", D3HSP.format(elements, total))))
     assert timing.cycles == 640
     assert (timing.total, timing.elements) == pytest.approx(found)
@@ -153,8 +167,8 @@ def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothi
 
 def test_smallest_steps_of_a_d3hsp_are_found_beside_the_deck(tmp_path: Path) -> None:
     (tmp_path / "d3hsp").write_text(D3HSP)
-    found = printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))
-    assert (found[7], found[101]) == ((5e-5, "d3hsp"), (8e-5, "d3hsp"))
+    steps = printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))
+    assert (steps[7], steps[101]) == ((5e-5, "d3hsp"), (8e-5, "d3hsp"))
 
 
 def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) -> None:
@@ -170,9 +184,9 @@ def test_times_per_zone_cycle_of_a_glstat(tmp_path: Path) -> None:
     text = glstat_text([0.0, 0.5], [1.0, 2.0]).replace(
         b"(nanosec)..             0", b"(nanosec)..          5134"
     )
-    found = read_zone_times(str(put(tmp_path / "glstat", text)))
-    assert found.time.tolist() == [0.0, 0.5]
-    assert found.per_zone == pytest.approx(5134e-9)
+    zone_times = read_zone_times(str(put(tmp_path / "glstat", text)))
+    assert zone_times.time.tolist() == [0.0, 0.5]
+    assert zone_times.per_zone == pytest.approx(5134e-9)
 
 
 def test_files_that_say_nothing_are_refused(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Quantities by their names: spellings of solvers, postprocessors and colleagues, in tables and in HDF5."""
+"""Quantities by their names: spellings of solvers, postprocessors and users, in tables and in HDF5."""
 
 from collections.abc import Callable
 
@@ -142,7 +142,7 @@ def test_a_name_without_addition_is_preferred() -> None:
     ) == [1]
     assert find_internal_energies(
         ["box IE", "IE_total", "dissipated internal energy"]
-    ) == [0, 1]  # to be chosen
+    ) == [0, 1]  # both are candidates, so the user has to choose
     assert find_quantities(["kinetic_energy", "total_kinetic_energy"]) == {
         "kinetic_energy": ["kinetic_energy"]
     }
@@ -178,7 +178,7 @@ COLUMNS = {
 }
 
 
-def table(*names: str) -> str:
+def write_header_and_rows(*names: str) -> str:
     values = zip(TIME, *[2 - TIME] * len(names), strict=True)
     rows = [",".join(f"{value:.4f}" for value in row) for row in values]
     return "\n".join([",".join(["time", *names]), *rows, ""])
@@ -193,21 +193,21 @@ def notes_of(text: str, *energy: str) -> str:
 
 
 def test_what_looks_like_an_energy_and_is_not_used_is_named() -> None:
-    assert notes_of(table("IE", "KE", "z")) == ""
+    assert notes_of(write_header_and_rows("IE", "KE", "z")) == ""
     assert "'KE of the door' (kinetic_energy?) looks like an energy" in notes_of(
-        table("IE", "KE of the door")
+        write_header_and_rows("IE", "KE of the door")
     )
     assert "'ALLPD', 'ALLSE' look like energies" in notes_of(
-        table("ALLIE", "ALLPD", "ALLSE")
+        write_header_and_rows("ALLIE", "ALLPD", "ALLSE")
     )
-    both = notes_of(table("IE", "KE", "Kinetic energy"))
+    notes = notes_of(write_header_and_rows("IE", "KE", "Kinetic energy"))
     assert (
-        "'KE' (kinetic_energy?), 'Kinetic energy' (kinetic_energy?) look like" in both
+        "'KE' (kinetic_energy?), 'Kinetic energy' (kinetic_energy?) look like" in notes
     )
 
 
 def test_internal_energies_that_were_passed_over_by_name_are_not_named() -> None:
-    assert notes_of(table("door IE", "box IE", "KE"), "box IE") == ""
+    assert notes_of(write_header_and_rows("door IE", "box IE", "KE"), "box IE") == ""
 
 
 def h5md(file: h5py.File) -> None:
@@ -262,9 +262,9 @@ def test_hdf5_files_are_read_by_their_own_names(
     run = run_of(hdf5_file, written(layout).getvalue())
     history = run.history(Selection())
     np.testing.assert_array_equal((history.time, history.energy), (TIME, TIME))
-    found = run.quantities(history.time)
-    np.testing.assert_array_equal(found["kinetic_energy"], 2 - TIME)
-    np.testing.assert_array_equal(found["total_energy"], 2 + 0 * TIME)
+    quantities = run.quantities(history.time)
+    np.testing.assert_array_equal(quantities["kinetic_energy"], 2 - TIME)
+    np.testing.assert_array_equal(quantities["total_energy"], 2 + 0 * TIME)
 
 
 def test_a_quantity_at_other_times_than_the_energy_is_not_taken() -> None:

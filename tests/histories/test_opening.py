@@ -1,4 +1,4 @@
-"""Recognition by content, where the bytes come from, and the errors of both."""
+"""Formats are recognised by content; the sources of bytes; the errors of both."""
 
 import gzip
 import io
@@ -186,7 +186,7 @@ LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{E
         (
             DYNA_HEAD + LEGEND + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n",
             "a",
-            "rcforc.* of LS-DYNA, which holds",
+            "rcforc.* of LS-DYNA, which has",
         ),
         (
             DYNA_HEAD
@@ -318,12 +318,12 @@ def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(
     assert by_pattern.sources == by_folder.sources == (str(tmp_path / "matsum"),)
     notes = " ".join(by_pattern.notes)
     assert (
-        "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy"
+        "nodout was left out: this is the nodout of LS-DYNA, which has no internal energy"
         in notes
     )
     assert "a_deck.k was left out: this is a deck" in notes
     assert (
-        "energy.csv was left out: a table beside databases of the solver; name it to use it"
+        "energy.csv was left out: a table next to databases of the solver; name it to use it"
         in notes
     )
     assert "remarks.txt was left out" in notes

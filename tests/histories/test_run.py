@@ -1,4 +1,4 @@
-"""Several files as one run: families, legs, companions; what of them is taken for the energy."""
+"""Several files as one run: families, legs, companions; which energy of them is used."""
 
 from __future__ import annotations
 
@@ -36,8 +36,10 @@ GLSTAT = glstat_text(TIMES, 10 * TIMES)
 MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 
 
-def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Run:
-    """Open files of different formats, all of a format as legs."""
+def open_companions(
+    files: Mapping[str, bytes], selection: Selection | None = None
+) -> Run:
+    """Open files of different formats; the files of one format are legs."""
     legs = {
         kind: [
             Source(name, data) for name, data in files.items() if name.startswith(kind)
@@ -57,7 +59,7 @@ def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Ru
 
 
 def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() -> None:
-    """Branches lie in the files of different ranks, and one goes on in %001; the restart has a folder of its own."""
+    """Branches are in files of different MPI ranks, one continues in %001; the restart has its own folder."""
     whole, parts = made_binout(range(1, 6)), made_binout(range(1, 6), glstat=False)
     globals_only = bytes(whole.data).replace(b"matsum", b"nodout")
     files = {
@@ -81,7 +83,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         for state in range(1, 8)
     ]
     assert run.notes == (
-        "1 state has the same printed time as the next one; the last of equal times counts",
+        "1 state has the same printed time as the next one; the last of equal times is used",
     )
 
 
@@ -93,7 +95,7 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
     )
     with pytest.raises(
         FormatError,
-        match="no matsum in it, but glstat, nodout; name the binout of the run that holds it",
+        match="no matsum in it, but glstat, nodout; name the binout of the run that contains it",
     ):
         no_parts.history(Selection(parts=("3",)))
     with pytest.raises(FormatError, match="no glstat in it, but matsum, nodout"):
@@ -113,13 +115,13 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     history = history_of(glstat, *legs)
     assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
     assert (
-        "time steps back once (restart); where legs overlap the newer one counts"
+        "time steps back once (restart); if legs overlap the newer one is used"
         in history.notes[0]
     )
 
 
 def test_a_leg_that_gives_no_state_is_named() -> None:
-    """Two runs that start alike are hardly legs."""
+    """Two files that start at the same time are hardly legs of one run."""
     history = history_of(
         glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4])
     )
@@ -160,17 +162,17 @@ def test_a_column_that_a_leg_lacks_is_refused() -> None:
 
 
 def test_companions_of_other_times_are_doubted() -> None:
-    assert opened({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
+    assert open_companions({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
     coarse = matsum_text(TIMES[::2], [7, 3], np.ones((4, 2)))
-    assert opened({"glstat": GLSTAT, "matsum": coarse}).notes == ()
+    assert open_companions({"glstat": GLSTAT, "matsum": coarse}).notes == ()
     shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
-    (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
+    (note,) = open_companions({"glstat": GLSTAT, "matsum": shifted}).notes
     assert (
         note
         == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
     )
     longer = np.arange(30) * (TIMES[1] - TIMES[0]) + TIMES[0]
-    (note,) = opened(
+    (note,) = open_companions(
         {"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}
     ).notes
     assert note.startswith(
@@ -180,13 +182,13 @@ def test_companions_of_other_times_are_doubted() -> None:
         FormatError,
         match="glstat and matsum have no time in common, files of one run were expected",
     ):
-        opened(
+        open_companions(
             {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))}
         )
 
 
 def test_companions_have_legs_of_their_own() -> None:
-    run = opened(
+    run = open_companions(
         {
             "glstat1": glstat_text([1, 2], [1, 2]),
             "matsum": matsum_text([1, 2, 3], [7], [[0.5], [6.0], [7.0]]),
@@ -200,16 +202,19 @@ def test_companions_have_legs_of_their_own() -> None:
 @pytest.mark.parametrize(
     ("parts", "refused"),
     [
-        ([[1, 9], [10, 10], [5, 4]], False),  # all of it
-        ([[1, 2], [3, 4], [5, 2]], False),  # others are not written
-        ([[1, 9.9], [10, 10], [5, 4]], False),  # within what solvers round
+        ([[1, 9], [10, 10], [5, 4]], False),  # the parts are the whole model
+        ([[1, 2], [3, 4], [5, 2]], False),  # the other parts are not written
+        (
+            [[1, 9.9], [10, 10], [5, 4]],
+            False,
+        ),  # a difference within the rounding of solvers
         ([[1, 2], [9, 15], [5, 4]], True),
     ],
 )
 def test_parts_with_more_energy_than_the_model_are_of_another_run(
     parts: list[list[float]], refused: bool
 ) -> None:
-    run = opened(
+    run = open_companions(
         {
             "glstat": glstat_text([1, 2, 3], [10, 20, 9]),
             "matsum": matsum_text([1, 2, 3], [7, 3], parts),
@@ -228,22 +233,22 @@ def test_parts_with_more_energy_than_the_model_are_of_another_run(
 
 
 def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
-    """A box that falls has some 1e-18 J in its parts, and another 1e-18 J in all."""
+    """A falling box has some 1e-18 J in its parts, and another 1e-18 J as a whole."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
-    run = opened(
+    run = open_companions(
         {"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])}
     )
     assert run.history(Selection(parts=("7",))).energy.size == 3
 
 
-# What is taken for the energy.
+# The energy that is used.
 
 
 def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_preferred() -> (
     None
 ):
     data = bytes(made_binout(range(1, 9)).data)
-    run = opened({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
+    run = open_companions({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
     assert run.history(Selection()).energy[0] == values("internal_energy", 1)
     assert (
         run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
@@ -316,7 +321,7 @@ def test_what_is_not_there_is_refused_with_what_there_is(
     files: Mapping[str, bytes], selection: Selection, reason: str
 ) -> None:
     with pytest.raises(FormatError, match=reason):
-        opened(files, selection).history(selection)
+        open_companions(files, selection).history(selection)
 
 
 def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
@@ -344,7 +349,7 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
 
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
-    """No states, and curves of which none is the one that is meant."""
+    """A file without states, and curves of which none is meant."""
     empty = survey(run_of(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
         0,
@@ -368,7 +373,7 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
         "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'"
         in curves.notes[0]
     )
-    doubtful = opened(
+    doubtful = open_companions(
         {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))}
     )
     assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
@@ -406,7 +411,9 @@ def masses(path: Path) -> Samples | None:
     return open_run([str(path)], Selection()).masses
 
 
-def written(path: Path, parts: dict[int, tuple[float, float]], states: int = 4) -> Path:
+def write_matsum(
+    path: Path, parts: dict[int, tuple[float, float]], states: int = 4
+) -> Path:
     """Write a matsum of parts with momentum and velocity along y at the end, half of both in the middle, and so on."""
     text = matsum_head([*parts]).decode()
     for state in range(states):
@@ -423,15 +430,15 @@ def written(path: Path, parts: dict[int, tuple[float, float]], states: int = 4) 
 
 
 def test_of_a_matsum_they_are_momentum_over_velocity(tmp_path: Path) -> None:
-    found = masses(
-        written(
+    masses_read = masses(
+        write_matsum(
             tmp_path / "matsum",
             {1: (30.0, 2.0), 2: (-4.0, -5.0), 7: (0.0, 0.0), 9: (6.0, 0.0)},
         )
     )
-    assert found is not None
-    assert found[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
-    assert np.isnan(found[3])  # a solver that does not write the velocity
+    assert masses_read is not None
+    assert masses_read[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
+    assert np.isnan(masses_read[3])  # from a solver that does not write velocities
 
 
 def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
@@ -440,7 +447,7 @@ def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
     )
     assert masses(tmp_path / "RUNT01") == pytest.approx(
         [value(1, 3, 6), value(1, 12, 6)]
-    )  # the middle of all states
+    )  # the middle of all states is not the middle of the states with a mass
     (tmp_path / "ENERGYT01").write_bytes(
         t01(3, (MadePart(3, "box", codes=(1, 2)),)).data
     )

@@ -50,7 +50,7 @@ def test_conventions(name: str) -> None:
 
 def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
     """Crossings by a walk in rational arithmetic: the same conventions, another way."""
-    found: list[tuple[Fraction, bool]] = []
+    passages: list[tuple[Fraction, bool]] = []
     side, arrived = 0, Fraction(0)
     for i, value in enumerate(energy):
         now = (value > level) - (value < level)
@@ -60,21 +60,23 @@ def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
             continue
         if i and energy[i - 1] == level:
             if side != now:
-                found.append((arrived, now > 0))
+                passages.append((arrived, now > 0))
         elif side and side != now:
-            before = energy[i - 1]
-            found.append((i - 1 + Fraction(level - before, value - before), now > 0))
+            previous = energy[i - 1]
+            passages.append(
+                (i - 1 + Fraction(level - previous, value - previous), now > 0)
+            )
         side = now
     if side and energy[-1] == level:
-        found.append((arrived, side < 0))
-    return found
+        passages.append((arrived, side < 0))
+    return passages
 
 
 @given(energies, levels)
 def test_exact_on_piecewise_linear_data(energy: list[int], level: int) -> None:
-    found, expected = crossings(energy, level), walk(energy, level)
-    assert [rising for _, rising in found] == [rising for _, rising in expected]
-    assert [time for time, _ in found] == pytest.approx(
+    passages, expected = crossings(energy, level), walk(energy, level)
+    assert [rising for _, rising in passages] == [rising for _, rising in expected]
+    assert [time for time, _ in passages] == pytest.approx(
         [float(time) for time, _ in expected], rel=1e-15, abs=0
     )
 
@@ -102,9 +104,11 @@ def test_shifting_and_scaling_shift_and_scale_the_answer(
 
 @given(energies, levels)
 def test_crossings_alternate_and_mirror(energy: list[int], level: int) -> None:
-    found = crossings(energy, level)
-    assert all(a[1] != b[1] for a, b in pairwise(found))
-    assert [(t, not up) for t, up in crossings([-e for e in energy], -level)] == found
+    passages = crossings(energy, level)
+    assert all(a[1] != b[1] for a, b in pairwise(passages))
+    assert [
+        (t, not up) for t, up in crossings([-e for e in energy], -level)
+    ] == passages
 
 
 @given(energies)
@@ -112,9 +116,13 @@ def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
     values = np.array(energy, dtype=float)
     at, peaks = find_turns(values)
     for i, peak in zip(at.tolist(), peaks.tolist(), strict=True):
-        before = next((v for v in values[:i][::-1] if v != values[i]), values[i])
-        after = next((v for v in values[i:] if v != values[i]), values[i])
-        assert (before < values[i] > after) if peak else (before > values[i] < after)
+        previous = next((v for v in values[:i][::-1] if v != values[i]), values[i])
+        following = next((v for v in values[i:] if v != values[i]), values[i])
+        assert (
+            (previous < values[i] > following)
+            if peak
+            else (previous > values[i] < following)
+        )
     assert (peaks[1:] != peaks[:-1]).all()
     monotone = np.all(np.diff(values) >= 0) or np.all(np.diff(values) <= 0)
     assert (not at.size) == bool(monotone)
@@ -150,13 +158,13 @@ ROOTS = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=8).map(np.array)
 @pytest.mark.parametrize("with_slope", [False, True])
 @given(ROOTS)
 def test_every_bracket_narrows_on_its_root(with_slope: bool, roots: np.ndarray) -> None:
-    found = narrow(
+    narrowed = narrow(
         lambda t: roots**3 - t**3, np.zeros(roots.size), np.ones(roots.size),
         slope=(lambda t: -3 * t**2) if with_slope else None, steps=64,
     )  # fmt: skip
-    np.testing.assert_allclose(found.at, roots, rtol=1e-12)
-    assert np.all(found.within <= found.at)
-    assert np.all(found.at <= found.beyond)
+    np.testing.assert_allclose(narrowed.at, roots, rtol=1e-12)
+    assert np.all(narrowed.within <= narrowed.at)
+    assert np.all(narrowed.at <= narrowed.beyond)
 
 
 @given(ROOTS)
@@ -193,10 +201,10 @@ def test_the_first_value_above_a_limit_is_the_one_that_a_walk_meets(
 ) -> None:
     start, limit = (np.array(column) for column in zip(*asked, strict=True))
     start = np.minimum(start, len(values))
-    found = first_above(np.array(values, dtype=float), start, limit.astype(float))
-    for at, above, place in zip(
-        start.tolist(), limit.tolist(), found.tolist(), strict=True
+    indices = first_above(np.array(values, dtype=float), start, limit.astype(float))
+    for at, above, index in zip(
+        start.tolist(), limit.tolist(), indices.tolist(), strict=True
     ):
-        assert place == next(
+        assert index == next(
             (i for i in range(at, len(values)) if values[i] > above), len(values)
         )

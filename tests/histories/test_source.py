@@ -67,7 +67,7 @@ def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input
         assert history.energy.tolist() == histories[0].energy.tolist()
         assert (
             history.files[0].sha256() == hashlib.sha256(data).hexdigest()
-        )  # as it lies there
+        )  # the bytes on disk, before they are unpacked
     assert (
         read_history([str(here / "plain")], input_format=kind).energy.tolist()
         == histories[0].energy.tolist()
@@ -113,7 +113,7 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
     def write_the_second() -> None:
         with second.open(
             "wb"
-        ) as pipe:  # when it is opened for reading, the first file was read
+        ) as pipe:  # the first file was read when the second one is opened
             if change == "replaced":
                 Path("next").replace(first)
             elif change == "taken away":

@@ -1,4 +1,4 @@
-"""The rollover box: what mechanics asks of it, what switching keeps, and that it is the study's time table."""
+"""The rollover box: the laws of mechanics, what switching keeps, and the times of the published study."""
 
 from functools import cache
 
@@ -37,29 +37,33 @@ TIMES = st.integers(0, 12).map(lambda count: count / 100)
 
 
 def momenta(motion: Motion) -> tuple[complex, float]:
-    """Momentum and angular momentum about the origin, of everything."""
-    each = motion.structure.masses * motion.velocities
-    return complex(each.sum()), float(np.vdot(motion.places, each).imag)
+    """Return momentum and angular momentum about the origin of the whole model."""
+    point_momenta = motion.structure.masses * motion.velocities
+    return complex(point_momenta.sum()), float(
+        np.vdot(motion.places, point_momenta).imag
+    )
 
 
 @cache
-def known(time: float) -> Motion:
-    """A run that has come to ``time``, which is left as it is."""
+def advance_to(time: float) -> Motion:
+    """Return a motion advanced to ``time``; it is cached and must not be changed."""
     motion = (
-        known(round(time - 0.01, 2)).copy() if time > 0 else Motion(COARSE, INTERVAL)
+        advance_to(round(time - 0.01, 2)).copy()
+        if time > 0
+        else Motion(COARSE, INTERVAL)
     )
     run_to(motion, time)
     return motion
 
 
-def at(time: float) -> Motion:
-    """A run that has come to ``time``, some hundredths."""
-    return known(time).copy()
+def copy_at(time: float) -> Motion:
+    """Return a copy of a motion advanced to ``time``, a multiple of 0.01 s."""
+    return advance_to(time).copy()
 
 
 @cache
-def run_of(parameters: Parameters, *windows: RigidWindow) -> Record:
-    """A run through trip or fall, flight and landing."""
+def simulate_box(parameters: Parameters, *windows: RigidWindow) -> Record:
+    """Compute a run through trip or fall, flight and landing."""
     return simulate(
         parameters, 1.2 if parameters.drop else 0.42, *windows, interval=INTERVAL
     )
@@ -79,7 +83,7 @@ def run_of(parameters: Parameters, *windows: RigidWindow) -> Record:
 def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
     parameters: Parameters, windows: tuple[RigidWindow, ...]
 ) -> None:
-    run = run_of(parameters, *windows)
+    run = simulate_box(parameters, *windows)
     assert run.landed is not None
     assert np.abs(run.imbalance).max() < 0.01
 
@@ -95,15 +99,15 @@ FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e
 def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is_switched(
     windows: tuple[RigidWindow, ...],
 ) -> None:
-    run = run_of(FALLING, *windows)
+    run = simulate_box(FALLING, *windows)
     assert np.abs(run.imbalance).max() < 0.01
     assert len(run.landings) >= 3
     assert run.landed == pytest.approx(
         np.sqrt(2 * 0.4 / GRAVITY), rel=0.01
-    )  # damping brakes the fall a little
+    )  # damping slows the fall a little
     assert run.released is None
-    before, after = run.landings[0][1], run.landings[1][0]
-    flying = (run.time > before + INTERVAL) & (run.time < after - INTERVAL)
+    start, end = run.landings[0][1], run.landings[1][0]
+    flying = (run.time > start + INTERVAL) & (run.time < end - INTERVAL)
     assert np.ptp(run.friction_energy[flying]) == 0.0
     assert np.ptp(run.momentum.sum(axis=1).real[flying]) < 0.01 * np.ptp(
         run.momentum.sum(axis=1).imag
@@ -146,12 +150,12 @@ def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
 def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(
     tr: float,
 ) -> None:
-    motion = at(tr)
+    motion = copy_at(tr)
     motion.box.forces(motion.places)  # yields where it does at this step
-    before, energy = momenta(motion), motion.box.internal_energy(motion.places)
+    momenta_before, energy = momenta(motion), motion.box.internal_energy(motion.places)
     kinetic = float(motion.structure.masses @ np.abs(motion.velocities) ** 2) / 2
     motion.make_rigid()
-    assert momenta(motion) == pytest.approx(before, rel=1e-10, abs=1e-8)
+    assert momenta(motion) == pytest.approx(momenta_before, rel=1e-10, abs=1e-8)
     lost = kinetic - float(motion.structure.masses @ np.abs(motion.velocities) ** 2) / 2
     assert lost >= -1e-9 * kinetic
     assert motion.accounts.lost == pytest.approx(lost, abs=1e-9 * kinetic)
@@ -163,7 +167,7 @@ def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(
 def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
     tr: float, rigid: float
 ) -> None:
-    motion = at(tr)
+    motion = copy_at(tr)
     motion.make_rigid()
     frozen, pulls = (
         motion.box.internal_energy(motion.places),
@@ -172,9 +176,9 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
     turned = sure(motion.body).arms[0]
     run_to(motion, tr + rigid)
     turned = sure(motion.body).arms[0] / turned
-    before = momenta(motion)
+    momenta_before = momenta(motion)
     motion.make_deformable()
-    assert momenta(motion) == before
+    assert momenta(motion) == momenta_before
     assert motion.box.internal_energy(motion.places) == pytest.approx(
         frozen, rel=1e-9, abs=1e-12
     )
@@ -190,7 +194,7 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
 def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_else(
     tr: float,
 ) -> None:
-    motion, untouched = at(tr), at(tr)
+    motion, untouched = copy_at(tr), copy_at(tr)
     motion.make_rigid()
     motion.make_deformable()
     np.testing.assert_array_equal(motion.places, untouched.places)
@@ -215,7 +219,10 @@ def test_a_window_of_no_length_is_a_run_that_goes_on() -> None:
 
 
 def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> None:
-    whole, switched = run_of(COARSE), run_of(COARSE, RigidWindow(0.14, 0.42))
+    whole, switched = (
+        simulate_box(COARSE),
+        simulate_box(COARSE, RigidWindow(0.14, 0.42)),
+    )
     rigid = switched.time > 0.14
     assert np.ptp(switched.internal_energy[rigid, BOX]) < 1e-9
     structure = build(COARSE)
@@ -234,33 +241,33 @@ def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(
     shaken = structure.places + 1e-4 * np.random.default_rng(seed).normal(
         size=structure.places.size
     )
-    here, there = (Bars(structure.box, structure.places.size) for _ in range(2))
+    bars, turned_bars = (Bars(structure.box, structure.places.size) for _ in range(2))
     turn = np.exp(1j * angle)
-    forces, turned = here.forces(shaken), there.forces(shaken * turn + 3)
+    forces, turned = bars.forces(shaken), turned_bars.forces(shaken * turn + 3)
     scale = np.abs(forces).max()
     np.testing.assert_allclose(turned, forces * turn, atol=1e-6 * scale)
     assert abs(forces.sum()) < 1e-9 * scale
     assert abs(np.vdot(shaken, forces).imag) < 1e-9 * scale
-    assert there.internal_energy(shaken * turn + 3) == pytest.approx(
-        here.internal_energy(shaken), rel=1e-6
+    assert turned_bars.internal_energy(shaken * turn + 3) == pytest.approx(
+        bars.internal_energy(shaken), rel=1e-6
     )
 
 
 def test_forces_are_the_slope_of_the_elastic_energy() -> None:
     structure = build(Parameters(mesh=4, yield_strain=1.0))
     bars = Bars(structure.box, structure.places.size)
-    places = structure.places + 1e-3 * np.random.default_rng(1).normal(
+    points = structure.places + 1e-3 * np.random.default_rng(1).normal(
         size=structure.places.size
     )
-    forces = bars.forces(places)
+    forces = bars.forces(points)
     for point in (0, 7, 20):
-        for way in (1e-6, 1e-6j):
-            moved, back = places.copy(), places.copy()
-            moved[point] += way
-            back[point] -= way
+        for step in (1e-6, 1e-6j):
+            moved, back = points.copy(), points.copy()
+            moved[point] += step
+            back[point] -= step
             slope = (bars.internal_energy(moved) - bars.internal_energy(back)) / 2e-6
             assert slope == pytest.approx(
-                -(forces[point] * np.conj(way)).real / 1e-6, rel=1e-5
+                -(forces[point] * np.conj(step)).real / 1e-6, rel=1e-5
             )
 
 
@@ -286,14 +293,14 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
     count = structure.places.size
     stiffness = np.zeros((2 * count, 2 * count))
     for truss in (structure.box, structure.step):
-        for (one, other), rigidity in zip(truss.ends, truss.stiffness, strict=True):
-            along = structure.places[other] - structure.places[one]
+        for (first, second), rigidity in zip(truss.ends, truss.stiffness, strict=True):
+            along = structure.places[second] - structure.places[first]
             row = np.zeros(2 * count)
-            row[[2 * other, 2 * other + 1]] = (
+            row[[2 * second, 2 * second + 1]] = (
                 along.real / abs(along),
                 along.imag / abs(along),
             )
-            row[[2 * one, 2 * one + 1]] = -row[[2 * other, 2 * other + 1]]
+            row[[2 * first, 2 * first + 1]] = -row[[2 * second, 2 * second + 1]]
             stiffness += rigidity * np.outer(row, row)
     masses = np.repeat(structure.masses, 2)
     fastest = np.sqrt(
@@ -306,16 +313,16 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
 
 
 def test_a_body_without_forces_moves_and_turns_evenly() -> None:
-    masses, places = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
+    masses, points = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
     body = RigidBody(
-        masses, places, np.asarray(2.0 + 1j * 3.0 * (places - 0.5), dtype=np.complex128)
+        masses, points, np.asarray(2.0 + 1j * 3.0 * (points - 0.5), dtype=np.complex128)
     )
     spin, velocity, centre = body.spin, body.velocity, body.centre
     for _ in range(100):
         body.push(np.zeros(3, dtype=complex), 0.0, 0.01)
         body.move(0.01)
     assert (body.spin, body.velocity) == (spin, velocity)
-    expected = centre + velocity + (places - centre) * np.exp(1j * spin)
+    expected = centre + velocity + (points - centre) * np.exp(1j * spin)
     np.testing.assert_allclose(body.places, expected, atol=1e-12)
 
 
@@ -326,12 +333,12 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
         contact = Contact(
             structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0)
         )
-        places = structure.places + 1j * (level - depth)
+        points = structure.places + 1j * (level - depth)
         push = sure(
             contact.push(
                 1.0,
-                places - 1.0 + p.speed * p.braking / 2,
-                np.full(places.size, 2.0 + 0j),
+                points - 1.0 + p.speed * p.braking / 2,
+                np.full(points.size, 2.0 + 0j),
             )
         )
         normal = push.forces.imag
@@ -346,10 +353,12 @@ def test_the_cushion_is_crushed_for_good_at_its_force_until_it_is_solid() -> Non
     p = Parameters(tilt=0.0, mesh=4, friction=0.0)
     structure = build(p)
     contact = Contact(structure, p)
-    rest = structure.places + p.speed * p.braking / 2 + 0.01j
+    undeformed = structure.places + p.speed * p.braking / 2 + 0.01j
 
     def against(way: float) -> float:
-        push = contact.push(1.0, rest + way, np.zeros(rest.size, dtype=complex))
+        push = contact.push(
+            1.0, undeformed + way, np.zeros(undeformed.size, dtype=complex)
+        )
         return -push.forces[structure.toes[0]].real if push else 0.0
 
     forces = [against(way) for way in (0.02, 0.06, 0.1, 0.3 * p.cushion_depth)]
@@ -359,7 +368,7 @@ def test_the_cushion_is_crushed_for_good_at_its_force_until_it_is_solid() -> Non
 
 
 def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
-    motion, awake = at(0.1), at(0.1)
+    motion, awake = copy_at(0.1), copy_at(0.1)
     for _ in range(motion.step_at(0.32)):
         awake.contact._sleeps_until = 0.0
         for run in (motion, awake):
@@ -370,9 +379,10 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 
 @pytest.mark.slow
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
-    reference, times, td = run_of(COARSE), [0.02, 0.15], 0.36
+    reference, times, td = simulate_box(COARSE), [0.02, 0.15], 0.36
     alone = [
-        compare(reference, run_of(COARSE, RigidWindow(tr, td)), tr, td) for tr in times
+        compare(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
+        for tr in times
     ]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
     assert list(scan(COARSE, reference, times, td, jobs=2)) == alone
@@ -380,7 +390,7 @@ def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> 
 
 
 def test_a_run_goes_on_from_a_copy_as_it_would_have() -> None:
-    motion = at(0.08)
+    motion = copy_at(0.08)
     twin = motion.copy()
     assert proceed(twin, 0.12).roll.tolist() == proceed(motion, 0.12).roll.tolist()
 
@@ -396,14 +406,14 @@ def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
 
 
 def test_what_is_no_model_or_no_window_is_refused() -> None:
-    for wrong in (
+    for values in (
         {"mesh": 3},
         {"stiffness": 0.0},
         {"speed": float("nan")},
         {"friction": -0.1},
     ):
-        with pytest.raises(RangeError, match=next(iter(wrong))):
-            Parameters(**wrong)
+        with pytest.raises(RangeError, match=next(iter(values))):
+            Parameters(**values)
     for refused, why in (
         (lambda: simulate(Parameters(stiffness=1e12), 100), "softer bars"),
         (lambda: RigidWindow(0.2, 0.1), "must be in this order"),
@@ -421,13 +431,13 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
 
 @pytest.mark.slow
 def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
-    """It yields when it hits the ground; up to there the run is the same to the last digit."""
+    """The roof yields when it hits the ground; until then the run is the same to the last digit."""
     base, weak = (
         simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7)
     )
-    before = base.time < sure(base.landed)
+    before_landing = base.time < sure(base.landed)
     np.testing.assert_array_equal(
-        weak.internal_energy[before], base.internal_energy[before]
+        weak.internal_energy[before_landing], base.internal_energy[before_landing]
     )
     assert np.abs(weak.internal_energy - base.internal_energy).max() > 1.0
     with pytest.raises(RangeError, match="roof_strength is 0"):

@@ -1,4 +1,4 @@
-"""The tool on twenty-one structures of many modes: what it recommends, against what happens at every tr."""
+"""The recommendations for twenty-one structures of many modes, compared with a scan over tr."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from tests.energies import sure
 from tests.faults import some
 from tests.rehearsals import SETS, rehearse
 
-# The suite takes coarse boxes; tests/benchmarks/rollover.py runs the sets as they are.
+# The suite uses coarse boxes; tests/benchmarks/rollover.py runs the original sets.
 MESH, INTERVAL, EVERY = 4, 3e-4, 18
 
 
@@ -22,11 +22,13 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     number: int, tmp_path: Path
 ) -> None:
     coarse = replace(SETS[number], mesh=MESH)
-    found = rehearse(coarse, tmp_path, every=EVERY, interval=INTERVAL)
-    assert found.flight[2] == "momentum"
-    assert found.roll_share < 0.1
-    assert abs(found.energy_off) < 0.25
-    pair = sure(suggest(history_of(found.reference), found.td, Settings()).recommended)
+    rehearsal = rehearse(coarse, tmp_path, every=EVERY, interval=INTERVAL)
+    assert rehearsal.flight[2] == "momentum"
+    assert rehearsal.roll_share < 0.1
+    assert abs(rehearsal.energy_off) < 0.25
+    pair = sure(
+        suggest(history_of(rehearsal.reference), rehearsal.td, Settings()).recommended
+    )
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
-    released = sure(found.reference.released)
-    assert min(pair.tr, sure(found.tr)) >= released - INTERVAL
+    released = sure(rehearsal.reference.released)
+    assert min(pair.tr, sure(rehearsal.tr)) >= released - INTERVAL

@@ -9,7 +9,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.choice.question import Settings
 from d2rpick.choice.sets_of_parts import parts_of
 from d2rpick.histories.opening import Selection, open_run
-from tests.histories.formats.test_binout import opened
+from tests.histories.formats.test_binout import open_binout
 from tests.real.files import content, real, rows_of
 
 R7 = "lasso-python__sph_models-R7_1_2-binout"
@@ -24,7 +24,7 @@ NUMBERS = rows_of("numbers_of_lasso")
 
 @pytest.mark.parametrize("file", [R7, R12, ANSYS, PLADE])
 def test_real_files_have_the_numbers_of_lasso(file: str) -> None:
-    run = opened(content(file))
+    run = open_binout(content(file))
     assert run.complete
     assert not run.notes
     rows = [row for row in NUMBERS if row["file"] == file]
@@ -46,7 +46,7 @@ def test_real_files_have_the_numbers_of_lasso(file: str) -> None:
 @pytest.mark.parametrize("file", [R7, R12, ANSYS])
 def test_real_glstat_prints_as_the_solvers_own_converter_printed_it(file: str) -> None:
     text = content(f"{file}.l2a-glstat").decode("latin-1")
-    run = opened(content(file))
+    run = open_binout(content(file))
     for label, column in (
         ("time..", run.time),
         ("internal energy..", run.channel("internal_energy")),
@@ -59,7 +59,7 @@ def test_real_glstat_prints_as_the_solvers_own_converter_printed_it(file: str) -
 
 def test_titles_belong_to_ids_not_to_places() -> None:
     """R7 lists legend_ids 101, 1 beside ids 1, 101; only part 1 has a title (l2a, d3hsp)."""
-    run = opened(content(R7))
+    run = open_binout(content(R7))
     assert [(part.id, part.title) for part in run.parts] == [
         (1, "null shells for visualization"),
         (101, ""),
@@ -67,15 +67,15 @@ def test_titles_belong_to_ids_not_to_places() -> None:
 
 
 def test_a_branch_that_is_missing_is_named_with_those_there_are() -> None:
-    run = opened(content(ANSYS))
+    run = open_binout(content(ANSYS))
     with pytest.raises(FormatError, match="no matsum in it, but glstat, rwforc;"):
         _ = run.part_time
 
 
 def test_half_a_real_file_keeps_the_states_of_that_half() -> None:
     whole = content(R7)
-    half = opened(whole[: len(whole) // 2])
-    assert half.time.tolist() == opened(whole).time[:44].tolist()
+    half = open_binout(whole[: len(whole) // 2])
+    assert half.time.tolist() == open_binout(whole).time[:44].tolist()
     assert not half.complete
 
 

@@ -15,7 +15,7 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna_inventory, read_inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.rules import Checked, check_deck
-from tests.deck.test_ls_dyna_inventory import counted
+from tests.deck.test_ls_dyna_inventory import count_elements
 from tests.real.files import real
 
 FOUND: dict[str, dict[str, int]] = {
@@ -157,6 +157,6 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
 
 def test_a_real_deck_is_counted() -> None:
     found = read_inventory(real("radioss-decks/IDEL8_0000.rad"))
-    assert counted(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}
+    assert count_elements(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}
     assert not found.complete  # one of its includes is absent
     assert not found.parts[1].section.turns

@@ -12,7 +12,7 @@ from d2rpick.report import findings as report, formats
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, automatic
-from tests.deck.test_radioss_run import place
+from tests.deck.test_radioss_run import write_run
 from tests.decks import write
 from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
 
@@ -60,7 +60,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
-    deck = place(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
+    deck = write_run(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
     lines = written("table", [check_deck(deck)], tmp_path).split("\n")
     assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 

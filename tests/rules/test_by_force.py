@@ -1,4 +1,4 @@
-"""Switches by force in a history with momenta: when, how often, and whether their windows are good."""
+"""Force switches in a history with momenta: their times, their number, and the verdict on their windows."""
 
 import re
 from pathlib import Path
@@ -19,36 +19,36 @@ LANDING = ("--drop", "0.4", "--mesh", "6", "--dt", "5e-4")
 
 @pytest.fixture(scope="module")
 def bounces(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A box that falls and bounces twice: momenta of box (part 1) and step."""
+    """Write the history of a box that falls and bounces twice: momenta of the box (part 1) and the sill."""
     path = str(tmp_path_factory.mktemp("drop") / "drop.matsum")
     assert run("rollover", *LANDING, "-o", path).exit_code == 0
     return path
 
 
-def pair(more: str = "") -> str:
+def write_pair(further_cards: str = "") -> str:
     """Write a deck with a pair of sets that act by a force, to the end of the history."""
     return (
         RULES["D2R208"]
         .failing[0]
         .deck.replace("       0.7", "       1.2", 1)
-        .replace("*END", f"{more}*END")
+        .replace("*END", f"{further_cards}*END")
     )
 
 
-def windows(found: dict[str, object]) -> list[tuple[float, float | None]]:
-    listed: list[dict[str, float]] = found["windows"]  # type: ignore[assignment]
-    return [(one["tr"], one["td"]) for one in listed]
+def list_windows(report: dict[str, object]) -> list[tuple[float, float | None]]:
+    listed: list[dict[str, float]] = report["windows"]  # type: ignore[assignment]
+    return [(window["tr"], window["td"]) for window in listed]
 
 
 def test_a_pair_is_followed_through_the_contacts(bounces: str, tmp_path: Path) -> None:
-    deck = write(tmp_path, pair())
-    assert windows(answer("check", deck)) == []
-    found = answer("check", deck, "--history", bounces)
+    deck = write(tmp_path, write_pair())
+    assert list_windows(answer("check", deck)) == []
+    report = answer("check", deck, "--history", bounces)
     flights = [
-        (one.start, one.end)
-        for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights
+        (entry.start, entry.end)
+        for entry in d2.plan(d2.read(bounces), parts=1, replay=False).flights
     ]
-    spans = windows(found)
+    spans = list_windows(report)
     assert len(spans) >= len(flights)
     for start, end in flights:
         near = [
@@ -57,12 +57,14 @@ def test_a_pair_is_followed_through_the_contacts(bounces: str, tmp_path: Path) -
             if td is not None and tr <= start + 0.01 and abs(td - end) < 0.002
         ]
         assert near or end > 1.19  # the last flight may go on
-    told = next(one["message"] for one in found["findings"] if one["rule"] == "D2R302")
-    assert re.search(
-        r"switches when the force of contact 0 is zero: by the momenta of the history \d+ times",
-        told,
+    message = next(
+        entry["message"] for entry in report["findings"] if entry["rule"] == "D2R302"
     )
-    assert {one["rule"] for one in found["findings"]} & {
+    assert re.search(
+        r"switches when the force of contact 0 is zero: \d+ times by the momenta of the history",
+        message,
+    )
+    assert {entry["rule"] for entry in report["findings"]} & {
         "D2R204",
         "D2R201",
     }  # they are judged
@@ -72,23 +74,30 @@ def test_of_several_contacts_nobody_knows_which_one_pushes(
     bounces: str, tmp_path: Path
 ) -> None:
     contacts = "".join(
-        f"*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n{one:10d}floor\n" for one in (7, 8)
+        f"*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n{entry:10d}floor\n"
+        for entry in (7, 8)
     )
-    found = answer("check", write(tmp_path, pair(contacts)), "--history", bounces)
-    assert windows(found) == []
-    assert any("not judged by time" in one["message"] for one in found["findings"])
+    report = answer(
+        "check", write(tmp_path, write_pair(contacts)), "--history", bounces
+    )
+    assert list_windows(report) == []
+    assert any("not judged by time" in entry["message"] for entry in report["findings"])
 
 
-def radioss(folder: Path, sensor: str, more: str = "/RWALL/PLANE/3\nground\n") -> str:
+def write_radioss_run(
+    folder: Path, sensor: str, further_cards: str = "/RWALL/PLANE/3\nground\n"
+) -> str:
     for name, text in engine_files(("1.2", "")).items():
         put(folder / name, text)
-    deck = starter_deck(more=sensor + more).replace(
+    deck = starter_deck(more=sensor + further_cards).replace(
         wide(1808, 0)[:-1], wide(1808, 5)[:-1]
     )
     return str(put(folder / "box_0000.rad", deck))
 
 
-def force(kind: str = "RWALL", wait: float = 0.05, highest: float = 0.0) -> str:
+def write_force_sensor(
+    kind: str = "RWALL", wait: float = 0.05, highest: float = 0.0
+) -> str:
     row = wide(3, "NF")[:-1] + wide(-1.0, highest, 0.0, width=20)
     return f"/SENSOR/{kind}/5\nforce\n{wide(wait, width=20)}{row}"
 
@@ -96,17 +105,22 @@ def force(kind: str = "RWALL", wait: float = 0.05, highest: float = 0.0) -> str:
 def test_a_sensor_of_a_force_is_followed_through_the_contacts(
     bounces: str, tmp_path: Path
 ) -> None:
-    found = answer("check", radioss(tmp_path, force()), "--history", bounces)
-    spans = windows(found)
+    report = answer(
+        "check", write_radioss_run(tmp_path, write_force_sensor()), "--history", bounces
+    )
+    spans = list_windows(report)
     flights = [
-        (one.start, one.end)
-        for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights
+        (flight.start, flight.end)
+        for flight in d2.plan(d2.read(bounces), parts=1, replay=False).flights
     ]
     assert spans[0][0] == 0
     for start, end in flights[1:]:
         if end - start > 0.06:
             assert any(abs(tr - start - 0.05) < 0.002 for tr, _ in spans)
-    assert windows(answer("check", radioss(tmp_path, force()))) == []
+    assert (
+        list_windows(answer("check", write_radioss_run(tmp_path, write_force_sensor())))
+        == []
+    )
 
 
 @pytest.mark.parametrize(("kind", "start"), [("RWALL", 0.9375), ("INTER", 0.4375)])
@@ -121,34 +135,36 @@ def test_of_several_that_push_the_force_of_the_named_one_is_followed(
     history = tmp_path / "boxT01"
     history.write_bytes(t01(groups, values))
     both = "/RWALL/PLANE/3\nground\n/INTER/TYPE7/3\nfloor\n"
-    deck = radioss(tmp_path, force(kind), both)
+    deck = write_radioss_run(tmp_path, write_force_sensor(kind), both)
     found = answer("check", deck, "--history", str(history))
-    ends = [time for pair in windows(found) for time in pair]
+    ends = [time for pair in list_windows(found) for time in pair]
     assert ends == pytest.approx([0.0, start])
 
 
 @pytest.mark.parametrize(
     ("sensor", "more"),
     [
-        (force(highest=100.0), "/RWALL/PLANE/3\nground\n"),
-        (force(), "/RWALL/PLANE/3\nground\n/INTER/TYPE7/4\nboth\n"),
-        (force(), ""),
+        (write_force_sensor(highest=100.0), "/RWALL/PLANE/3\nground\n"),
+        (write_force_sensor(), "/RWALL/PLANE/3\nground\n/INTER/TYPE7/4\nboth\n"),
+        (write_force_sensor(), ""),
     ],
     ids=["a force above a limit", "two that push", "none that pushes"],
 )
 def test_sensors_that_momenta_do_not_show_are_told(
     bounces: str, tmp_path: Path, sensor: str, more: str
 ) -> None:
-    found = answer("check", radioss(tmp_path, sensor, more), "--history", bounces)
-    assert windows(found) == []
-    assert "D2R302" in {one["rule"] for one in found["findings"]}
+    report = answer(
+        "check", write_radioss_run(tmp_path, sensor, more), "--history", bounces
+    )
+    assert list_windows(report) == []
+    assert "D2R302" in {finding["rule"] for finding in report["findings"]}
 
 
 def test_each_window_of_a_pair_has_its_line(bounces: str, tmp_path: Path) -> None:
-    deck = write(tmp_path, pair())
-    shown = run("check", deck, "--history", bounces).stdout
+    deck = write(tmp_path, write_pair())
+    output = run("check", deck, "--history", bounces).stdout
     assert (
-        shown.count("part 1: rigid from")
-        == len(windows(answer("check", deck, "--history", bounces)))
+        output.count("part 1: rigid from")
+        == len(list_windows(answer("check", deck, "--history", bounces)))
         > 2
     )

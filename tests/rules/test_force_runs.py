@@ -16,13 +16,13 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.names import Selection
 from d2rpick.rules import check_deck
 from d2rpick.rules.judgement import HistoryJudge
-from tests.deck.test_openradioss import solve
+from tests.deck.test_openradioss import run_solver
 from tests.decks import wide
 
 WIDE = 20  # columns of a real number
 MAIN, SENSOR, ENTITY, END, INTERVAL = 9999, 5, 3, 0.25, 5e-4
-GAP = 0.002  # of the contact
-_CELLS = 3  # of the plate along each side
+GAP = 0.002  # gap of the contact
+_CELLS = 3  # cells of the plate along each side
 
 
 class Bounce(NamedTuple):
@@ -41,9 +41,9 @@ class Bounce(NamedTuple):
     wait: float
 
 
-def bounces() -> list[Bounce]:
+def generate_bounces() -> list[Bounce]:
     random.seed(5)
-    made = []
+    generated = []
     for number in range(20):
         speed, height = (
             round(random.uniform(0.3, 2.0), 2),
@@ -57,7 +57,7 @@ def bounces() -> list[Bounce]:
             random.choice([0.01, 0.02]),
             round(random.uniform(0.004, 0.03), 4),
         )
-        made.append(
+        generated.append(
             Bounce(
                 number % 2 == 1,
                 number % 4 < 2,
@@ -69,30 +69,28 @@ def bounces() -> list[Bounce]:
                 wait,
             )
         )
-    return made
+    return generated
 
 
-def reals(*values: float) -> str:
+def write_reals(*values: float) -> str:
     return wide(*values, width=WIDE)
 
 
-def deck(run: Bounce, *, switched: bool) -> str:
+def write_bounce_deck(run: Bounce, *, switched: bool) -> str:
     """Write the starter deck; its body has the sensor where the run is ``switched``."""
     corners = range(_CELLS + 1)
     nodes = {(i, j): 1 + i * (_CELLS + 1) + j for i in corners for j in corners}
     text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(2023, 0)}" + 2 * wide(
         "kg", "m", "s", width=WIDE
     )
-    text += (
-        f"/TITLE\nplate\n/MAT/ELAST/1\nsteel\n{reals(7850.0)}{reals(run.modulus, 0.3)}"
-    )
-    text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{reals(run.thickness)}/NODE\n"
+    text += f"/TITLE\nplate\n/MAT/ELAST/1\nsteel\n{write_reals(7850.0)}{write_reals(run.modulus, 0.3)}"
+    text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{write_reals(run.thickness)}/NODE\n"
     for (i, j), node in nodes.items():
         x, y = i / _CELLS, j / _CELLS
-        text += wide(node)[:-1] + reals(x, y, run.height + GAP + run.slope * x)
+        text += wide(node)[:-1] + write_reals(x, y, run.height + GAP + run.slope * x)
     text += (
         wide(MAIN)[:-1]
-        + reals(0.5, 0.5, run.height + 0.2)
+        + write_reals(0.5, 0.5, run.height + 0.2)
         + f"/PART/1\nplate\n{wide(1, 1)}/SHELL/1\n"
     )
     cells = [(i, j) for i in range(_CELLS) for j in range(_CELLS)]
@@ -100,17 +98,18 @@ def deck(run: Bounce, *, switched: bool) -> str:
         text += wide(
             number, nodes[i, j], nodes[i + 1, j], nodes[i + 1, j + 1], nodes[i, j + 1]
         )
-    every = [*nodes.values(), MAIN]
+    node_ids = [*nodes.values(), MAIN]
     text += f"/GRNOD/PART/1\nplate\n{wide(1)}/GRNOD/NODE/6\nall\n"
-    text += "".join(wide(*every[at : at + 10]) for at in range(0, len(every), 10))
-    text += f"/INIVEL/TRA/1\nthrown\n{reals(0.0, 0.0, -run.speed)[:-1]}{wide(6)}"
-    text += f"/FUNCT/1\ngravity\n{reals(0.0, -9.81)}{reals(10.0, -9.81)}"
-    text += f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 6)[:-1]}{reals(1.0, 1.0)}"
-    text += _wall() if run.wall else _contact()
+    text += "".join(wide(*node_ids[at : at + 10]) for at in range(0, len(node_ids), 10))
+    text += f"/INIVEL/TRA/1\nthrown\n{write_reals(0.0, 0.0, -run.speed)[:-1]}{wide(6)}"
+    text += f"/FUNCT/1\ngravity\n{write_reals(0.0, -9.81)}{write_reals(10.0, -9.81)}"
+    text += f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 6)[:-1]}{write_reals(1.0, 1.0)}"
+    text += write_wall() if run.wall else write_contact()
     kind = "RWALL" if run.wall else "INTER"
-    text += f"/SENSOR/{kind}/{SENSOR}\nforce\n{reals(run.wait)}{wide(ENTITY, 'NF')[:-1]}{reals(-1.0, 0.0, 0.0)}"
-    text += f"/RBODY/1\nbody\n{wide(MAIN, SENSOR * switched, 0, 0)[:-1]}{reals(0.0)[:-1]}{wide(1, 1, 0, 0)}"
-    text += 2 * reals(0.0, 0.0, 0.0) + wide(0, 0, 0)
+    force = wide(ENTITY, "NF")[:-1] + write_reals(-1.0, 0.0, 0.0)
+    text += f"/SENSOR/{kind}/{SENSOR}\nforce\n{write_reals(run.wait)}{force}"
+    text += f"/RBODY/1\nbody\n{wide(MAIN, SENSOR * switched, 0, 0)[:-1]}{write_reals(0.0)[:-1]}{wide(1, 1, 0, 0)}"
+    text += 2 * write_reals(0.0, 0.0, 0.0) + wide(0, 0, 0)
     text += (
         f"/TH/PART/1\nparts\nDEF       XMOM      YMOM      ZMOM      MASS\n{wide(1)}"
     )
@@ -119,29 +118,30 @@ def deck(run: Bounce, *, switched: bool) -> str:
     return f"{text}/END\n"
 
 
-def _wall() -> str:
-    return f"/RWALL/PLANE/{ENTITY}\nground\n{wide(0, 0, 1, 0)}{reals(0.0)}{reals(0.0, 0.0, 0.0)}{reals(0.0, 0.0, 1.0)}"
+def write_wall() -> str:
+    plane = write_reals(0.0, 0.0, 0.0) + write_reals(0.0, 0.0, 1.0)
+    return f"/RWALL/PLANE/{ENTITY}\nground\n{wide(0, 0, 1, 0)}{write_reals(0.0)}{plane}"
 
 
-def _contact() -> str:
-    places = ((-1.0, -1.0), (2.0, -1.0), (2.0, 2.0), (-1.0, 2.0))
+def write_contact() -> str:
+    corners = ((-1.0, -1.0), (2.0, -1.0), (2.0, 2.0), (-1.0, 2.0))
     ids = range(1001, 1005)
     text = "/NODE\n" + "".join(
-        wide(node)[:-1] + reals(*place, 0.0)
-        for node, place in zip(ids, places, strict=True)
+        wide(node)[:-1] + write_reals(*corner, 0.0)
+        for node, corner in zip(ids, corners, strict=True)
     )
     text += f"/PART/2\nground\n{wide(1, 1)}/SHELL/2\n{wide(900, *ids)}/GRNOD/NODE/2\nground\n{wide(*ids)}"
     text += f"/BCS/1\nfixed\n   111 111{wide(0, 2)}/SURF/PART/7\nground\n{wide(2)}"
     text += f"/INTER/TYPE7/{ENTITY}\nplate on ground\n{wide(1, 7, 4, 0, 0)}{wide('', 0, 0, 0, 0)}"
-    text += 2 * reals(0.0, 0.0) + reals(1.0, 0.0, GAP, 0.0, 0.0)
+    text += 2 * write_reals(0.0, 0.0) + write_reals(1.0, 0.0, GAP, 0.0, 0.0)
     return (
         text
-        + f"{'000':>10}{'':10}{0:10d}{reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{reals(0.0)[:-1]}{wide(0)}"
+        + f"{'000':>10}{'':10}{0:10d}{write_reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{write_reals(0.0)[:-1]}{wide(0)}"
     )
 
 
-def listed_windows(folder: Path) -> list[tuple[float, float]]:
-    """Give when the sensor is not active, by the listing: from 0 on, from one time to another, and to the end."""
+def read_listed_windows(folder: Path) -> list[tuple[float, float]]:
+    """Return the spans in which the sensor is inactive according to the listing."""
     ends, now = [0.0], 0.0
     for line in (folder / "X_0001.out").read_text("latin-1").splitlines():
         if cycle := re.match(r"\s+\d+\s+([\d.E+-]+)\s+[\d.E+-]+ [A-Z]+ ", line):
@@ -155,31 +155,37 @@ def listed_windows(folder: Path) -> list[tuple[float, float]]:
     return list(zip(ends[::2], [*ends[1::2], END][: len(ends[::2])], strict=True))
 
 
-def met(window: tuple[float, float], others: list[tuple[float, float]]) -> bool:
-    """Whether both ends of a window are those of another one, within an interval of the history."""
-    return any(window == pytest.approx(other, abs=INTERVAL) for other in others)
+def is_met(window: tuple[float, float], windows: list[tuple[float, float]]) -> bool:
+    """Return True if another window has the same ends, within an output interval of the history."""
+    return any(
+        window == pytest.approx(other_window, abs=INTERVAL) for other_window in windows
+    )
 
 
-@pytest.mark.parametrize("run", bounces())
+@pytest.mark.parametrize("run", generate_bounces())
 def test_the_sensor_switches_as_often_as_momenta_say(
     tmp_path: Path, run: Bounce
 ) -> None:
-    """In the run without switching the sensor switches nothing: its listing is the truth of what it would do."""
+    """In the reference run the sensor switches nothing, so its listing shows when it would have switched."""
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     engine = f"/RUN/X/1\n{END}\n/VERS/2023\n/DT\n0.9 0.0\n{{}}/DTIX\n2e-05 2e-05\n/TFILE/4\n{INTERVAL}\n/PRINT/-1\n"
-    for folder, off in ((reference, f"/RBODY/OFF\n{MAIN}\n"), (switched, "")):
+    for folder, off_cards in ((reference, f"/RBODY/OFF\n{MAIN}\n"), (switched, "")):
         folder.mkdir()
-        (folder / "X_0000.rad").write_text(deck(run, switched=folder is switched))
-        (folder / "X_0001.rad").write_text(engine.format(off))
-    solve(reference, "X")
+        (folder / "X_0000.rad").write_text(
+            write_bounce_deck(run, switched=folder is switched)
+        )
+        (folder / "X_0001.rad").write_text(engine.format(off_cards))
+    run_solver(reference, "X")
     judge = HistoryJudge(d2.read(reference / "XT01").files, Selection(), Settings())
     windows = check_deck(str(switched / "X_0000.rad"), judge=judge).windows
-    predicted = [(one.tr, END if one.td is None else one.td) for one in windows]
-    listed = listed_windows(reference)
-    for some, others in ((predicted, listed), (listed, predicted)):
-        # What is shorter than an interval may fall between two states of the history.  Momenta do not show a force
-        # that is small beside the weight.
+    predicted = [
+        (window.tr, END if window.td is None else window.td) for window in windows
+    ]
+    listed = read_listed_windows(reference)
+    for windows_a, windows_b in ((predicted, listed), (listed, predicted)):
+        # A window shorter than an interval may lie between two states of the history.  Momenta do not show a force
+        # that is small compared with the weight.
         shortest = INTERVAL if run.forces else 3 * INTERVAL
-        lasting = [(tr, td) for tr, td in some if td - tr > shortest]
+        lasting = [(tr, td) for tr, td in windows_a if td - tr > shortest]
         assert lasting
-        assert all(met(window, others) for window in lasting)
+        assert all(is_met(window, windows_b) for window in lasting)

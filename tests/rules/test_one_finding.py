@@ -15,7 +15,7 @@ OSCILLATOR = (
 )
 
 
-def deck(folder: Path, tr: str, td: str, end: str = "       0.2") -> str:
+def write_timed_deck(folder: Path, tr: str, td: str, end: str = "       0.2") -> str:
     cards = automatic(1, tr, rigid=["1"]) + automatic(2, td, deformable=["1"])
     return write(folder, HEAD.replace("       0.2", end) + PARTS + cards + "*END\n")
 
@@ -34,41 +34,48 @@ def test_a_mistake_of_units_is_one_finding(
 ) -> None:
     history = str(tmp_path / "energy.csv")
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
-    found = answer(
-        "check", deck(tmp_path, *times), "--history", history, "--ignore", "D2R111"
+    findings = answer(
+        "check",
+        write_timed_deck(tmp_path, *times),
+        "--history",
+        history,
+        "--ignore",
+        "D2R111",
     )["findings"]
-    assert [one["rule"] for one in found] == [rule]
+    assert [finding["rule"] for finding in findings] == [rule]
 
 
 def test_a_time_after_the_run_is_one_finding(tmp_path: Path) -> None:
     """It is outside the history as well; where its rule is ignored, the history says so."""
     history = str(tmp_path / "energy.csv")
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
-    options = (deck(tmp_path, "0.0135867", "68.7534"), "--history", history)
+    options = (write_timed_deck(tmp_path, "0.0135867", "68.7534"), "--history", history)
     for ignored, rule in (("D2R111", "D2R101"), ("D2R111,D2R101", "D2R205")):
         found = answer("check", *options, "--ignore", ignored)["findings"]
         assert [one["rule"] for one in found] == [rule]
 
 
 def test_what_follows_is_reported_where_its_cause_is_ignored(tmp_path: Path) -> None:
-    path = deck(tmp_path, "13.5867", "68.7534")
-    assert [one.rule for one in check_deck(path).findings if one.rule != "D2R111"] == [
-        "D2R115"
-    ]
+    path = write_timed_deck(tmp_path, "13.5867", "68.7534")
+    assert [
+        finding.rule
+        for finding in check_deck(path).findings
+        if finding.rule != "D2R111"
+    ] == ["D2R115"]
     ignored = check_deck(path, Configuration(ignore=("D2R115",))).findings
-    assert {one.rule for one in ignored} >= {"D2R101"}
+    assert {finding.rule for finding in ignored} >= {"D2R101"}
 
 
 def test_a_deck_without_contacts_has_none_to_name(tmp_path: Path) -> None:
     example = RULES["D2R007"].failing[1].deck
     (message,) = [
-        one.message
-        for one in check_deck(write(tmp_path, example)).findings
-        if one.rule == "D2R007"
+        finding.message
+        for finding in check_deck(write(tmp_path, example)).findings
+        if finding.rule == "D2R007"
     ]
     assert (
         message
-        == "ENTNO is 7, but the deck has no contact, so the switch never comes; add one"
+        == "ENTNO is 7, but the deck has no contact, so the set never switches; add one"
     )
 
 

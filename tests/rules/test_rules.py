@@ -1,4 +1,4 @@
-"""Every rule: its examples, how it is selected and silenced, and that decks are judged apart."""
+"""Every rule: its examples, its selection and silencing, and the independence of several decks."""
 
 import json
 import re
@@ -26,42 +26,42 @@ PASSING = [(rule, example) for rule in RULES.values() for example in rule.passin
 FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]
 
 
-def names(examples: list[tuple[Rule, Example]]) -> list[str]:
+def name_examples(examples: list[tuple[Rule, Example]]) -> list[str]:
     return [rule.id for rule, _ in examples]
 
 
 @cache
-def history(command: str, arguments: str) -> bytes:
+def write_history(command: str, arguments: str) -> bytes:
     """The energy history that ``d2rpick replay`` writes, or another command."""
     return run(command, *shlex.split(arguments)).stdout_bytes
 
 
-def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
-    """What the rule finds in an example, checked as `d2rpick rule` says."""
+def find_findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
+    """Return the findings of the rule in an example, checked as `d2rpick rule` says."""
     options = shlex.split(example.options)
     if example.history:
         (folder / "energy.csv").write_bytes(
-            history(example.computed_by, example.history)
+            write_history(example.computed_by, example.history)
         )
         options += ["--history", str(folder / "energy.csv")]
     path = write(folder, example.deck, example.files, example.name)
     if example.stdin:
-        found = json.loads(
+        report = json.loads(
             run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout
         )["findings"]
     else:
-        found = answer("check", path, *options)["findings"]
-    return [finding for finding in found if finding["rule"] == rule.id]
+        report = answer("check", path, *options)["findings"]
+    return [finding for finding in report if finding["rule"] == rule.id]
 
 
-@pytest.mark.parametrize(("rule", "example"), PASSING, ids=names(PASSING))
+@pytest.mark.parametrize(("rule", "example"), PASSING, ids=name_examples(PASSING))
 def test_passing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
-    assert not findings(tmp_path, rule, example)
+    assert not find_findings(tmp_path, rule, example)
 
 
-@pytest.mark.parametrize(("rule", "example"), FAILING, ids=names(FAILING))
+@pytest.mark.parametrize(("rule", "example"), FAILING, ids=name_examples(FAILING))
 def test_failing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
-    mine = findings(tmp_path, rule, example)
+    mine = find_findings(tmp_path, rule, example)
     assert mine
     for finding in mine:
         assert finding["severity"] == rule.severity
@@ -76,6 +76,8 @@ def test_every_rule_has_examples_and_an_explanation() -> None:
         assert rule.passing
         assert rule.failing
         assert rule.explanation.endswith(".")
+        assert rule.fix[:1].isupper()
+        assert rule.fix.endswith(".")
 
 
 SWAPPED = (
@@ -185,7 +187,7 @@ def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
 def test_only_the_list_behind_ignore_counts(
     tmp_path: Path, comment: str, silenced: bool
 ) -> None:
-    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    checked = check_deck(write(tmp_path, comment_second_card(f"$ d2rpick: {comment}")))
     assert (not checked.findings) is silenced
     assert checked.remarks == ()
 
@@ -197,22 +199,24 @@ def test_only_the_list_behind_ignore_counts(
 def test_a_comment_that_names_no_rule_is_told(
     tmp_path: Path, comment: str, told: str
 ) -> None:
-    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    checked = check_deck(write(tmp_path, comment_second_card(f"$ d2rpick: {comment}")))
     (remark,) = checked.remarks
     assert told in remark
     assert [finding.rule for finding in checked.findings] == ["D2R102"]
 
 
-def before_the_second(comment: str) -> str:
-    """A deck with one fault, and a comment before the card that has it."""
+def comment_second_card(comment: str) -> str:
+    """Return a deck with one fault and a comment before the faulty card."""
     second = SWAPPED.rindex("*DEFORMABLE_TO_RIGID_AUTOMATIC")
     return f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"
 
 
-def message(folder: Path, rule: str, deck: str) -> str:
-    """The only finding of a rule."""
+def find_message(folder: Path, rule: str, deck: str) -> str:
+    """Return the message of the only finding of a rule."""
     (finding,) = (
-        one for one in check_deck(write(folder, deck)).findings if one.rule == rule
+        finding
+        for finding in check_deck(write(folder, deck)).findings
+        if finding.rule == rule
     )
     return finding.message
 
@@ -225,11 +229,11 @@ def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
     tmp_path: Path, codes: tuple[int, int], weight: set[str], paired: bool
 ) -> None:
     pairs = ((2, 1), (1, -1)) if paired else ((0, 0), (0, 0))
-    there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0])
+    rigid_card = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0])
     deck = (
         HEAD
         + PARTS
-        + there
+        + rigid_card
         + automatic(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1])
         + END
     )
@@ -246,21 +250,23 @@ def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
 
 
 def test_an_unknown_part_lists_its_neighbours_with_their_titles(tmp_path: Path) -> None:
-    told = message(
+    text = find_message(
         tmp_path, "D2R106", HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END
     )
-    assert told.startswith("part 7 not in the deck (nearest to 7: 1 'door', 2 'frame')")
+    assert text.startswith("part 7 not in the deck (nearest to 7: 1 'door', 2 'frame')")
 
 
 def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
     mesh = "*ELEMENT_SHELL\n" + "".join(
-        f"{one:8d}{one:8d}{one:8d}{3:8d}{8:8d}{9:8d}\n" for one in (1, 2)
+        f"{element:8d}{element:8d}{element:8d}{3:8d}{8:8d}{9:8d}\n"
+        for element in (1, 2)
     )
     sets = "*SET_PART\n         3\n         1         2\n"
     line = "         3         0      PSET"
     deck = HEAD + PARTS + mesh + sets + automatic(1, "0.02", rigid=[line]) + END
-    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 8" in message(
-        tmp_path, "D2R108", deck
+    assert (
+        "part 1 (of part set 3) and part 2 (of part set 3) share node 8"
+        in find_message(tmp_path, "D2R108", deck)
     )
 
 
@@ -279,9 +285,9 @@ def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
         ],
         "the third line, with the first part, is missing": lines[:5],
     }
-    for told, kept in without.items():
-        deck = HEAD + PARTS + "\n".join(kept) + "\n" + END
-        assert told in message(tmp_path, "D2R001", deck)
+    for problem, remaining_lines in without.items():
+        deck = HEAD + PARTS + "\n".join(remaining_lines) + "\n" + END
+        assert problem in find_message(tmp_path, "D2R001", deck)
         assert not found(tmp_path, deck)["D2R002"]
 
 
@@ -298,7 +304,7 @@ def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
 def test_missing_lines_of_an_inertia_are_named(
     rows: str, told: str, tmp_path: Path
 ) -> None:
-    assert told in message(
+    assert told in find_message(
         tmp_path, "D2R001", HEAD + PARTS + "*DEFORMABLE_TO_RIGID_INERTIA\n" + rows + END
     )
 
@@ -307,7 +313,7 @@ def test_contacts_are_listed_where_none_has_the_number(tmp_path: Path) -> None:
     deck = next(iter(RULES["D2R007"].failing)).deck
     assert (
         "the deck has 7 (*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID 'floor')"
-        in message(tmp_path, "D2R007", deck)
+        in find_message(tmp_path, "D2R007", deck)
     )
 
 
@@ -322,7 +328,7 @@ def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) ->
 def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
     tmp_path: Path,
 ) -> None:
-    """Wherever it is cut, unless in a comment or at the end of a line of a card that holds no mesh."""
+    """The exceptions are a cut in a comment and a cut at the end of a line that is not in a mesh."""
     whole = (
         GOOD.removesuffix(END)
         + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"
@@ -332,16 +338,20 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
     for end in range(whole.rindex("*DEFORM") + 2, len(whole) + 1):
         text = whole[:end]
         deck.write_text(text)
-        told = [
+        messages = [
             finding.message
             for finding in check_deck(str(deck)).findings
             if finding.rule == "D2R011"
         ]
-        within = not (text.endswith("\n") or text.splitlines()[-1].startswith("$"))
-        assert len(told) == (within or end > mesh + len("*NODE"))
+        ends_within_line = not (
+            text.endswith("\n") or text.splitlines()[-1].startswith("$")
+        )
+        assert len(messages) == (ends_within_line or end > mesh + len("*NODE"))
         assert all(
-            one.endswith("or end its last line" if within else "or add that line")
-            for one in told
+            message.endswith(
+                "or end its last line" if ends_within_line else "or add *END"
+            )
+            for message in messages
         )
     deck.write_text(f"{whole}*END")
     assert not check_deck(str(deck)).findings
@@ -350,7 +360,7 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
 # Configuration files.
 
 
-def configuration_in(folder: Path) -> Configuration:
+def read_configuration_in(folder: Path) -> Configuration:
     return configuration_for(str(folder / "deck.k"), Configuration())
 
 
@@ -362,7 +372,7 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
     inner.mkdir(parents=True)
     (tmp_path / "d2rpick.toml").write_text(OWN)
     (tmp_path / "a" / "pyproject.toml").write_text("[project]\nname = 'other'\n")
-    configuration = configuration_in(inner)
+    configuration = read_configuration_in(inner)
     assert configuration.select == ("D2R1",)
     assert configuration.ignore == ("D2R104",)
     assert configuration.severity == {"D2R101": "warning"}
@@ -370,9 +380,9 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
     (tmp_path / "a" / "pyproject.toml").write_text(
         "[tool.d2rpick]\nselect = ['D2R0']\n"
     )
-    assert configuration_in(inner).select == ("D2R0",)
+    assert read_configuration_in(inner).select == ("D2R0",)
     (tmp_path / "a" / "d2rpick.toml").write_text("")
-    assert configuration_in(inner).select == ()
+    assert read_configuration_in(inner).select == ()
 
 
 @pytest.mark.parametrize(
@@ -398,7 +408,7 @@ def test_wrong_settings_say_what_is_wrong(
     name = "pyproject.toml" if "[tool]" in text else "d2rpick.toml"
     (tmp_path / name).write_bytes(text.encode("latin-1"))
     with pytest.raises(ConfigurationError, match=message) as caught:
-        configuration_in(tmp_path)
+        read_configuration_in(tmp_path)
     assert "\n" not in str(caught.value)
 
 
@@ -407,7 +417,7 @@ def test_wrong_settings_say_what_is_wrong(
 )
 def test_a_pyproject_without_a_table_for_us(tmp_path: Path, text: str) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
-    assert configuration_in(tmp_path).source != str(tmp_path / "pyproject.toml")
+    assert read_configuration_in(tmp_path).source != str(tmp_path / "pyproject.toml")
     assert read_configuration({}) == Configuration()
 
 

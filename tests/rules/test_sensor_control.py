@@ -11,14 +11,14 @@ from d2rpick.deck.ls_dyna_sensors import follow_control, read_controls
 from d2rpick.deck.reader import read_deck
 from d2rpick.rules.rule import HEAD, PARTS, automatic, deck
 from tests.command import answer, put, refused, run
-from tests.rules.test_by_force import windows
+from tests.rules.test_by_force import list_windows
 
 END = 1.0
 
 
 def flat(found: dict[str, object]) -> list[float | None]:
     """List all ends of the windows."""
-    return [time for pair in windows(found) for time in pair]
+    return [time for pair in list_windows(found) for time in pair]
 
 
 TIMES = np.arange(0.0, END + 5e-3, 0.01)
@@ -92,8 +92,10 @@ def test_a_control_by_time_needs_no_history(tmp_path: Path) -> None:
 
 def test_a_control_that_begins_on_is_rigid_from_the_start(tmp_path: Path) -> None:
     cards = control("1", initial="ON") + by_time(1, "GT", 0.3)
-    assert windows(answer("check", write(tmp_path, cards))) == [(0.0, 0.3)]
-    assert windows(answer("check", write(tmp_path, control("", "ON")))) == [(0.0, None)]
+    assert list_windows(answer("check", write(tmp_path, cards))) == [(0.0, 0.3)]
+    assert list_windows(answer("check", write(tmp_path, control("", "ON")))) == [
+        (0.0, None)
+    ]
 
 
 def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> None:
@@ -104,7 +106,7 @@ def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> 
     assert flat(found) == pytest.approx(
         [0.05, 0.105, 0.245, 0.505, 0.745, None], abs=0.011
     )
-    assert windows(answer("check", write(tmp_path, cards))) == []
+    assert list_windows(answer("check", write(tmp_path, cards))) == []
 
 
 def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
@@ -135,12 +137,14 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
     assert flat(found[7]) == pytest.approx(
         [0.0, 0.105, 0.195, 0.505, 0.595, None], abs=0.011
     )
-    assert windows(found[8]) == []
-    for contact, times in ((7, "5 times, first at 0"), (8, "0 times")):
-        told = [one["message"] for one in found[contact]["findings"]]
-        assert any(
-            f"by the contact forces of the history {times}" in one for one in told
-        )
+    assert list_windows(found[8]) == []
+    by_history = "by the contact forces of the history"
+    for contact, text in (
+        (7, f"5 times {by_history}, first at 0"),
+        (8, f"0 times {by_history}"),
+    ):
+        messages = [finding["message"] for finding in found[contact]["findings"]]
+        assert any(text in message for message in messages)
 
 
 def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
@@ -153,7 +157,7 @@ def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
     path = Path(write(tmp_path, switch_set=there))
     path.write_text(path.read_text().replace("SURFACE_TO_SURFACE", "GENERAL"))
     found = answer("check", str(path), "--history", folder)
-    assert windows(found) == []
+    assert list_windows(found) == []
     assert "D2R008" in {one["rule"] for one in found["findings"]}
 
 
@@ -198,7 +202,7 @@ def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> No
 )
 def test_what_is_not_followed_is_named(cards: str, why: str, tmp_path: Path) -> None:
     found = answer("check", write(tmp_path, cards))
-    assert windows(found) == []
+    assert list_windows(found) == []
     told = [one["message"] for one in found["findings"] if one["rule"] == "D2R302"]
     assert why in told[0]
     assert "not judged by time" in told[0]

@@ -34,7 +34,7 @@ from d2rpick.running.sequence import (
     windows,
 )
 from tests.command import ROOT, put, refused, run
-from tests.deck.test_openradioss import ENGINE, starter
+from tests.deck.test_openradioss import ENGINE, write_starter
 from tests.decks import wide
 
 FAKE = Path(__file__).with_name("fake_solver.py")
@@ -55,7 +55,7 @@ def asked(folder: Path, *more: str) -> list[str]:
     if not deck.exists():
         deck.mkdir()
         (deck / "strip_0000.rad").write_text(
-            starter().replace("/TH/PART", f"{GRAVITY}{WALL}/TH/PART")
+            write_starter().replace("/TH/PART", f"{GRAVITY}{WALL}/TH/PART")
         )
         text = ENGINE.replace("0.02\n/VERS", f"{END}\n/VERS").replace(
             "/TFILE/4\n2e-05", "/TFILE/4\n0.001"

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
-from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
+from d2rpick.vibration.measures import Profile, kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modal import ModalVibration, confirm, identify_modal
 from tests.energies import of, sure
 from tests.vibration.linear_structure import LinearStructure
@@ -253,3 +253,19 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
             sure(best.residual) <= sure(sure(other).residual) + 0.02
             or sure(other).rigid_time < 3.9
         )
+
+
+def test_a_weak_mode_of_few_states_is_told_of() -> None:
+    """Its line holds too little for the strong ones, and shows that the record may hold faster ones unseen."""
+    for rate, is_coarse in ((3.3, False), (30.3, True)):
+        time = np.linspace(0.0, 6.0, 1200)
+        strong = np.cos(2 * np.pi * time) ** 2 + 0.7 * np.cos(14.3 * time) ** 2
+        weak = 0.08 * np.cos(2 * np.pi * rate * time + 0.4) ** 2
+        found = sure(identify_modal(time, strong + weak))
+        assert found.doubts.coarse > 4.0
+        assert (found.states_per_period < 4.0) == is_coarse
+
+
+def test_a_profile_without_two_times_has_no_interval() -> None:
+    empty = Profile(np.empty(0), np.empty(0))
+    assert np.all(np.isinf(empty.cell(np.array([0.3, 0.7]))))

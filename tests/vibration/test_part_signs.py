@@ -404,7 +404,7 @@ def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
         + small.kinetic_energy(td)
     )
     told /= np.sqrt(small.vibration_energy(td))
-    high = small.residual_bound(told, tr, td)
+    _, _, high = small.residual_band(told, tr, td)
     truth = [planes(5e-4).residual(one, td) for one in tr]
     assert np.all(high > told + 5e-4)
     assert np.all(np.abs(told - truth) < 0.02)

@@ -11,12 +11,12 @@ from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.oscillator_band import residual_band
 from d2rpick.vibration.span import (
     Fits,
     Span,
     described_span,
     hidden_share,
-    residual_bound,
     span_of,
 )
 from tests import paper
@@ -183,7 +183,9 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
         mode = sure(found.mode)
         found = found._replace(hidden_share=hidden_share(TIMES, energy, mode))
         true, told = replayed_residual(truth, tr, td), replayed_residual(mode, tr, td)
-        assert np.all(residual_bound(found, told, tr, td) > true - 0.05)
+        _, low, high = residual_band(found, told, tr, td)
+        assert np.all(high > true - 0.05)
+        assert np.all(low < true + 0.05)
 
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:

@@ -1,7 +1,7 @@
-"""The formats of histories, each a line of `READERS` and a module, and what several of the modules share.
+"""The file formats of histories: each is one line of `READERS` and one module, and some modules share others.
 
-Readers are loaded when a file may be their own, and the help shows the names without them: start-up is part of the
-product.
+A reader is imported only when a file may have its format. Help texts list the formats without importing their
+readers, which keeps start-up short.
 """
 
 from __future__ import annotations
@@ -13,13 +13,17 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Formats whose data fill a family of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
+FAMILIES: Final = ("d3thdt", "d3plot")
+
 
 class Listed(NamedTuple):
-    """What is known of a format before its reader, the ``module``, is loaded.
+    """A format as it is known before its reader, the ``module``, is imported.
 
-    Regular expressions tell its files: ``hint`` is found in the head of each, ``files`` is what a ``solver`` calls
-    them, with the name of the run as ``root`` where it tells them by that.  Energies of a solver can be balanced, and
-    its files have one time; a format of no solver holds columns that somebody named.
+    The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
+    names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
+    name. Only files of a solver have an energy balance and one common time. A format without a solver holds columns
+    named by a user.
     """
 
     module: str
@@ -28,8 +32,9 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
-# holds more digits; csv takes any text, so it comes last of those; and what a run writes seldom comes behind all.
+# In the order in which the formats are tried, and preferred as source of a quantity: binary files come before text
+# files, since they hold more digits; csv accepts any text, so it is the last of these; files that a run seldom writes
+# come last of all.
 READERS: Final[Mapping[str, Listed]] = {
     "binout": Listed(
         "binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"
@@ -44,5 +49,3 @@ READERS: Final[Mapping[str, Listed]] = {
     "d3thdt": Listed("d3thdt", b"", "LS-DYNA", r"(?i:d3thdt(?:\d{2,})?)"),
     "d3plot": Listed("d3plot", b"", "LS-DYNA", r"(?i:d3plot(?:\d{2,})?)"),
 }
-# Of the formats that are families of files, of which only the first says what it is.
-FAMILIES: Final = ("d3thdt", "d3plot")

@@ -31,7 +31,7 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg: there a solver continues a binout and spreads its branches."""
+    """Open the files of each folder as one leg: a solver continues a binout and spreads its branches there."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  start-up
@@ -40,9 +40,9 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
 
 
 class Binout(Database):
-    """All binout files of one leg, by name and content, those of a family in their order, read as one `Database`.
+    """All binout files of one leg (in the order of their family), read as one `Database`.
 
-    FormatError if a file is no binout, or none of them holds glstat, matsum or forces of contacts.
+    Raises FormatError if a file is not a binout, or if none of them has glstat, matsum or contact forces.
     """
 
     format = "binout"
@@ -69,7 +69,7 @@ class Binout(Database):
         self.title = whole.text("title") or parts.text("title")
         self.digits = DIGITS[min(branch.time_width for branch in self._branches)]
         stops = [
-            f"{file.source}: {file.stop}; what lies before it was read"
+            f"{file.source}: {file.stop}; the records before it were read"
             for file in self._files
             if file.stop
         ]
@@ -78,8 +78,8 @@ class Binout(Database):
         self.channels = tuple(name for name in whole.scalars if name != "time")
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # only when it is asked for
-        """Parts of matsum, in the order of its first list of ids."""
+    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]
+        """The parts of matsum, in the order of the first list of ids."""
         _, branch = self._branches
         return tuple(
             Part(number, branch.legend.get(number, "")) for number in branch.part_ids
@@ -87,28 +87,25 @@ class Binout(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of contacts, both sides together, and of rigid walls."""
+        """Forces of the contacts, both sides as one, and of the rigid walls."""
         return forces_of(self._files)
 
     def branch(self, name: str) -> Branch:
-        """Give a branch; FormatError where there is none, or records are lost: they may be the other's."""
-        found = next(
-            (branch for branch in self._branches if branch and branch.name == name),
-            None,
-        )
-        if found is None:
-            raise FormatError(self._without(name))
-        if damage := next(
-            filter(None, (branch.damage for branch in self._branches)), ""
-        ):
-            raise FormatError(
-                f"{damage}; records are lost or out of place, copy the file again"
-            )
-        return found
+        """Return a branch by name; raise FormatError if there is none, or if records of any branch are lost."""
+        for branch in self._branches:
+            if branch and branch.damage:
+                raise FormatError(
+                    f"{branch.damage}; records are lost or out of place, copy the file again"
+                )
+        for branch in self._branches:
+            if branch and branch.name == name:
+                return branch
+        raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        there = sorted(set().union(*(file.names for file in self._files)))
+        """Return the message that no file of the leg has a branch of this name."""
+        names = sorted(set().union(*(file.names for file in self._files)))
         return (
-            f"{self.source}: no {name} in it, but {listing(there) or 'nothing'}; "
-            "name the binout of the run that holds it (binout0000, binout0001, ...) or let the run write it"
+            f"{self.source}: no {name} in it, but {listing(names) or 'nothing'}; "
+            "name the binout of the run that contains it (binout0000, binout0001, ...) or let the run write it"
         )

@@ -1,6 +1,6 @@
 """A branch of LS-DYNA's binout: its states in all files of a family, grouped by file and layout.
 
-A column is gathered with a few array operations, however many states there are.  Whatever does not fit - a variable or
+A column is gathered with a few array operations, however many states there are. Anything inconsistent - a variable or
 a part that one state lacks, a count that changes - is refused with the state named, never shifted.
 """
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Values gathered at a time: keeps the index arrays small beside the answer.
+# Values gathered at a time; keeps the index arrays small compared with the result.
 _CHUNK: Final = 1 << 17
 
 
 @dataclass(frozen=True)
 class Group:
-    """States of one file and one layout: their rows in the columns, and the bytes where they start."""
+    """States of one file with one layout: their rows in the columns, and the bytes at which they start."""
 
     file: Lsda
     layout: DirectoryLayout
@@ -41,24 +41,26 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Divide into pieces of so few states that ``width`` values of each fit into a chunk."""
+        """Yield groups of so few states that ``width`` values of each fit into a chunk."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
             yield Group(self.file, self.layout, self.rows[part], self.starts[part])
 
-    def values(self, variable: Variable, places: Indices) -> NDArray[Any]:
-        """Values of a variable at ``places`` of its list, shape (states, places); floating-point ones as doubles."""
+    def values(self, variable: Variable, indices: Indices) -> NDArray[Any]:
+        """Return the values of a list at ``indices``, shape (states, indices); floating-point values as doubles."""
         positions = (
-            self.starts[:, None] + variable.offset + variable.dtype.itemsize * places
+            self.starts[:, None] + variable.offset + variable.dtype.itemsize * indices
         )
-        found = self.file.read(positions, variable.dtype)
-        with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
-            return found.astype(np.float64) if variable.dtype.kind == "f" else found
+        values = self.file.read(positions, variable.dtype)
+        if variable.dtype.kind != "f":
+            return values
+        with np.errstate(invalid="ignore"):  # a NaN is refused later, or not used
+            return values.astype(np.float64)
 
 
 def _start(file: Lsda, branch: str) -> float:
-    """Time of the first state of a branch in a file; before all others where it has none."""
+    """Return the time of the first state of a branch in a file, -inf if the state has none."""
     _, start, layout = file.visits[branch][:3]
     variable = file.layouts[layout].variables.get("time")
     if variable is None or not variable.count:
@@ -67,7 +69,7 @@ def _start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Whether the file ends in a state of this branch that differs from the one before."""
+    """Return True if the file ends in a state of this branch whose layout differs from the state before."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 
@@ -75,23 +77,22 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Say what shows, in the states of one file, that records are lost or out of place."""
+    """Yield what shows, in the states of one file, that records are lost or out of place."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
         yield f"{where} goes from state {numbers[hole]} to {numbers[hole + 1]}"
     if doubled := sorted(name for layout in layouts for name in layout.doubled):
         yield f"{where} has {doubled[0]} twice in one state"
-    if (steps < 1).any() and len(
-        {frozenset(layout.variables) for layout in layouts}
-    ) > 1:
-        yield f"{where} begins a new leg whose states hold other variables"
+    variable_sets = {frozenset(layout.variables) for layout in layouts}
+    if (steps < 1).any() and len(variable_sets) > 1:
+        yield f"{where} begins a new leg whose states have other variables"
 
 
 def _groups(
     layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices
 ) -> Iterator[Group]:
-    """States by layout; ``kinds`` says which of ``layouts`` each one has."""
+    """Yield the states grouped by layout; ``kinds`` are the indices of their layouts in ``layouts``."""
     order = np.argsort(kinds, kind="stable")
     cuts = np.flatnonzero(np.diff(kinds[order])) + 1
     for rows in np.split(order, cuts) if order.size else ():
@@ -100,13 +101,13 @@ def _groups(
 
 
 class Branch(Database):
-    """The states of one branch in all files of a family; false when no file knows the branch.
+    """The states of one branch in all files of a family; False if no file has the branch.
 
-    A solver numbers its states one by one.  Where a file begins higher than the last one ended, a member of
-    the family is missing; a number that comes again begins a newer leg, which writes the same variables, be it
-    the same states again or the next ones: that shows in their times.  A number left out inside a file, a name
-    twice in a state and a leg with other variables are the marks of records lost or out of place: what then seems
-    to be one state may be made of two.
+    A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
+    state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
+    either the same states again or the next ones, as their times show. A number left out inside a file, a name twice
+    in one state and a leg with other variables show that records are lost or out of place: a state may then be made
+    of two.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ class Branch(Database):
     files : sequence of Lsda
         The family, in its order.
     by_part : bool
-        Whether variables are lists with one value per part.
+        True if variables are lists with one value for each part.
 
     Attributes
     ----------
@@ -128,11 +129,12 @@ class Branch(Database):
             (file for file in files if file.visits[name]),
             key=lambda file: _start(file, name),
         )
+        # Files whose last state is left out.
         self._unfinished = [
             file.source for file in visited if _is_unfinished(file, name)
-        ]  # less their last state
+        ]
         damages = [
-            f"{file.source}: {name} has {file.odd[name][0]!r}, which is not a state"
+            f"{file.source}: {name} contains {file.odd[name][0]!r}, which is not a state"
             for file in files
             if file.odd[name]
         ]
@@ -140,16 +142,14 @@ class Branch(Database):
         layouts: list[tuple[Lsda, DirectoryLayout]] = []
         for file in visited:
             states = file.states(name)
-            here, begin, used = states[
-                : len(states) - (file.source in self._unfinished)
-            ].T
-            damages += _damages(
-                here,
-                [file.layouts[kind] for kind in {*used.tolist()}],
-                f"{file.source}: {name}",
-            )
-            numbers, starts = np.append(numbers, here), np.append(starts, begin)
-            kinds = np.append(kinds, used + len(layouts))
+            if file.source in self._unfinished:
+                states = states[:-1]
+            file_numbers, file_starts, file_kinds = states.T
+            used = [file.layouts[kind] for kind in {*file_kinds.tolist()}]
+            damages += _damages(file_numbers, used, f"{file.source}: {name}")
+            numbers = np.append(numbers, file_numbers)
+            starts = np.append(starts, file_starts)
+            kinds = np.append(kinds, file_kinds + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
         self.damage = damages[-1] if damages else ""
         self._numbers = numbers
@@ -169,7 +169,7 @@ class Branch(Database):
         return any(self.name.split("/")[0] in file.names for file in self._files)
 
     def _remarks(self) -> tuple[str, ...]:
-        """What was left out, what is missing, what only some states hold."""
+        """Return notes on states that were left out or are missing, and on variables that not all states have."""
         notes = [
             f"{name}: the last state of {self.name} is not whole and was left out"
             for name in self._unfinished
@@ -186,70 +186,74 @@ class Branch(Database):
             notes.append(
                 f"{self.source} lacks the states {holes}; is a file of the family missing?"
             )
-        every = set().union(*self._variables)
+        names = set().union(*self._variables)
         common = {
-            name for name in every if all(name in held for held in self._variables)
+            name
+            for name in names
+            if all(name in variables for variables in self._variables)
         }
-        if late := listing(sorted(every - common)):
+        if late := listing(sorted(names - common)):
             notes.append(f"{self.source} has {late} in some states only")
         kinds = {
-            name: {held[name].dtype.kind for held in self._variables} for name in common
+            name: {variables[name].dtype.kind for variables in self._variables}
+            for name in common
         }
         if changing := listing(sorted(name for name in common if len(kinds[name]) > 1)):
             notes.append(
                 f"{self.source} has {changing} of another type in some states: damaged there, and left out"
             )
         if self and not self._numbers.size:
-            notes.append(f"{self.source} holds no state yet")
+            notes.append(f"{self.source} has no state yet")
         return tuple(notes)
 
     @property
     def scalars(self) -> tuple[str, ...]:
-        """Floating-point variables that all states hold with one value, in the order of the file."""
-        held = self._variables
+        """Floating-point variables with one value in every state, in the order of the file."""
+        first = self._variables[0] if self._variables else {}
         return tuple(
             name
-            for name in (held[0] if held else ())
-            if all(_is_scalar(one.get(name)) for one in held)
+            for name in first
+            if all(_is_scalar(variables.get(name)) for variables in self._variables)
         )
 
     @property
     def time_width(self) -> int:
-        """Bytes per number of the times, the shortest of all states; times of another type are refused when read."""
-        times = (held["time"].dtype for held in self._variables if "time" in held)
-        return min((one.itemsize for one in times if one.kind == "f"), default=8)
+        """Bytes per time, the fewest of all states; times that are not floating point are refused when read."""
+        widths = [
+            variables["time"].dtype.itemsize
+            for variables in self._variables
+            if "time" in variables and variables["time"].dtype.kind == "f"
+        ]
+        return min(widths, default=8)
 
     @cached_property
     def legend(self) -> dict[int, str]:
         """Titles of the parts by id."""
         titles: dict[int, str] = {}
         for file, start, layout in self._metadata:
-            ids, legend = (
-                _integers(file, start, layout, "legend_ids"),
-                layout.variables.get("legend"),
-            )
+            ids = _integers(file, start, layout, "legend_ids")
+            legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
-                continue  # without a whole length per title nobody knows where one ends
-            raw, width = file.raw(start, legend), legend.count // ids.size
-            titles.update(
-                (id_, plain_text(raw[i * width : (i + 1) * width]))
-                for i, id_ in enumerate(ids.tolist())
-            )
+                continue  # the titles cannot be separated: their length is not constant
+            raw = file.raw(start, legend)
+            width = legend.count // ids.size
+            for i, id_ in enumerate(ids.tolist()):
+                titles[id_] = plain_text(raw[i * width : (i + 1) * width])
         return titles
 
     @cached_property
     def part_ids(self) -> tuple[int, ...]:
-        """Ids of all parts that any state holds, in the order of the lists."""
-        known: dict[int, None] = {}
+        """Ids of all parts of any state, in the order of the lists."""
+        part_ids: dict[int, None] = {}  # a set that keeps its order
         for group in self._groups:
             for part in group.chunks(max(self._list_lengths(group), default=1)):
                 listed = self.ids_of(part)
                 changed = np.append(True, (np.diff(listed, axis=0) != 0).any(axis=1))
-                known.update(dict.fromkeys(listed[changed].ravel().tolist()))
-        return tuple(known)
+                part_ids.update(dict.fromkeys(listed[changed].ravel().tolist()))
+        return tuple(part_ids)
 
     def text(self, name: str) -> str:
-        """Text from the metadata; empty if it is not there."""
+        """Return a text of the metadata, empty if it has none of this name."""
         for file, start, layout in self._metadata:
             if name in layout.variables:
                 return plain_text(file.raw(start, layout.variables[name]))
@@ -261,7 +265,7 @@ class Branch(Database):
         return self.channel("time")
 
     def channel(self, name: str) -> Samples:
-        """One variable of one value per state, shape (n,)."""
+        """Return a variable with one value per state, shape (n,)."""
         column = np.empty(self._numbers.size)
         for group, variable in self.checked(name):
             if variable.count != 1:
@@ -276,7 +280,7 @@ class Branch(Database):
         return column
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One variable of some parts, shape (n, len(ids))."""
+        """Return a variable of some parts, shape (n, len(ids))."""
         columns = np.empty((self._numbers.size, len(ids)))
         for group, variable in self.checked(quantity):
             for part in group.chunks(max(variable.count, len(ids))):
@@ -284,17 +288,18 @@ class Branch(Database):
                 if listed.shape[1] != variable.count:
                     counts = f"{variable.count} values of {quantity} for {listed.shape[1]} parts"
                     raise self.refused(part, f"{counts}; they cannot be told apart")
-                places = [self._places(part, listed, id_) for id_ in ids]
-                columns[part.rows] = (
-                    part.values(variable, np.stack(places, axis=1)) if places else 0.0
-                )
+                columns[part.rows] = 0.0
+                if ids:
+                    indices_of_parts = [self._places(part, listed, id_) for id_ in ids]
+                    indices = np.stack(indices_of_parts, axis=1)
+                    columns[part.rows] = part.values(variable, indices)
         return columns
 
     def checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
-        """Each group with its variable of this name.
+        """Yield each group with its variable of this name.
 
-        A count that fits neither the parts nor the other states is the mark of records of two states run into
-        each other: then no value of the state can be trusted.
+        A count that fits neither the parts nor the other states shows that records of two states were merged; then no
+        value of the state can be trusted.
         """
         for group in self._groups:
             variables = group.layout.variables
@@ -308,30 +313,35 @@ class Branch(Database):
                     group,
                     f"{name} is stored as {variables[name].dtype}, not as floating point",
                 )
-            for other, variable in variables.items():
-                if variable.count not in (fit := self._fitting(group, other)):
-                    counts = f"{variable.count} values of {other} where {listing(sorted(fit))} would fit"
+            for checked_name, variable in variables.items():
+                fitting = self._fitting(group, checked_name)
+                if variable.count not in fitting:
+                    counts = f"{variable.count} values of {checked_name} where {listing(sorted(fitting))} would fit"
                     raise self.refused(group, f"{counts}; the file is damaged there")
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Possible counts of a variable: one per state or per part, or what it is in the other states."""
+        """Return the possible counts of a variable: one per state or per part, or the count in the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}
 
     def _list_lengths(self, group: Group) -> set[int]:
-        own = group.layout.variables.get("ids")
-        return {own.count} if own else {ids.size for _, _, ids in self._id_lists}
+        """Return the possible numbers of parts in a group: that of its own list of ids, or of those in the metadata."""
+        ids_of_states = group.layout.variables.get("ids")
+        if ids_of_states:
+            return {ids_of_states.count}
+        return {ids.size for _, _, ids in self._id_lists}
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        """Say why a value of a state is not given."""
+        """Return the error for a value of a state that cannot be trusted."""
         return FormatError(
             f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
         )
 
     @cached_property
     def _metadata(self) -> list[tuple[Lsda, int, DirectoryLayout]]:
+        """File, start [byte] and layout of each metadata directory of the branch."""
         return [
             (file, start, file.layouts[layout])
             for file in self._files
@@ -340,7 +350,7 @@ class Branch(Database):
 
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
-        """Each list of part ids in the metadata: number of the file, byte, ids."""
+        """The lists of part ids in the metadata, each with the number of its file and its byte."""
         lists = (
             (file, at, _integers(file, at, layout, "ids"))
             for file, at, layout in self._metadata
@@ -350,29 +360,31 @@ class Branch(Database):
         ]
 
     def ids_of(self, group: Group) -> Indices:
-        """Part ids of a group's states, shape (states, parts); (1, parts) if they are the same for all."""
-        own = group.layout.variables.get("ids")
-        if own and own.dtype.kind in "iu":
-            return group.values(own, np.arange(own.count)[None, :]).astype(np.int64)
+        """Return the part ids of a group's states, shape (states, parts), or (1, parts) if they are all the same."""
+        ids_of_states = group.layout.variables.get("ids")
+        if ids_of_states and ids_of_states.dtype.kind in "iu":
+            indices = np.arange(ids_of_states.count)[None, :]
+            return group.values(ids_of_states, indices).astype(np.int64)
         if not self._id_lists:
             raise FormatError(
                 f"{self.source} has no part ids in its metadata; the values cannot be assigned to parts"
             )
         index = self._files.index(group.file)
-        before = sum(1 for file, _, _ in self._id_lists if file < index)
-        here = np.array(
+        lists_in_earlier_files = sum(1 for file, _, _ in self._id_lists if file < index)
+        list_starts = np.array(
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state is in force; a rank's file may bring its list behind the first states.
-        in_force = np.maximum(before + np.searchsorted(here, group.starts) - 1, 0)
+        # The last list before a state applies; a file of an MPI rank may contain its list after the first states.
+        before_state = np.searchsorted(list_starts, group.starts)
+        in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {
             int(i): self._id_lists[i][2] for i in np.flatnonzero(np.bincount(in_force))
         }
         if len({entry.size for entry in lists.values()}) > 1:
             raise self.refused(
                 group,
-                "the number of parts changes here or later, that of the values does not",
+                "the number of parts changes here or later, but not the number of values",
             )
         if len(lists) == 1:
             ids: Indices = next(iter(lists.values()))
@@ -380,32 +392,31 @@ class Branch(Database):
         return np.stack([lists[i] for i in in_force.tolist()])
 
     def _places(self, group: Group, listed: Indices, id_: int) -> Indices:
-        """Where in its lists each state has a part, shape (states,) or (1,)."""
-        found = listed == id_
-        times = found.sum(axis=1)
+        """Return the index of a part in the list of each state, shape (states,) or (1,)."""
+        is_part = listed == id_
+        times = is_part.sum(axis=1)
         if (times != 1).any():
             row = int(np.argmax(times != 1))
-            hint = (
-                "it is there in some states only"
-                if id_ in self.part_ids
-                else f"there are {listing(self.part_ids)}"
-            )
+            hint = f"there are {listing(self.part_ids)}"
+            if id_ in self.part_ids:
+                hint = "it is there in some states only"
             raise self.refused(
                 group, f"part {id_} is listed {times[row]} times, not once; {hint}", row
             )
-        return np.asarray(found.argmax(axis=1))
+        return np.asarray(is_part.argmax(axis=1))
 
 
 def _is_scalar(variable: Variable | None) -> bool:
+    """Return True if a variable is a single floating-point value."""
     return variable is not None and variable.count == 1 and variable.dtype.kind == "f"
 
 
 def _integers(file: Lsda, start: int, layout: DirectoryLayout, name: str) -> Indices:
-    """List of integers from a directory; empty if there is none of this name."""
+    """Return the list of integers of this name in a directory, empty if there is none."""
     variable = layout.variables.get(name)
     if variable is None or variable.dtype.kind not in "iu":
         return np.empty(0, dtype=np.int64)
-    places = (
+    positions = (
         start + variable.offset + variable.dtype.itemsize * np.arange(variable.count)
     )
-    return file.read(places, variable.dtype).astype(np.int64)
+    return file.read(positions, variable.dtype).astype(np.int64)

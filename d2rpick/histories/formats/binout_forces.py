@@ -1,4 +1,4 @@
-"""LS-DYNA binout: the branches rcforc (contacts) and rwforc (rigid walls), whose states hold a force of each."""
+"""LS-DYNA binout: the force branches rcforc (contacts) and rwforc (rigid walls)."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Branches of forces, and what each tells of.
+# Branches of forces, and what exerts the forces.
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
 def writes_forces(files: Sequence[Lsda]) -> bool:
-    """Whether any state of a family holds forces."""
+    """Return True if any state of a family contains forces."""
     return any(ForceBranch(name, files, by_part=True).writes_forces for name in FORCES)
 
 
 def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
-    """Give the forces of all contacts and rigid walls of a family; FormatError where they cannot be assigned."""
+    """Return the forces of all contacts and rigid walls of a family; raise FormatError if they cannot be assigned."""
     branches = [ForceBranch(name, files, by_part=True) for name in FORCES]
     return tuple(
         force
@@ -40,17 +40,17 @@ def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
 
 
 class ForceBranch(Branch):
-    """A branch whose variables are lists with one value for each side of each contact, or for each wall."""
+    """A branch whose variables are lists, with one value for each side of each contact or for each wall."""
 
     @property
     def writes_forces(self) -> bool:
-        """Whether its states hold forces; a run without a contact writes states of their time alone."""
+        """True if its states contain forces; a run without contacts writes states with a time only."""
         return bool(self._variables) and all(
-            "x_force" in held for held in self._variables
+            "x_force" in variables for variables in self._variables
         )
 
     def of_each(self, name: str) -> tuple[Indices, Samples]:
-        """Ids of all that is listed, of contacts once for each side, and one variable of theirs, of shape (n, ids)."""
+        """Return the listed ids (a contact has one for each side), and one of their variables, shape (n, ids)."""
         listed: Indices | None = None
         columns: list[tuple[Indices, Samples]] = []
         for group, variable in self.checked(name):
@@ -63,19 +63,21 @@ class ForceBranch(Branch):
             ):
                 raise self.refused(
                     group,
-                    f"other ids than before, which the values of {name} cannot be assigned to",
+                    f"other ids than before, so the values of {name} cannot be assigned",
                 )
             listed = first
             values = group.values(variable, np.arange(variable.count)[None, :])
             columns.append((group.rows, values))
-        found = np.empty((self.time.size, 0 if listed is None else listed.size))
+        if listed is None:
+            return np.empty(0, np.int64), np.empty((self.time.size, 0))
+        forces = np.empty((self.time.size, listed.size))
         for rows, values in columns:
-            found[rows] = values
-        return np.empty(0, np.int64) if listed is None else listed, found
+            forces[rows] = values
+        return listed, forces
 
 
 def _forces_of(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Put the sides of each contact together: they have the same force in opposite directions, or one has none."""
+    """Yield one force for each contact: its sides have the same force in opposite directions, or one side has none."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

@@ -1,4 +1,4 @@
-"""Blocks of solver databases: what one looks like, how many are like it, and the numbers they hold."""
+"""The blocks of solver text files: their layout, how many blocks have the same one, and the numbers in them."""
 
 from __future__ import annotations
 
@@ -20,21 +20,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-UNSURE: Final = (
-    -1
-)  # in place of an offset: the field is cut, or stands in the block twice
+UNSURE: Final = -1  # offset of a field that is cut, or occurs twice in the block
 
 _OVERLONG: Final = 512  # bytes of a line that no solver writes
 
+CHUNK: Final = 1 << 20  # bytes compared together, which stay in the cache
+_FOLD: Final = 16  # adjacent blocks compared as one row, which halves the time
+_LONGEST: Final = 1 << 22  # bytes; a longer block is walked record by record
+_NUMBER: Final = re.compile(
+    rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
+)
+_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
+# Flags added to the two digits of an exponent, which fill a byte: negative exponent, negative number.
+_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
+
 
 class BlockLayout(NamedTuple):
-    """Where in a block what stands.
+    """The layout of a block: which field is where.
 
-    ``fields`` maps the name of a number to its offset in the block, or to UNSURE.  ``literal`` is 255 for the
-    bytes that all blocks of this layout share, line ends among them, and 0 for the others; its shape is that
-    of the block.  No line of a block can be hidden between literal bytes.
-    ``last`` names the number the block ends with.  ``broken_off`` is True when the head of another run
-    follows in place of the next block.
+    ``fields`` maps the name of a number to its offset in the block, or to UNSURE. ``literal``, shape (size of the
+    block,), is 255 for the bytes that all blocks of this layout share, line ends among them, and 0 for the others, so
+    that no line of a block can be hidden between literal bytes. ``last`` is the name of the last number of the block.
+    ``broken_off`` is True if the head of another run follows instead of the next block.
     """
 
     fields: Mapping[Any, int]
@@ -44,15 +51,15 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """What the engine has to know about a database.
+    """The form of the blocks of a file format, as the reader of blocks needs it.
 
-    ``start`` is the text a block's first line begins with; ``lines`` matches the lines that are known.  ``describe``
-    takes a block apart, by these lines, and names its numbers and the last of them; it releases their columns, in an
-    array of the shape of the block.  What ``changing`` matches in other lines may differ from block to block: it must
-    match short pieces only, lest a whole line hide in one.  ``time`` is the first number.  ``whole`` tells whether a
-    block that stands alone in its file is known to be whole.  The numbers have ``width`` columns and ``decimals``
-    places.  ``compare_all`` compares every block in full when the file is opened; otherwise, where all blocks have one
-    size, only their first lines, and the rest when it is read.
+    ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
+    these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
+    in ``literal`` to 0. ``changing`` matches what may differ between blocks in other lines: short pieces only, so
+    that no whole line is ignored. ``time`` is the name of the first number. ``whole`` returns True if the only block
+    of a file is known to be whole. Numbers have ``width`` columns and ``decimals`` decimals. If ``compare_all`` is
+    True, every block is compared in full when the file is opened; otherwise, if all blocks have one size, only their
+    first lines are compared, and the rest when it is read.
     """
 
     start: bytes
@@ -68,35 +75,32 @@ class Grammar(NamedTuple):
     compare_all: bool
 
     def layout(self, block: bytes) -> BlockLayout:
-        """Find where in a block what stands."""
-        literal, lines = (
-            np.full(len(block), 255, np.uint8),
-            [*self.lines.finditer(block)],
-        )
+        """Find the layout of a block."""
+        literal = np.full(len(block), 255, np.uint8)
+        lines = [*self.lines.finditer(block)]
         edges = [0, *(edge for line in lines for edge in line.span()), len(block)]
-        for first, behind in zip(edges[::2], edges[1::2], strict=True):
-            for piece in self.changing.finditer(block, first, behind):
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            for piece in self.changing.finditer(block, begin, end):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
-        if (
-            max(map(len, block.split(b"\n"))) >= _OVERLONG
-        ):  # states were blanked, and hide in it
+        longest_line = max(map(len, block.split(b"\n")))
+        if longest_line >= _OVERLONG:  # further states are hidden in a damaged line
             fields = {
-                name: place if name == self.time else UNSURE
-                for name, place in fields.items()
+                name: offset if name == self.time else UNSURE
+                for name, offset in fields.items()
             }
         return BlockLayout(fields, literal, last, broken_off=b"ls-dyna" in block)
 
 
 def head(data: bytes | Content) -> tuple[str, str, int]:
-    """Read the head of an LS-DYNA text database.
+    """Read the head of an LS-DYNA text file.
 
     Returns
     -------
     title, version : str
-        Empty if there is no head.
+        Empty if the file has no head.
     begin : int
-        Address behind it.
+        Address after the head [byte].
     """
     lines = data[:4096].split(b"\n")
     if len(lines) < 3 or b"ls-dyna" not in lines[1]:
@@ -106,18 +110,12 @@ def head(data: bytes | Content) -> tuple[str, str, int]:
 
 
 def written_head(title: str, database: str) -> str:
-    """Two lines as solvers write them; no release of a solver wrote this, its name alone tells the layout."""
+    """Return the two head lines of a made-up file. They name no release of a solver, since no solver wrote the file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
-CHUNK: Final = (
-    1 << 20
-)  # bytes compared at a time: they stay in the cache between the two passes
-_FOLD: Final = 16  # blocks side by side compared as one row: saves half the time
-
-
 class Stretch(NamedTuple):
-    """``repeats`` blocks of ``stride`` bytes from ``start`` on, laid out like the one at ``example``."""
+    """``repeats`` blocks of ``stride`` bytes from byte ``start`` on, with the layout of the block at ``example``."""
 
     start: int
     stride: int
@@ -129,20 +127,20 @@ def like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
-    """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example.
+    """Count the blocks of ``run`` whose literal bytes, from ``offset`` on, are those of its example.
 
     Parameters
     ----------
     data : Content
     run : Stretch
     offset : int
-        Where in the blocks to begin.
+        Byte of the blocks from which on they are compared.
     literal : array of shape (size,)
         255 for the bytes that must be those of the example, 0 for the others.
     varied : array of shape (size,), optional
-        Gets the bits in which a byte of any counted block differs from the example.
+        Is set to the bits in which a byte of any counted block differs from the example.
     take : callable, optional
-        Gets those bytes of the counted blocks, some blocks at a time, shape (count, size), while they are at hand.
+        Is called with these bytes of the counted blocks, shape (count, size), some blocks at a time.
 
     Examples
     --------
@@ -154,8 +152,9 @@ def like_example(
     size = literal.size
     example = data.view(run.example + offset, run.example + offset + size).copy()
     done, step = (0, 1) if size else (run.repeats, 1)
-    most = max(1, CHUNK // max(1, size))
-    most -= most % _FOLD if most > _FOLD else 0
+    largest_step = max(1, CHUNK // max(1, size))
+    if largest_step > _FOLD:
+        largest_step -= largest_step % _FOLD
     alike = True
     while alike and done < run.repeats:
         rows = _rows(
@@ -169,20 +168,21 @@ def like_example(
         alike = not (differing & literal).any()
         if not alike:
             rows = rows[: int(((rows ^ example) & literal).any(axis=1).argmax())]
-            differing = (
-                _differing(rows, example) if len(rows) else np.zeros_like(example)
-            )
+            if len(rows):
+                differing = _differing(rows, example)
+            else:
+                differing = np.zeros_like(example)
         if varied is not None:
             varied |= differing
         if take is not None:
             take(rows)
         done += len(rows)
-        step = min(2 * step, most)
+        step = min(2 * step, largest_step)
     return done
 
 
 def _rows(data: Content, first: int, stride: int, count: int, size: int) -> Bytes:
-    """``size`` bytes of each of ``count`` blocks, shape (count, size)."""
+    """Return ``size`` bytes of each of ``count`` blocks, shape (count, size)."""
     if 2 * size < stride:
         return data.fields(first + stride * np.arange(count), size)
     span = data.view(first, first + (count - 1) * stride + size)
@@ -190,19 +190,20 @@ def _rows(data: Content, first: int, stride: int, count: int, size: int) -> Byte
 
 
 def _differing(rows: Bytes, example: Bytes) -> Bytes:
-    """Bits in which any of the rows differs from the example, shape (size,)."""
+    """Return the bits in which any of the rows differs from the example, shape (size,)."""
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
-    # a bit is the example's in all rows where it is so in their AND and in their OR
-    least, most = (
-        of.reduce(of.reduce(rows, axis=0).reshape(-1, size))
-        for of in (np.bitwise_and, np.bitwise_or)
-    )
-    return np.asarray((least ^ example) | (most ^ example))
+    # A bit is the same in all rows and the example if it is so in the AND and in the OR of the rows.
+    bits_of_all = _reduce_rows(np.bitwise_and, rows, size)
+    bits_of_any = _reduce_rows(np.bitwise_or, rows, size)
+    return np.asarray((bits_of_all ^ example) | (bits_of_any ^ example))
 
 
-_LONGEST: Final = 1 << 22  # a block with more bytes is left to the walk
+def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
+    """Combine all blocks of some rows, each of one or more blocks of ``size`` bytes, into one block."""
+    folded = operation.reduce(rows, axis=0).reshape(-1, size)
+    return np.asarray(operation.reduce(folded))
 
 
 def repeats(
@@ -217,14 +218,14 @@ def repeats(
     fixed : array of shape (size,)
         255 for each byte of structure and 0 for each byte of data.
     numbers : sequence of (int, int)
-        Place and width of the decimal state numbers; each goes up by a step of its own, the same from block to block.
+        Offset and width of the decimal state numbers; each grows by its own constant step from block to block.
 
     Returns
     -------
     times : int
-        Number of repetitions behind the first block.
+        Number of repetitions after the first block.
     steps : list of int
-        How much each state number grows from one to the next.
+        Growth of each state number from one block to the next.
 
     Examples
     --------
@@ -237,11 +238,15 @@ def repeats(
     run = Stretch(begin, fixed.size, (len(data) - begin) // fixed.size, begin)
     if fixed.size > _LONGEST:
         return 0, []
-    found: list[NDArray[np.int64]] = []
+    numbers_of_blocks: list[NDArray[np.int64]] = []
     like_example(
-        data, run, 0, fixed, take=lambda rows: found.append(_decimals(rows, numbers))
+        data,
+        run,
+        0,
+        fixed,
+        take=lambda rows: numbers_of_blocks.append(_decimals(rows, numbers)),
     )
-    states = np.concatenate(found)
+    states = np.concatenate(numbers_of_blocks)
     steps = np.diff(states[:2], axis=0)
     if not steps.size or steps.min() < 1:
         return 0, []
@@ -251,11 +256,11 @@ def repeats(
     return (len(even) if even.all() else int(even.argmin())) - 1, steps[0].tolist()
 
 
-def _decimals(blocks: Bytes, places: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
-    """Decimal numbers of each block, shape (blocks, places); -1 where a byte is no digit."""
-    numbers = np.empty((len(blocks), len(places)), dtype=np.int64)
-    for column, (at, width) in enumerate(places):
-        digits = blocks[:, at : at + width].astype(np.int64) - ord("0")
+def _decimals(blocks: Bytes, fields: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """Return the decimal numbers of each block, shape (blocks, fields); -1 if a byte of a number is not a digit."""
+    numbers = np.empty((len(blocks), len(fields)), dtype=np.int64)
+    for column, (offset, width) in enumerate(fields):
+        digits = blocks[:, offset : offset + width].astype(np.int64) - ord("0")
         number = digits @ 10 ** np.arange(width - 1, -1, -1, dtype=np.int64)
         numbers[:, column] = np.where(
             ((digits < 0) | (digits > 9)).any(axis=1), -1, number
@@ -263,19 +268,9 @@ def _decimals(blocks: Bytes, places: Sequence[tuple[int, int]]) -> NDArray[np.in
     return numbers
 
 
-_NUMBER: Final = re.compile(
-    rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
-)
-_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-_SHRINKS, _NEGATIVE = (
-    1 << 8,
-    1 << 9,
-)  # beside the two digits of an exponent, which fill a byte
-
-
 @cache
 def _scales(decimals: int) -> tuple[Samples, Samples]:
-    """Factors and divisors of mantissas without point, one of both 1, by exponent and signs; NaN for none exact."""
+    """Return factors and divisors of mantissas without point, by exponent and signs: one is 1, or NaN if inexact."""
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
         np.minimum(abs(exponent), _EXACT + 1)
@@ -287,7 +282,7 @@ def _scales(decimals: int) -> tuple[Samples, Samples]:
 
 
 def number(text: bytes) -> float:
-    """Value of one right-justified Fortran field, NaN if it does not hold a finite number.
+    """Return the value of a right-justified Fortran field, NaN if it is not a finite number.
 
     Examples
     --------
@@ -305,18 +300,17 @@ def number(text: bytes) -> float:
 
 
 def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
-    """Values of fixed-width fields, each the very double that ``float()`` gives; NaN for what is no number.
+    """Return the values of fixed-width fields, exactly those of ``float()``; NaN for a field that is not a number.
 
-    Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power
-    of ten are both exact doubles, so their one product or quotient is correctly rounded.  All others go
-    through ``number``.
+    Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
+    both exact doubles, so their product or quotient is correctly rounded. ``number`` converts all others.
 
     Parameters
     ----------
     fields : array of bytes of one width, shape (n,)
         As written in the file.
     decimals : int
-        Places behind the point in the usual shape.
+        Decimals in the usual shape.
 
     Returns
     -------
@@ -333,9 +327,11 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     column = np.ascontiguousarray(
         np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T
     )
-    point, mark = width - 5 - decimals, width - 4
-    negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
-    # wraps around for what is below "0", so one comparison is enough
+    point = width - 5 - decimals
+    mark = width - 4
+    negative = column[point - 2] == ord("-")
+    shrinks = column[mark + 1] == ord("-")
+    # uint8 wraps around below "0", so that one comparison is enough
     digits = column[
         [point - 1, *range(point + 1, mark), mark + 2, mark + 3]
     ] - np.uint8(ord("0"))
@@ -345,12 +341,12 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= shrinks | (column[mark + 1] == ord("+"))
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
-    weights = np.array([float(10**place) for place in range(decimals, -1, -1)])
+    weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
     values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
-    tens, ones = digits[-2:]
+    tens, units = digits[-2:]
     scale = (
         tens * np.uint8(10)
-        + ones
+        + units
         + shrinks * np.uint16(_SHRINKS)
         + negative * np.uint16(_NEGATIVE)
     )

@@ -1,4 +1,4 @@
-"""Cells of a line of text: how a line is cut, which cells hold a number, and what stands for a missing one."""
+"""The cells of a line of text: how a line is cut into cells, which cells are numbers, and which mark missing values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
-# What a spreadsheet writes for a value it cannot compute, in English and German; a line may begin with it.
+# What spreadsheets write for a value that they cannot compute, in English and German.  These begin with the comment
+# sign "#", but a line that begins with one of them is a row.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -29,54 +30,56 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-_OVERFLOW: Final = re.compile(r"\*+|#{2,}")  # a number too wide for its field
+# What is written for a number that is too wide for its field.
+_OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
-# What was taken is not given back: the time grows with the length of a cell, not with its square.
+# A number by its decimal sign.  The quantifiers are possessive (no backtracking), so that the time grows linearly with
+# the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
-_GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"  # thousands and decimal sign; compiled where it is needed
-# Signs between groups of three digits, beside the one of "." and "," that is not the decimal sign.
+# A number with thousands separators, to be filled in with this separator and the decimal sign.
+_GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
+# Thousands separators that are tried after "." or "," (whichever is not the decimal sign).
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# A date or clock time, a percentage: no numbers, but nothing that a wrong separator makes either.
+# A date, clock time or percentage: not a number, yet no sign that the line was cut with the wrong separator.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-_RULE: Final = (
-    "-=+|:_ \t"  # signs of a line that is drawn between rows or around a table
-)
+_RULE: Final = "-=+|:_ \t"  # characters of a line drawn between rows or around a table
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
 def split(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without blanks and quotes around them; a separator inside quotes does not count.
+    """Split a line into its cells, without outer blanks and quotes; a separator inside quotes is part of its cell.
 
     Examples
     --------
     >>> split('"part 3, left", 1.5 ,', ",")
     ['part 3, left', '1.5', '']
     """
+    if '"' not in line and separator is None:
+        return line.split()
     if '"' not in line:
-        return (
-            line.split()
-            if separator is None
-            else [cell.strip() for cell in line.split(separator)]
-        )
+        return [cell.strip() for cell in line.split(separator)]
     sign = separator or " "
+    if separator is None:
+        line = " ".join(line.split())
     cells: list[str] = []
-    inside = False
-    for piece in (line if separator else " ".join(line.split())).split(sign):
-        if inside:
+    is_quoted = False
+    for piece in line.split(sign):
+        if is_quoted:
             cells[-1] += sign + piece
         else:
             cells.append(piece)
-        inside ^= piece.count('"') % 2 == 1
+        if piece.count('"') % 2:
+            is_quoted = not is_quoted
     return [cell.strip().removeprefix('"').removesuffix('"').strip() for cell in cells]
 
 
 def is_skipped(line: str) -> bool:
-    """Return True if a line is blank, a comment or a rule.
+    """Return True if a line is blank, a comment or a rule drawn with signs.
 
     Examples
     --------
@@ -92,7 +95,7 @@ def is_skipped(line: str) -> bool:
 
 
 def as_number(cell: str, decimal: str, thousands: str = "") -> float | None:
-    """Return the number in a cell, or None; words and underscores are none, though Python takes them.
+    """Return the number in a cell, or None; unlike Python's float, refuse words (``nan``) and underscores.
 
     Examples
     --------
@@ -124,22 +127,22 @@ def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
 
 
 def is_missing(cell: str) -> bool:
-    """Return True if a cell is empty, or holds what stands for a number that is missing."""
+    """Return True if a cell is empty, or marks a missing number (``NaN``, ``n/a``, ``#DIV/0!``, ``****``)."""
     return cell.casefold() in _MISSING or _OVERFLOW.fullmatch(cell) is not None
 
 
 def is_word(cell: str) -> bool:
-    """Return True if a cell that is no number is a word, date, clock time or percentage.
+    """Return True if a cell that is not a number is a word, date, clock time or percentage.
 
-    A word begins with a letter: "5 load 1" is a piece of "0,5 load 1,5", cut at the wrong places.
+    A word begins with a letter: "5 load 1" is what a wrong separator cuts out of "0,5 load 1,5".
     """
     return cell[0].isalpha() or _DATE_OR_SHARE.fullmatch(cell) is not None
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
-    """Return the sign between groups of three digits, empty if no cell shows for sure that it is one.
+    """Return the thousands separator of some cells, or an empty string if no cell proves that there is one.
 
-    A number with the sign and the decimal sign shows it, or one with two such signs: "1.234" alone may be either.
+    A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
 
     Examples
     --------
@@ -148,12 +151,8 @@ def find_thousands(cells: Sequence[str], decimal: str) -> str:
     """
     for sign in ("." if decimal == "," else ",", *_THOUSANDS):
         grouped = re.compile(_GROUPED % (re.escape(sign), re.escape(decimal)), re.ASCII)
-        sure = (
-            cell
-            for cell in cells
-            if sign in cell
-            and (decimal in cell or cell.count(sign) > 1 or sign not in ".,")
-        )
-        if any(grouped.fullmatch(cell) for cell in sure):
-            return sign
+        for cell in cells:
+            is_proof = decimal in cell or cell.count(sign) > 1 or sign not in ".,"
+            if sign in cell and is_proof and grouped.fullmatch(cell):
+                return sign
     return ""

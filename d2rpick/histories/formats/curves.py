@@ -1,9 +1,9 @@
-"""Curves one after the other in one text, each with times of its own: what pre- and postprocessors export.
+"""Texts of curves one after the other, each with its own times, as pre- and postprocessors export them.
 
-LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a star,
-pairs of numbers and ``endcurve``.  LS-PrePost's XY pairs: a line with the number of pairs, then these.  T/HIS ``.cur``:
-title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar; the Oasys programs write
-type and factor behind a label.  DYNAFORM: the number of curves; for each ``number 'name'`` and pairs.
+LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
+star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
+``.cur``: title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar sign; the Oasys
+programs write type and factor after a label. DYNAFORM: the number of curves; for each ``number 'name'`` and pairs.
 """
 
 from __future__ import annotations
@@ -35,22 +35,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
 
 _POINTS: Final = "#pts="
-_DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
-_LONGEST_LABEL: Final = (
-    1000  # what is longer is no label, and would be searched for long
-)
-# Type and factor that the Oasys programs write behind a label: "Time <TIME/0.001>;".  Compiled where it is needed.
+_DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
+_LONGEST_LABEL: Final = 1000  # characters; keeps the search in a longer line short
+# Type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
-_FEWEST_LABELS: Final = 3  # of x, y and the curve; the title may be blank
-_MOST_DIGITS: Final = 12  # no file has more pairs than such a number says
+# x label, y label and name of the curve; the title may be blank
+_FEWEST_LABELS: Final = 3
+_MOST_DIGITS: Final = 12  # of a number of pairs; a longer one is damaged
 
 
 class _Curve:
-    """Name of a curve, its pairs as cells, and the numbers of their lines."""
+    """A curve: its name, its pairs as text cells, and the line numbers of the pairs."""
 
     def __init__(self, name: str) -> None:
-        from array import array  # not above: plain tables do without it
+        from array import array  # imported here: plain tables do not need it
 
         self.name = name
         self.times: list[str] = []
@@ -59,17 +58,16 @@ class _Curve:
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
-    """Read a text of curves, those whose times are asked for first by the selection; None for any other text."""
-    found = _CurveText(text)
-    read = next(
-        (read for read in (_curveplot, _t_his, _dynaform, _counted) if read(found)),
-        None,
-    )
-    return Curves(found, selection) if read else None
+    """Read a text of curves, with the times of the first curve of the selection; return None for any other text."""
+    curves = _CurveText(text)
+    for read in (_curveplot, _t_his, _dynaform, _counted):
+        if read(curves):
+            return Curves(curves, selection)
+    return None
 
 
 class _CurveText:
-    """What was found in a text: curves, the label of their x axis, and what it ends within of."""
+    """The content of a text while it is read: the curves, the label of their x axis, and the curve that is open."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -80,12 +78,12 @@ class _CurveText:
         self.last = 0  # number of the last line
 
     def top(self, count: int) -> list[str]:
-        """The first lines that are neither blank nor comments."""
-        rest = [self._text.unended] if self._text.is_short else []
-        return list(islice(filter(_counts, chain(self._text.head, rest)), count))
+        """Return the first lines that are neither blank nor comments."""
+        unended = [self._text.unended] if self._text.is_short else []
+        return list(islice(filter(_counts, chain(self._text.head, unended)), count))
 
     def lines(self) -> Iterator[tuple[int, str]]:
-        """All lines that are neither blank nor comments, numbered."""
+        """Yield number and text of all lines that are neither blank nor comments."""
         for number, line in enumerate(self._text.lines(0), 1):
             self.last = number
             if _counts(line):
@@ -95,7 +93,7 @@ class _CurveText:
             yield self.last, self._text.unended
 
     def add(self, number: int, line: str) -> None:
-        """Add a pair to the last curve."""
+        """Add the pair in a line to the last curve."""
         cells = line.replace(",", " ").split()
         if len(cells) != 2 or not self.curves:
             raise FormatError(
@@ -107,7 +105,7 @@ class _CurveText:
         curve.lines.append(number)
 
     def count(self, number: int, digits: str) -> int:
-        """Read how many pairs or curves a line announces."""
+        """Return the number of pairs or curves that a line announces."""
         if len(digits) > _MOST_DIGITS:
             raise FormatError(
                 f"{self.source}:{number}: a count of {len(digits)} digits; the file is damaged"
@@ -115,38 +113,38 @@ class _CurveText:
         return int(digits)
 
     def close(self, number: int, expected: int) -> None:
-        """End the last curve; FormatError unless it has the pairs that were announced."""
-        found = len(self.curves[-1].times)
-        if found != expected:
-            what = f"{self.source}:{number}: {found} pairs, {expected} were expected in {self.stops}"
-            raise FormatError(f"{what}; export it again")
+        """End the last curve; raise FormatError unless it has the announced number of pairs."""
+        count = len(self.curves[-1].times)
+        if count != expected:
+            problem = f"{self.source}:{number}: {count} pairs, {expected} were expected in {self.stops}"
+            raise FormatError(f"{problem}; export it again")
         self.stops = ""
 
 
 class Curves(Database):
-    """Curves of one text; a `Database` without parts, whose times are those of the curves that are asked for."""
+    """The curves of one text as a `Database` without parts; its times are those of the first requested curve."""
 
     format = "csv"
     named_by_people = True
 
-    def __init__(self, found: _CurveText, selection: Selection) -> None:
-        self.source = found.source
-        self.time_unit = unit_of(found.x_label) or found.time_unit
+    def __init__(self, text: _CurveText, selection: Selection) -> None:
+        self.source = text.source
+        self.time_unit = unit_of(text.x_label) or text.time_unit
         self._curves = dict(
             zip(
-                unique([one.name for one in found.curves], "curve"),
-                found.curves,
+                unique([curve.name for curve in text.curves], "curve"),
+                text.curves,
                 strict=True,
             )
         )
         self.channels = tuple(self._curves)
-        notes = [f"the file ends within {found.stops}"] if found.stops else []
-        if found.x_label and not is_time(found.x_label):
+        notes = [f"the file ends within {text.stops}"] if text.stops else []
+        if text.x_label and not is_time(text.x_label):
             notes.append(
-                f"the x axis is called {found.x_label!r}; it was taken for the time"
+                f"the x axis is called {text.x_label!r}; it was used as the time"
             )
-        last = found.curves[-1]
-        breaks_off = found.unended and bool(last.times) and last.lines[-1] == found.last
+        last = text.curves[-1]
+        breaks_off = text.unended and bool(last.times) and last.lines[-1] == text.last
         cut = breaks_off and not is_whole(last.values[-1], last.values[:-1])
         if cut:
             for cells in (last.times, last.values, last.lines):
@@ -154,7 +152,7 @@ class Curves(Database):
             notes.append(
                 "the last line has no line end and may be cut; it was left out"
             )
-        self.complete = not found.stops and not cut
+        self.complete = not text.stops and not cut
         self.notes = tuple(notes)
         if selection.time is not None and not is_time(selection.time):
             raise FormatError(
@@ -164,22 +162,21 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only one named like an internal energy; else FormatError with all there are."""
-        fitting = (
-            range(1)
-            if len(self.channels) == 1
-            else find_internal_energies(self.channels)
-        )
+        """The only curve, or the only one named like an internal energy; FormatError lists all curves otherwise."""
+        if len(self.channels) == 1:
+            fitting = [0]
+        else:
+            fitting = find_internal_energies(self.channels)
         if len(fitting) != 1:
-            found = f"{len(fitting)} curves are" if fitting else "no curve is"
-            what = f"{self.source}: {found} named like an internal energy"
-            raise FormatError(f"{what}; choose with `energy`: {self._menu()}")
+            count = f"{len(fitting)} curves are" if fitting else "no curve is"
+            problem = f"{self.source}: {count} named like an internal energy"
+            raise FormatError(f"{problem}; choose with `energy`: {self._menu()}")
         if len(self.channels) == 1:
             refuse_other_quantity(self.channels[0], self.source)
         return self.channels[fitting[0]]
 
     def find(self, wanted: str) -> str:
-        """Name of the curve that is meant by its name or 1-based number; FormatError with what there is."""
+        """Return the name of a curve given by its name or 1-based number; FormatError lists the curves."""
         if (
             wanted.isdecimal()
             and wanted not in self.channels
@@ -190,7 +187,7 @@ class Curves(Database):
 
     @cached_property
     def time(self) -> Samples:
-        """Times of the curve that is asked for first, shape (n,) [time]."""
+        """Times of the first requested curve, shape (n,) [time]."""
         name = self.find(self._asked[0]) if self._asked else self.energy_channel
         lines = self._curves[name].lines
         return of_one_run(
@@ -199,95 +196,98 @@ class Curves(Database):
         )
 
     def channel(self, name: str) -> Samples:
-        """Values of one curve, shape (n,); FormatError when its times are not those of the run."""
+        """Return the values of one curve, shape (n,); raise FormatError if its times are not those of the run."""
         if name not in self._curves:
             raise FormatError(f"{self.source}: no curve {name!r}, only {self._menu()}")
         if not np.array_equal(self._numbers(name, "times"), self.time):
             raise FormatError(
-                f"{self.source}: {name!r} has other times than the first curve that is asked for"
+                f"{self.source}: the times of {name!r} differ from those of the first requested curve"
             )
         return self._numbers(name, "values")
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """How finely the times and these curves were printed."""
+        """Return the precision with which the times and these curves were printed."""
         curves = [self._curves[name] for name in names or self.channels[:1]]
         times = [cell for curve in curves for cell in curve.times]
         values = [cell for curve in curves for cell in curve.values]
         return precisions(times, values, self.time)
 
     def _numbers(self, name: str, axis: str) -> Samples:
+        """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        numbers = np.array(
-            [as_number(cell, ".") for cell in cells], dtype=np.float64
-        )  # None becomes nan
+        # None becomes NaN
+        numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            found = f"{self.source}:{curve.lines[bad[0]]}: {cells[bad[0]][:60]!r} of {name!r}, a number was expected"
-            raise FormatError(f"{found}; repair or delete the line")
+            line = curve.lines[bad[0]]
+            cell = cells[bad[0]][:60]
+            problem = (
+                f"{self.source}:{line}: {cell!r} of {name!r}, a number was expected"
+            )
+            raise FormatError(f"{problem}; repair or delete the line")
         return numbers
 
     def _menu(self) -> str:
+        """Return numbers and names of the curves that can be chosen."""
         return listing(
             [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
         )
 
 
-def _curveplot(found: _CurveText) -> bool:
-    word, *labels = [line.strip() for line in found.top(4)] or [""]
+def _curveplot(text: _CurveText) -> bool:
+    """Read a Curveplot of LS-PrePost; return False for any other text."""
+    word, *labels = [line.strip() for line in text.top(4)] or [""]
     if word != "Curveplot":
         return False
-    found.x_label, y_label = (*labels, "", "", "")[1:3]
+    text.x_label, y_label = (*labels, "", "", "")[1:3]
     points = 0
-    for number, line in found.lines():
+    for number, line in text.lines():
         name, mark, digits = (piece.strip() for piece in line.rpartition(_POINTS))
         if mark and digits.isdecimal():
-            points = found.count(number, digits)
-            found.curves.append(
+            points = text.count(number, digits)
+            text.curves.append(
                 _Curve(name if name == y_label else f"{name}: {y_label}")
             )
-            found.stops = f"the curve {name!r}"
-        elif line.strip() == "endcurve" and found.stops:
-            found.close(number, points)
-        elif found.stops and not line.startswith("*"):
-            found.add(number, line)
-    if not found.curves:
+            text.stops = f"the curve {name!r}"
+        elif line.strip() == "endcurve" and text.stops:
+            text.close(number, points)
+        elif text.stops and not line.startswith("*"):
+            text.add(number, line)
+    if not text.curves:
         raise FormatError(
-            f"{found.source}: a Curveplot without a line '#pts=', no curve was found; export it again"
+            f"{text.source}: a Curveplot without a line '#pts=', no curve was found; export it again"
         )
     return True
 
 
-def _t_his(found: _CurveText) -> bool:
-    top = [_without_type(line) for line in found.top(5)]
-    labels = list(
-        takewhile(lambda line: not _is_pair(line), top)
-    )  # the title may be blank
-    x_label = next(
-        (place for place in (0, 1) if place < len(labels) and is_time(labels[place])),
-        None,
-    )
+def _t_his(text: _CurveText) -> bool:
+    """Read a .cur file of T/HIS; return False for any other text."""
+    top = [_without_type(line) for line in text.top(5)]
+    # the title may be blank, so the x label is the first or second label
+    labels = list(takewhile(lambda line: not _is_pair(line), top))
+    x_label = next((i for i in (0, 1) if i < len(labels) and is_time(labels[i])), None)
     if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):
         return False
-    found.x_label = labels[x_label]
-    found.time_unit = _unit_of_type(found.top(5)[x_label])
+    text.x_label = labels[x_label]
+    text.time_unit = _unit_of_type(text.top(5)[x_label])
     labels = []
     in_head = True
-    for number, line in found.lines():
+    for number, line in text.lines():
         if line.strip().upper() == "CONTINUE":
             in_head, labels = True, []
         elif in_head and not _is_pair(line):
             labels.append(_without_type(line))
         else:
             if in_head:
-                found.curves.append(
+                text.curves.append(
                     _Curve(
                         ": ".join(reversed(labels[-2:]))
-                        or f"curve {len(found.curves) + 1}"
+                        or f"curve {len(text.curves) + 1}"
                     )
                 )
                 in_head = False
-            found.add(number, line)
+            text.add(number, line)
     return True
 
 
@@ -303,14 +303,15 @@ def _without_type(line: str) -> str:
 
 
 def _unit_of_type(line: str) -> str:
-    """Return the unit of time that the factor of a label says, empty if there is none."""
-    found = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
-    factor = as_number(found[2].strip(), ".") if found and found[2] else None
+    """Return the unit of time that the factor of a label stands for, empty if there is none."""
+    match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
+    factor = as_number(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")
 
 
-def _dynaform(found: _CurveText) -> bool:
-    top = found.top(2)
+def _dynaform(text: _CurveText) -> bool:
+    """Read a text of curves from DYNAFORM; return False for any other text."""
+    top = text.top(2)
     if (
         len(top) < 2
         or not top[0].strip().isdecimal()
@@ -318,43 +319,45 @@ def _dynaform(found: _CurveText) -> bool:
     ):
         return False
     head = re.compile(_DYNAFORM)
-    lines = found.lines()
+    lines = text.lines()
     number, first = next(lines)
-    expected = found.count(number, first.strip())
+    expected = text.count(number, first.strip())
     for number, line in lines:
         if start := head.fullmatch(line):
-            found.curves.append(_Curve(start[1].strip()))
+            text.curves.append(_Curve(start[1].strip()))
         else:
-            found.add(number, line)
-    if len(found.curves) < expected:
-        found.stops = f"curve {len(found.curves)} of {expected}"
+            text.add(number, line)
+    if len(text.curves) < expected:
+        text.stops = f"curve {len(text.curves)} of {expected}"
     return True
 
 
-def _counted(found: _CurveText) -> bool:
-    top = found.top(2)
+def _counted(text: _CurveText) -> bool:
+    """Read the XY pairs of LS-PrePost; return False for any other text."""
+    top = text.top(2)
     if len(top) < 2 or not top[0].strip().isdecimal() or not _is_pair(top[1]):
         return False
     points = 0
-    for number, line in found.lines():
+    for number, line in text.lines():
         if line.strip().isdecimal():
-            if found.stops:
-                found.close(number, points)
-            points = found.count(number, line.strip())
-            found.curves.append(_Curve(f"curve {len(found.curves) + 1}"))
-            found.stops = f"the {found.curves[-1].name}"
+            if text.stops:
+                text.close(number, points)
+            points = text.count(number, line.strip())
+            text.curves.append(_Curve(f"curve {len(text.curves) + 1}"))
+            text.stops = f"the {text.curves[-1].name}"
         else:
-            found.add(number, line)
-    if len(found.curves[-1].times) >= points:
-        found.close(found.last, points)
+            text.add(number, line)
+    if len(text.curves[-1].times) >= points:
+        text.close(text.last, points)
     return True
 
 
 def _counts(line: str) -> bool:
-    """Whether a line is neither blank nor a comment."""
+    """Return True if a line is neither blank nor a comment."""
     return bool(line.strip()) and line[0] != "$"
 
 
 def _is_pair(line: str) -> bool:
+    """Return True if a line is a pair of numbers."""
     cells = line.replace(",", " ").split()
     return len(cells) == 2 and all(as_number(cell, ".") is not None for cell in cells)

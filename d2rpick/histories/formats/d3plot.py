@@ -1,9 +1,9 @@
-"""LS-DYNA d3plot and d3thdt: energies, velocities and masses of the model and its parts, which each state begins with.
+"""LS-DYNA d3plot and d3thdt: energies, velocities and masses of the model and its parts, at the start of each state.
 
-A run writes a family: the first file, d3plot, has the head, the geometry and perhaps states; d3plot01, d3plot02 and
-so on have states alone, none of which goes on in the next file.  A state is its time, the values of the model and of
-its parts, and then nodes and elements, which are most of it and are passed over.  The files of a family are known by
-their names, since only the first says what it is; a restart may leave numbers out.
+A run writes a family of files. The first file, d3plot, contains the head, the geometry and perhaps states; d3plot01,
+d3plot02 and so on contain whole states only. A state is its time, the values of the model and of the parts, and then
+the nodes and elements, which are most of it and are skipped. The files of a family are recognised by their names,
+since only the first one identifies itself; a restart may leave numbers out.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.floating[Any]]
 
-# Values of the whole model behind the time of a state.
+# Values of the whole model after the time of a state.
 _MODEL: Final = (
     "kinetic_energy",
     "internal_energy",
@@ -46,7 +46,7 @@ _MODEL: Final = (
     "z_velocity",
 )
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
-# Values of the parts, each for all parts together, by how many of a part come before; the velocity has three of each.
+# Values of the parts, each for all parts together, by the number of values of a part before it; the velocity has 3.
 _OF_PARTS: Final = {
     "internal_energy": 0,
     "kinetic_energy": 1,
@@ -57,11 +57,11 @@ _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _WALL: Final = "rigid_wall_{}_force"
-_TAIL: Final = 1 << 16  # bytes in which the mark at the end of a file is looked for
+_TAIL: Final = 1 << 16  # bytes at the end of a file in which its end mark is searched
 
 
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is the first one of a d3plot, or of a d3part; never raises."""
+    """Return True if these first bytes are those of a d3plot or d3part; never raises."""
     return family_of(head) in ("d3plot", "d3part")
 
 
@@ -82,7 +82,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """States of files: ``rows`` (n, values) of their heads; ``ended`` by marks; what to say of what is left out."""
+    """States of files: ``rows`` (n, values) of their first words; ``ended`` if each file has its end mark; notes."""
 
     rows: Rows
     ended: bool = True
@@ -90,23 +90,21 @@ class _States(NamedTuple):
 
 
 class D3plot(Database):
-    """One family of files, read as a `Database`; parts and the whole model share their times.
+    """One family of files as a `Database`; parts and the whole model have the same times.
 
-    FormatError if the head cannot be read, or states do not lie where it says.
+    Raises FormatError if the head cannot be read, or if the states do not match it.
     """
 
     format = "d3plot"
 
-    def __init__(self, first: Source, others: Mapping[int, Source]) -> None:
-        files = [first, *(others[number] for number in sorted(others))]
+    def __init__(self, first: Source, other_files: Mapping[int, Source]) -> None:
+        files = [first, *(other_files[number] for number in sorted(other_files))]
         self._head = head = read_head(content_of(first.data), first.name)
-        self.source = (
-            first.name
-            if len(files) == 1
-            else f"{first.name} and {len(files) - 1} files behind it"
-        )
-        found = _states_of(files, head)
-        self._rows = found.rows
+        self.source = first.name
+        if len(files) > 1:
+            self.source = f"{first.name} and {len(files) - 1} files after it"
+        states = _states_of(files, head)
+        self._rows = states.rows
         self.title, self.version, self.parts, self.no_parts = (
             head.title,
             head.version,
@@ -116,9 +114,9 @@ class D3plot(Database):
         self.digits = DIGITS[head.form.width]
         walls = [_WALL.format(number) for number in range(1, head.walls + 1)]
         self.channels = (*_MODEL, *walls)
-        missing = _missing(first.name, sorted(others))
-        self.complete = not missing and found.ended
-        self.notes = (*missing, *found.notes)
+        missing = _missing(first.name, sorted(other_files))
+        self.complete = not missing and states.ended
+        self.notes = (*missing, *states.notes)
 
     @cached_property
     def time(self) -> Samples:
@@ -127,22 +125,23 @@ class D3plot(Database):
 
     @cached_property
     def part_time(self) -> Samples:
-        """The same."""
+        """Times of all states, shape (n,) [time]."""
         return self.time
 
     def channel(self, name: str) -> Samples:
-        """One value of the whole model, or the force of a rigid wall, shape (n,)."""
+        """Return a value of the whole model, or the force of a rigid wall, shape (n,)."""
         if name not in self.channels:
             raise FormatError(
                 f"{self.source}: no {name}, there are {listing(self.channels)}; ask for one of these"
             )
-        place = self.channels.index(name)
-        of_parts = self._head.part_values * len(self.parts) if place >= GLOBALS else 0
-        return self._column(1 + place + of_parts)
+        index = self.channels.index(name)
+        # the forces of rigid walls come after the values of the parts
+        of_parts = self._head.part_values * len(self.parts) if index >= GLOBALS else 0
+        return self._column(1 + index + of_parts)
 
     @property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the rigid walls; those of contacts are in no d3plot."""
+        """Forces of the rigid walls; a d3plot has no forces of contacts."""
         walls = self.channels[GLOBALS:]
         return tuple(
             ContactForce.of_forces(
@@ -154,59 +153,55 @@ class D3plot(Database):
         )
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity of some parts, shape (n, len(ids)); their momenta are those of their masses at their velocity.
+        """Return a quantity of some parts, shape (n, len(ids)); a momentum is the mass times the velocity.
 
         Raises
         ------
         FormatError
-            If a part is not in the file, or without this quantity.
+            If a part is not in the file, or has not this quantity.
         """
         if not self.parts:
             raise FormatError(self.no_parts)
-        known = {part.id: place for place, part in enumerate(self.parts)}
-        if missing := [id_ for id_ in ids if id_ not in known]:
-            found = f"{self.source}: no part {listing(missing)}"
-            raise FormatError(f"{found}; choose from {listing(list(known))}")
-        places = np.array([known[id_] for id_ in ids], np.intp)
+        index_of = {part.id: index for index, part in enumerate(self.parts)}
+        if missing := [id_ for id_ in ids if id_ not in index_of]:
+            problem = f"{self.source}: no part {listing(missing)}"
+            raise FormatError(f"{problem}; choose from {listing(list(index_of))}")
+        indices = np.array([index_of[id_] for id_ in ids], np.intp)
         if quantity in _MOMENTA:
             velocity = self.part_channel(_VELOCITIES[_MOMENTA.index(quantity)], ids)
             return velocity * self.part_channel("mass", ids)
-        before = (
-            _VELOCITY
-            if quantity in _VELOCITIES
-            else _OF_PARTS.get(quantity, self._head.part_values)
-        )
-        if before >= self._head.part_values:
+        values_before = _OF_PARTS.get(quantity, self._head.part_values)
+        if quantity in _VELOCITIES:
+            values_before = _VELOCITY
+            indices = 3 * indices + _VELOCITIES.index(quantity)
+        if values_before >= self._head.part_values:
             raise FormatError(
                 f"{self.source}: no {quantity} of parts in its states; ask for another"
             )
-        if quantity in _VELOCITIES:
-            places = 3 * places + _VELOCITIES.index(quantity)
-        return self._rows[
-            :, _FIRST_OF_PARTS + before * len(self.parts) + places
-        ].astype(np.float64)
+        columns = _FIRST_OF_PARTS + values_before * len(self.parts) + indices
+        return self._rows[:, columns].astype(np.float64)
 
-    def _column(self, place: int) -> Samples:
-        return self._rows[:, place].astype(np.float64)
+    def _column(self, index: int) -> Samples:
+        """Return a word of all states as doubles, shape (n,)."""
+        return self._rows[:, index].astype(np.float64)
 
 
 def _states_of(files: Sequence[Source], head: Head) -> _States:
-    """Read the heads of the states of a family, whose first file has them behind its own head."""
-    real, values = head.form.real, 1 + head.globals
-    contents, begins = (
-        [content_of(file.data) for file in files],
-        [head.begin] + [0] * (len(files) - 1),
-    )
+    """Read the first words of all states of a family; in its first file the states begin after the head."""
+    real = head.form.real
+    values = 1 + head.globals
+    contents = [content_of(file.data) for file in files]
+    begins = [head.begin] + [0] * (len(files) - 1)
     counts = [
-        max(0, len(one) - begin) // head.state
-        for one, begin in zip(contents, begins, strict=True)
+        max(0, len(content) - begin) // head.state
+        for content, begin in zip(contents, begins, strict=True)
     ]
-    behind = np.cumsum(counts).tolist()
-    heads = np.empty((behind[-1], values * real.itemsize), np.uint8)
-    rests = [
+    ends = np.cumsum(counts).tolist()  # states up to the end of each file
+    heads = np.empty((ends[-1], values * real.itemsize), np.uint8)
+    first_words_after = [
         content.fill_rows(heads[end - count : end], begin, head.state, real.itemsize)
         for content, begin, end, count in zip(
-            contents, begins, behind, counts, strict=True
+            contents, begins, ends, counts, strict=True
         )
     ]
     for content in contents:
@@ -215,67 +210,68 @@ def _states_of(files: Sequence[Source], head: Head) -> _States:
     first_is_empty = not counts[0] and _is_blank(
         contents[0], begins[0], len(contents[0]) - begins[0]
     )
+    end_mark = np.array(END, real).tobytes()
     if (
         first_is_empty
-        and set(rests[1:]) == {np.array(END, real).tobytes()}
-        and _ascend(rows[:, 0], behind)
+        and set(first_words_after[1:]) == {end_mark}
+        and _ascend(rows[:, 0], ends)
     ):
-        return _States(rows)  # as mostly
-    pieces = zip(files, begins, np.split(rows, behind[:-1]), rests, strict=True)
-    found = [
-        _whole_states(file, head, begin, piece, rest)
-        for file, begin, piece, rest in pieces
-    ]
-    notes = tuple(note for states in found for note in states.notes)
+        return _States(rows)  # the usual case, without a look at each file
+    states_of_files = []
+    for file, begin, piece, word in zip(
+        files, begins, np.split(rows, ends[:-1]), first_words_after, strict=True
+    ):
+        states_of_files.append(_whole_states(file, head, begin, piece, word))
+    notes = tuple(note for states in states_of_files for note in states.notes)
     return _States(
-        np.concatenate([states.rows for states in found]),
-        all(states.ended for states in found),
+        np.concatenate([states.rows for states in states_of_files]),
+        all(states.ended for states in states_of_files),
         notes,
     )
 
 
-def _ascend(time: NDArray[np.floating[Any]], behind: Sequence[int]) -> bool:
-    """Whether times are numbers that ascend in each of several files, which end ``behind`` so many states."""
+def _ascend(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
+    """Return True if times are finite and ascend in each file; ``ends`` counts the states up to the end of each."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    ascends[[end - 1 for end in behind if 0 < end < time.size]] = (
-        True  # a restart may write a state again
-    )
+    # a restart may write a state again at the start of a file
+    ascends[[end - 1 for end in ends if 0 < end < time.size]] = True
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
 
 def _whole_states(
-    file: Source, head: Head, begin: int, rows: Rows, rest: bytes
+    file: Source, head: Head, begin: int, rows: Rows, word_after: bytes
 ) -> _States:
-    """Give the states of one file up to its end, which the solver marks."""
-    content, name = content_of(file.data), file.name
+    """Return the states of one file up to its end mark; ``word_after`` is the word after the last whole state."""
+    content = content_of(file.data)
+    name = file.name
     ends = np.flatnonzero(rows[:, 0] == END)
     if ends.size:
         rows = rows[: ends[0]]
     end = begin + head.state * len(rows)
     while len(rows) and _is_blank(content, end - head.state, head.state):
-        rows, end = rows[:-1], end - head.state
-    ended = bool(ends.size) or rest == np.array(END, head.form.real).tobytes()
+        rows = rows[:-1]
+        end = end - head.state
+    ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
         ended = True  # states begin in the next file
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
     with np.errstate(invalid="ignore"):
-        wrong = np.flatnonzero(
-            ~(np.diff(time, prepend=-np.inf) > 0) | ~np.isfinite(time)
-        )
-    if wrong.size:
-        where = begin + head.state * int(wrong[0])
-        found = f"{name}: a state was expected at byte {where}, with a time above that of the one before"
+        is_wrong = ~(np.diff(time, prepend=-np.inf) > 0) | ~np.isfinite(time)
+    if is_wrong.any():
+        first = int(np.argmax(is_wrong))
+        where = begin + head.state * first
+        problem = f"{name}: a state was expected at byte {where}, with a time above that of the state before"
         raise FormatError(
-            f"{found}, not {time[wrong[0]]:g}; the file is damaged, copy it again"
+            f"{problem}, not {time[first]:g}; the file is damaged, copy it again"
         )
     return _States(rows, ended, () if ended else (_cut(content, name, end, rows),))
 
 
 def _cut(content: Content, name: str, end: int, rows: Rows) -> str:
-    """Say that a file does not end as the solver ends it."""
+    """Return the note on a file that does not end with its end mark."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
     return (
@@ -284,26 +280,27 @@ def _cut(content: Content, name: str, end: int, rows: Rows) -> str:
 
 
 def _is_blank(content: Content, begin: int, size: int) -> bool:
-    """Whether nothing but zeros stands there, with which a solver fills a file up: nodes of a state are not all 0."""
+    """Return True if there are only zeros, with which a solver pads a file; the nodes of a state are never all 0."""
     return not content[begin : begin + min(size, _TAIL)].strip(b"\0")
 
 
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
-    """FormatError where the mark at the end of a file stands within a state: then states are longer or shorter."""
+    """Raise FormatError if the end mark of a file is within a state: then states are longer or shorter."""
     first = max(begin, len(content) - _TAIL)
-    tail, mark = content[first : len(content)], np.array(END, head.form.real).tobytes()
+    tail = content[first : len(content)]
+    mark = np.array(END, head.form.real).tobytes()
     at = tail.rfind(mark)
     if at >= 0 and not tail[at + len(mark) :].strip(b"\0"):
-        found = (
+        problem = (
             f"{name}: its states are {first + at - begin} bytes together, one of "
             f"{head.state} bytes each by the head"
         )
         cure = "that layout is not known; name the glstat, matsum or binout of the run"
-        raise FormatError(f"{found}; {cure}")
+        raise FormatError(f"{problem}; {cure}")
 
 
 def _missing(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Say which numbers of a family are left out."""
+    """Return a note on the file numbers that a family leaves out."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
     ]
@@ -314,5 +311,5 @@ def _missing(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"{first}: of the files behind it {listing(names, most=5)} are not there; are they missing?",
+        f"{first}: of the files after it {listing(names, most=5)} are not there; are they missing?",
     )

@@ -1,7 +1,6 @@
 """The sections between the control words and the states of a d3plot: nodes, elements, ids of the parts, titles.
 
-Only what says something of the states is read of them; the rest is passed over by the lengths that the control words
-tell.
+Only sections that describe the states are read; the others are skipped by the lengths that the control words give.
 """
 
 from __future__ import annotations
@@ -21,27 +20,27 @@ if TYPE_CHECKING:
 _WITH_MATERIAL_TYPES: Final = (5, 7)
 _WITH_ROADS: Final = (6, 7, 9)
 WITH_RIGID_BODIES: Final = (8, 9)
-# Words of an element of each kind in the section behind the numbers of nodes and elements.
+# Words of each element of a kind in the section after the numbers of nodes and elements.
 _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # words before the ids
-_PART_NUMBERING: Final = 16  # the same where ids of parts are among them
-_TITLE: Final = 72  # bytes, whatever a word has
+_NUMBERING: Final = 10  # words of the section of numbers before the ids
+_PART_NUMBERING: Final = 16  # the same if the section contains ids of parts
+_TITLE: Final = 72  # bytes of a title in both word widths
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
 _OTHER_TITLES: Final = (90_002, 90_020)
-_KEYWORD: Final = 80  # bytes of a line of them
+_KEYWORD: Final = 80  # bytes of a line of keywords
 _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles, passed over one after the other.
+    """The sections between the control words and the titles, which are skipped one after the other.
 
-    ``at`` is the word where the next one begins; ``part_ids`` are those of the parts, sorted and as they were
-    defined, where the file tells them.  The rest counts what a state holds of each.
+    ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
+    the order of their definition; empty if the file has none. The other attributes count the values in a state.
     """
 
     def __init__(self, words: Words, control: Mapping[str, int]) -> None:
@@ -54,7 +53,7 @@ class Geometry:
         self._airbag_geometry = self._left_nodes = 0
 
     def pass_over(self) -> None:
-        """Go through all sections in their order."""
+        """Skip all sections in their order."""
         self._material_types()
         self.at += self._control["ialemat"]
         self._sph_flags()
@@ -70,63 +69,69 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Take so many counts; FormatError where one is none."""
-        found = self._words.integers(self.at, count)
-        if min(found) < 0:
-            raise self._words.damaged(f"a count of {min(found)} at word {self.at}")
+        """Read this number of counts; raise FormatError if one is negative."""
+        counts = self._words.integers(self.at, count)
+        if min(counts) < 0:
+            raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")
         self.at += count
-        return found
+        return counts
 
     def _material_types(self) -> None:
+        """Skip the material types; count the shells of rigid parts, which have no values."""
         if self._control["ndim"] in _WITH_MATERIAL_TYPES:
             self.rigid_shells, materials = self._next(2)
             self.at += materials
 
     def _sph_flags(self) -> None:
+        """Skip the flags of SPH; count the values of a particle."""
         if self._control["nmsph"] <= 0:
             return
         begin = self.at
         (length,) = self._next(1)
         flags = self._words.integers(begin + 1, 10)
-        histories = (
-            flags[-1] if length > len(flags) else 0
-        )  # older files have no word for them
+        # older files have no word for history variables
+        histories = flags[-1] if length > len(flags) else 0
         self.values_of_sph = 1 + sum(abs(flag) for flag in flags[:-1]) + histories
         self.at = begin + length
 
     def _airbag_flags(self) -> None:
-        airbags, version = self._control["npefg"] % 1000, self._control["npefg"] // 1000
+        """Skip the flags of particle airbags; count their values in a state."""
+        airbags = self._control["npefg"] % 1000
+        version = self._control["npefg"] // 1000
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
         self.at += version == 4  # the number of chambers
-        self.at += 9 * (
-            of_geometry + of_particle + of_airbag
-        )  # a type and a name of each value
+        # a type and a name of each value
+        self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle
 
     def _nodes_and_elements(self) -> None:
-        control, solids = self._control, abs(self._control["nel8"])
+        """Skip nodes and elements; the two additional nodes of solids follow the solids or, in other releases, all."""
+        control = self._control
+        solids = abs(self._control["nel8"])
         self.at += dimensions_of(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
-        more = 2 * solids if control["nel8"] < 0 else 0  # two more nodes of each solid
-        # they are told of behind the solids or, by other releases, behind all: where the numbering begins shows it
-        follows = not more or self._begins_numbering(self.at + more + shells)
-        self.at += shells + (more if follows else 0)
-        self._left_nodes = 0 if follows else more
+        more_nodes = 2 * solids if control["nel8"] < 0 else 0
+        # where the section of numbers begins shows where the additional nodes are
+        follows = not more_nodes or self._begins_numbering(
+            self.at + more_nodes + shells
+        )
+        self.at += shells + (more_nodes if follows else 0)
+        self._left_nodes = 0 if follows else more_nodes
         self._numbering()
 
-    def _begins_numbering(self, place: int) -> bool:
-        if not self._words.has(
-            place * self._words.form.width, _NUMBERING * self._words.form.width
-        ):
+    def _begins_numbering(self, word: int) -> bool:
+        """Return True if the section of node and element numbers begins at a word."""
+        width = self._words.form.width
+        if not self._words.has(word * width, _NUMBERING * width):
             return False
-        counts = self._words.integers(place + 5, 2)
+        counts = self._words.integers(word + 5, 2)
         return counts == (self._control["numnp"], abs(self._control["nel8"]))
 
     def _numbering(self) -> None:
-        """Pass over the numbers of nodes and elements, and read those of the parts."""
+        """Skip the numbers of nodes and elements, and read the ids of the parts."""
         size = self._control["narbs"]
         if size <= 0:
             return
@@ -136,7 +141,9 @@ class Geometry:
         self.at += size
 
     def _ids(self, head: tuple[int, ...], size: int) -> tuple[tuple[int, ...], ...]:
-        form, count = self._words.form, self._control["nmmat"]
+        """Read the ids of the parts, sorted and as defined, from a section of numbers of ``size`` words."""
+        form = self._words.form
+        count = self._control["nmmat"]
         long = self._control["filetype"] >= LONG_IDS
         width = 8 if long else form.width
         expected = _PART_NUMBERING + (sum(head[5:]) + 3 * count) * width // form.width
@@ -151,6 +158,7 @@ class Geometry:
         return tuple(tuple(ids.tolist()) for ids in found_ids.reshape(2, count))
 
     def _rigid_bodies(self) -> None:
+        """Skip the rigid bodies, and count them."""
         if self._control["ndim"] not in WITH_RIGID_BODIES:
             return
         (self.rigid_bodies,) = self._next(1)
@@ -161,6 +169,7 @@ class Geometry:
             self.at += active
 
     def _roads(self) -> None:
+        """Skip the rigid roads, and count them."""
         if self._control["ndim"] not in _WITH_ROADS:
             return
         nodes, _, self.roads, _ = self._next(4)
@@ -170,7 +179,9 @@ class Geometry:
             self.at += 4 * segments
 
     def _extra_nodes(self) -> None:
-        control, kinds = self._control, dict(_EXTRA_NODES)
+        """Skip the additional nodes of elements of higher order."""
+        control = self._control
+        kinds = dict(_EXTRA_NODES)
         if control["quadr"]:
             kinds |= _FULL_QUADRATIC
         if control["cubic"]:
@@ -181,14 +192,14 @@ class Geometry:
 
 
 class Titles:
-    """The titles behind the geometry; ``at`` is the byte behind them, where states may begin."""
+    """The titles after the geometry; ``at`` is the byte after them, where states may begin."""
 
     def __init__(self, words: Words, at: int) -> None:
         self._words, self.at = words, at
         self.of_run, self.of_parts = "", dict[int, str]()
 
     def read(self) -> None:
-        """Read all of them; FormatError where the geometry does not end here."""
+        """Read all titles; raise FormatError if the geometry does not end here."""
         width = self._words.form.width
         if not self._words.has(self.at, width):
             self._words.bytes(self.at, width)
@@ -202,7 +213,7 @@ class Titles:
                 self.at += width
 
     def _section(self) -> bool:
-        """Read what begins here; False where it is no titles."""
+        """Read the section that begins here; return False if it is not a section of titles."""
         (kind,), width = self._integers(1), self._words.form.width
         if kind == _RUN_TITLE:
             self.of_run = plain_text(self._words.bytes(self.at + width, _TITLE))
@@ -225,5 +236,6 @@ class Titles:
         return True
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        found = self._words.bytes(self.at, count * self._words.form.width)
-        return tuple(np.frombuffer(found, self._words.form.integer).tolist())
+        """Read this number of integers without moving on."""
+        integers = self._words.bytes(self.at, count * self._words.form.width)
+        return tuple(np.frombuffer(integers, self._words.form.integer).tolist())

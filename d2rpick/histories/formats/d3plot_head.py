@@ -1,4 +1,4 @@
-"""The head of a d3plot or d3thdt of LS-DYNA: how its numbers are written, how long states are, which parts it has."""
+"""The head of an LS-DYNA d3plot or d3thdt: the form of its numbers, the length of its states, its parts."""
 
 from __future__ import annotations
 
@@ -25,32 +25,25 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-GLOBALS: Final = (
-    6  # kinetic, internal and total energy, and the velocity of the whole model
-)
+# Values of the whole model: kinetic, internal and total energy, and the velocity.
+GLOBALS: Final = 6
 
-_FEMZIP: Final = 76_893_465  # stands in place of the number of parts in packed files
-_BY_ELEMENT: Final = (
-    -10_000
-)  # at most this: the state tells which elements are deleted, else which nodes
-_WITH_WALL_PLACES: Final = (
-    971.0  # since this release a rigid wall has its place beside its force
-)
+_FEMZIP: Final = 76_893_465  # replaces the number of parts in files packed by femzip
+# At most this value of ``maxint``: a state lists deleted elements, otherwise deleted nodes.
+_BY_ELEMENT: Final = -10_000
+# Since this release a state has the position of a rigid wall next to its force.
+_WITH_WALL_PLACES: Final = 971.0
 
-_THERMAL: Final = {
-    0: 0,
-    1: 1,
-    2: 4,
-    3: 6,
-}  # values of a node: temperatures of one layer or three, and heat flux
+# Thermal values of a node by flag: temperatures of one layer or three, and heat flux.
+_THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 
 
 class Head(NamedTuple):
-    """What the first file of a family says of its states.
+    """The description of the states in the first file of a family.
 
-    ``begin`` is where states begin in it, ``state`` how long each is [bytes].  Of each state ``globals`` words follow
-    its time: those of the model, ``part_values`` quantities of each part and the forces of so many rigid ``walls``.
-    ``no_parts`` says why there are no parts where there are none.
+    States begin at byte ``begin`` of it; each has ``state`` bytes. In a state, ``globals`` words follow the time: the
+    values of the model, ``part_values`` quantities of each part, and the forces of ``walls`` rigid walls.
+    ``no_parts`` is the reason why there are no parts, if there are none.
     """
 
     form: Form
@@ -71,12 +64,12 @@ def read_head(content: Content, source: str) -> Head:
     Raises
     ------
     FormatError
-        If the file ends within it, is packed by femzip, or a section does not end where it should.
+        If the file ends within its head, is packed by femzip, or a section does not end where it should.
     """
     form = form_of(content[:HEAD])
     if form is None:
         raise FormatError(
-            f"{source}: this is not the first file of a d3plot or d3thdt; name that of the run"
+            f"{source}: this is not the first file of a d3plot or d3thdt; name the first file of the run"
         )
     words = Words(content, form, source)
     control = words.control()
@@ -85,8 +78,8 @@ def read_head(content: Content, source: str) -> Head:
             f"{source}: this file is packed by femzip; unpack it, or name the glstat or binout of the run"
         )
     if control["nglbv"] < GLOBALS:
-        found = f"{source}: its states have {control['nglbv']} global values, {GLOBALS} or more were expected"
-        raise FormatError(f"{found}; name the glstat or binout of the run")
+        problem = f"{source}: its states have {control['nglbv']} global values, {GLOBALS} or more were expected"
+        raise FormatError(f"{problem}; name the glstat or binout of the run")
     geometry = Geometry(words, control)
     geometry.pass_over()
     titles = Titles(words, geometry.at * form.width)
@@ -100,7 +93,7 @@ def read_head(content: Content, source: str) -> Head:
     state = form.width * _words_of_state(control, geometry)
     if state < form.width * (1 + control["nglbv"]):
         raise words.damaged(
-            f"states of {state} bytes, less than the values of the model have,"
+            f"states of {state} bytes, too few for the values of the model,"
         )
     return Head(
         form=form,
@@ -117,15 +110,16 @@ def read_head(content: Content, source: str) -> Head:
 
 
 def _number_of_parts(control: Mapping[str, int]) -> int:
+    """Return the number of parts, which older files give for each kind of element."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )
 
 
 def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
-    """Give the ids of the parts in the order of their values.
+    """Return the ids of the parts in the order of their values.
 
-    A file of parts that are numbered one by one has no list of them; the titles have their ids, too.
+    A file of parts that are numbered consecutively has no list of their ids; the titles have their ids too.
     """
     titled = tuple(titles.of_parts)
     lists = geometry.part_ids or (tuple(range(1, number + 1)),)
@@ -135,33 +129,34 @@ def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
 
 
 def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
-    """Give how many quantities a state has of each part: 7, or less in older files; 0 and the reason where none."""
+    """Return the number of quantities of a part (7, fewer in older files), or 0 and the reason why there are none."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
         return (
             0,
-            f"{source}: its states hold the whole model alone; give the matsum or binout of the run for its parts",
+            f"{source}: its states have no values of parts; give the matsum or binout of the run",
         )
-    each = 7 if of_parts >= 7 * number else of_parts // number
+    per_part = 7 if of_parts >= 7 * number else of_parts // number
     fits = of_parts >= 7 * number or of_parts % number == 0
-    if not fits or each < 2:
-        found = f"{source}: its states have {of_parts} values for {number} parts, which cannot be told apart"
-        return 0, f"{found}; give the matsum or binout of the run for its parts"
-    return each, ""
+    if not fits or per_part < 2:
+        problem = f"{source}: its states have {of_parts} values for {number} parts, which cannot be told apart"
+        return 0, f"{problem}; give the matsum or binout of the run for its parts"
+    return per_part, ""
 
 
 def _walls(values: int, parts: int, of_part: int, words: Words) -> int:
-    """Count the rigid walls, whose forces stand behind the values of the parts; 0 where they cannot be told apart.
+    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if they cannot be told apart.
 
-    Releases that are named R9 and so on come behind 971, although the number in their files is 960.
+    Releases with a name (R9 and later) are newer than 971, although the number in their files is 960.
     """
-    rest = values - GLOBALS - parts * of_part
-    each = 4 if words.is_named or words.release() >= _WITH_WALL_PLACES else 1
-    return rest // each if parts and rest % each == 0 else 0
+    of_walls = values - GLOBALS - parts * of_part
+    is_new = words.is_named or words.release() >= _WITH_WALL_PLACES
+    per_wall = 4 if is_new else 1
+    return of_walls // per_wall if parts and of_walls % per_wall == 0 else 0
 
 
 def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
-    """Count the words of a state: its time, global values, nodes, elements, and what else there may be."""
+    """Count the words of a state: time, global values, nodes, elements, deleted elements, SPH, airbags, roads."""
     solids = abs(control["nel8"])
     elements = (
         solids * (control["nv3d"] + control["nt3d"])
@@ -169,21 +164,24 @@ def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
         + control["nel2"] * control["nv1d"]
         + (control["nel4"] - geometry.rigid_shells) * control["nv2d"]
     )
-    others = (
+    words_of_body = 12 if control["ndim"] == max(WITH_RIGID_BODIES) else 24
+    special = (
         control["nmsph"] * geometry.values_of_sph
         + geometry.airbag_values
         + 6 * geometry.roads
-        + geometry.rigid_bodies
-        * (12 if control["ndim"] == max(WITH_RIGID_BODIES) else 24)
+        + geometry.rigid_bodies * words_of_body
     )
     nodes = control["numnp"] * _values_of_node(control)
-    return 1 + control["nglbv"] + nodes + elements + _deletions(control) + others
+    return 1 + control["nglbv"] + nodes + elements + _deletions(control) + special
 
 
 def _values_of_node(control: Mapping[str, int]) -> int:
+    """Count the words of a node in a state."""
     vectors = sum(control[name] != 0 for name in ("iu", "iv", "ia"))
-    heat, scaled_mass = control["it"] % 10, control["it"] // 10 % 10 == 1
-    rates, residuals = control["idtdt"] % 10 == 1, control["idtdt"] // 10 % 10 == 1
+    heat = control["it"] % 10
+    scaled_mass = control["it"] // 10 % 10 == 1
+    rates = control["idtdt"] % 10 == 1
+    residuals = control["idtdt"] // 10 % 10 == 1
     contact = control["penout"] + (control["engout"] == 1)
     return (
         dimensions_of(control) * vectors
@@ -196,7 +194,7 @@ def _values_of_node(control: Mapping[str, int]) -> int:
 
 
 def _deletions(control: Mapping[str, int]) -> int:
-    """Count the words that say which elements or nodes are deleted."""
+    """Count the words that mark deleted elements or nodes."""
     if control["maxint"] <= _BY_ELEMENT:
         return (
             abs(control["nel8"]) + control["nelt"] + control["nel4"] + control["nel2"]

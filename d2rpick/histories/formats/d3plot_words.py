@@ -1,6 +1,6 @@
-"""The words of LS-DYNA's d3plot and d3thdt: of 4 or 8 bytes, in either byte order, and what the first of them say.
+"""The words of LS-DYNA's d3plot and d3thdt, 4 or 8 bytes long in either byte order, and the control words.
 
-The control words at the beginning of the first file keep the names of their source: "LS-DYNA Database Binary Output
+The control words at the start of the first file keep the names of their source: "LS-DYNA Database Binary Output
 Files" of LSTC.
 """
 
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-END: Final = -999999.0  # ends the geometry, the titles, and the states of each file
-HEAD: Final = 512  # bytes of the control words of the wider form
-CONTROL: Final = 64  # words, before as many as ``extra`` says
+# end mark of the geometry, the titles, and the states of each file
+END: Final = -999999.0
+HEAD: Final = 512  # bytes of the control words if a word has 8 bytes
+CONTROL: Final = 64  # control words of any file; ``extra`` counts further ones
 
 _PLACES: Final = {
     "filetype": 11, "ndim": 15, "numnp": 16, "nglbv": 18, "it": 19, "iu": 20, "iv": 21, "ia": 22, "nel8": 23,
@@ -32,22 +33,22 @@ _PLACES: Final = {
     "nel27": 66, "nel21p": 68, "nel15t": 69, "nel20t": 71, "nel40p": 72, "nel64": 73, "quadr": 74, "cubic": 75,
     "penout": 78, "engout": 79,
 }  # fmt: skip
-_SIGNED: Final = ("nel8", "maxint")  # whose sign is a flag
-_RELEASE: Final = 13  # place of its name, before that of its number
+_SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
+_RELEASE: Final = 13  # word with the name of the release; its number follows
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # is added to the type of a file whose ids have 8 bytes
+LONG_IDS: Final = 1000  # is added to the file type if ids have 8 bytes
 _DIMENSIONS: Final = range(2, 10)
 
 
 class Form(NamedTuple):
-    """How numbers are written: bytes of a word, and their order as `struct` says it."""
+    """The form of numbers: bytes of a word, and their order as a character of `struct`."""
 
     width: int
     order: str
 
     @property
     def real(self) -> np.dtype[Any]:
-        """Type of a real."""
+        """Type of a real number."""
         return np.dtype(f"{self.order}f{self.width}")
 
     @property
@@ -57,13 +58,14 @@ class Form(NamedTuple):
 
 
 def form_of(head: bytes) -> Form | None:
-    """Find how the numbers of a file of the family are written that begins like this; None where it is none."""
+    """Return the form of the numbers in a file with these first bytes; None if it belongs to no known family."""
     for form in (Form(width, order) for width in (4, 8) for order in "<>"):
         if len(head) < CONTROL * form.width:
             continue
         words = np.frombuffer(head[: CONTROL * form.width], form.integer)
         counts = words[[_PLACES[name] for name in ("numnp", "nglbv", "nmmat")]]
-        kind, dimensions = int(words[_PLACES["filetype"]]), int(words[_PLACES["ndim"]])
+        kind = int(words[_PLACES["filetype"]])
+        dimensions = int(words[_PLACES["ndim"]])
         is_known = kind % LONG_IDS in _FAMILIES and kind // LONG_IDS in (0, 1)
         if is_known and dimensions in _DIMENSIONS and (counts >= 0).all():
             return form
@@ -71,7 +73,7 @@ def form_of(head: bytes) -> Form | None:
 
 
 def family_of(head: bytes) -> str | None:
-    """Name the family, d3plot, d3thdt or d3part, of a file that begins like this; None where it is of none."""
+    """Return the family (d3plot, d3thdt or d3part) of a file with these first bytes; None if there is none."""
     form = form_of(head)
     if form is None:
         return None
@@ -80,79 +82,71 @@ def family_of(head: bytes) -> str | None:
 
 
 class Words:
-    """Words of a file by their place, counted from 0."""
+    """The words of a file, counted from 0."""
 
     def __init__(self, content: Content, form: Form, source: str) -> None:
         self._content, self.form, self.source = content, form, source
 
     def control(self) -> dict[str, int]:
-        """Read the control words by their names; those that an older file has not are 0."""
+        """Return the control words by name; words that an older file lacks are 0."""
         words = self.integers(0, CONTROL)
         length = CONTROL + max(0, words[_PLACES["extra"]])
         words += self.integers(
             CONTROL, min(length, max(_PLACES.values()) + 1) - CONTROL
         )
-        found = {
-            name: words[place] if place < len(words) else 0
-            for name, place in _PLACES.items()
+        control = {
+            name: words[index] if index < len(words) else 0
+            for name, index in _PLACES.items()
         }
-        negative = [
-            name for name, count in found.items() if count < 0 and name not in _SIGNED
-        ]
-        if negative:
-            raise self.damaged(
-                f"a count of {found[negative[0]]} ({negative[0]}) in its head"
-            )
-        return found
+        for name, count in control.items():
+            if count < 0 and name not in _SIGNED:
+                raise self.damaged(f"a count of {count} ({name}) in its head")
+        return control
 
     def release(self) -> float:
-        """Read the number of the release, as 971."""
-        return float(
-            np.frombuffer(
-                self.bytes((_RELEASE + 1) * self.form.width, self.form.width),
-                self.form.real,
-            )[0]
-        )
+        """Return the number of the release, such as 971."""
+        number = self.bytes((_RELEASE + 1) * self.form.width, self.form.width)
+        return float(np.frombuffer(number, self.form.real)[0])
 
     @property
     def is_named(self) -> bool:
-        """Whether the release has a name that begins with R, as R920 and R12, and not a number alone."""
+        """True if the release has a name that begins with R (R920, R12), rather than only a number."""
         return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
 
     def version(self) -> str:
-        """Read the name of the release, as R920, which older files have not."""
+        """Return solver and name of the release, such as LS-DYNA R920; older files have no name."""
         name = plain_text(self.bytes(_RELEASE * self.form.width, 4))
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
-    def integers(self, place: int, count: int) -> tuple[int, ...]:
-        """Read so many integers."""
-        found = self.bytes(place * self.form.width, count * self.form.width)
-        return tuple(np.frombuffer(found, self.form.integer).tolist())
+    def integers(self, word: int, count: int) -> tuple[int, ...]:
+        """Return ``count`` integers from a word on."""
+        data = self.bytes(word * self.form.width, count * self.form.width)
+        return tuple(np.frombuffer(data, self.form.integer).tolist())
 
     def ends_at(self, at: int) -> bool:
-        """Whether the mark of an end stands at a byte."""
-        found = self._content[at : at + self.form.width]
-        return len(found) == self.form.width and bool(
-            np.frombuffer(found, self.form.real)[0] == END
-        )
+        """Return True if there is an end mark at a byte."""
+        data = self._content[at : at + self.form.width]
+        if len(data) < self.form.width:
+            return False
+        return bool(np.frombuffer(data, self.form.real)[0] == END)
 
     def has(self, at: int, size: int) -> bool:
-        """Whether the file has so many bytes there."""
+        """Return True if the file has ``size`` bytes from byte ``at`` on."""
         return at + size <= len(self._content)
 
-    def damaged(self, found: str) -> FormatError:
-        """Say what was found in a file that its head does not describe."""
-        cure = "the file is damaged, or of a release that is not known; name the glstat, matsum or binout of the run"
-        return FormatError(f"{self.source}: it has {found}; {cure}")
+    def damaged(self, content: str) -> FormatError:
+        """Return the error for a file whose content contradicts its head."""
+        cure = "the file is damaged, or of an unknown release; name the glstat, matsum or binout of the run"
+        return FormatError(f"{self.source}: it has {content}; {cure}")
 
     def bytes(self, at: int, size: int) -> bytes:
-        """Read so many bytes; FormatError where the file ends before."""
+        """Return ``size`` bytes from byte ``at`` on; raise FormatError if the file ends before."""
         if at < 0 or size < 0 or not self.has(at, size):
-            found = f"{self.source}: the file has {len(self._content)} bytes, its head goes on beyond them"
-            raise FormatError(f"{found}; it is cut or damaged, copy it again")
+            problem = f"{self.source}: the file has {len(self._content)} bytes, its head goes on beyond them"
+            raise FormatError(f"{problem}; it is cut or damaged, copy it again")
         return self._content[at : at + size]
 
 
 def dimensions_of(control: Mapping[str, int]) -> int:
-    """Give the coordinates of a node: the word for them has flags above 3."""
+    """Return the number of coordinates of a node; the control word has flags above 3."""
     return min(control["ndim"], 3)

@@ -1,4 +1,4 @@
-"""LS-DYNA d3thdt: a d3plot of chosen nodes and elements, which is mostly written far more often."""
+"""LS-DYNA d3thdt: a d3plot of selected nodes and elements, usually written far more often."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is the first one of a d3thdt; never raises."""
+    """Return True if these first bytes are those of a d3thdt; never raises."""
     return family_of(head) == "d3thdt"
 
 

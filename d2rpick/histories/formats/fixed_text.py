@@ -1,10 +1,10 @@
-"""Solver text databases made of blocks of fixed columns: where the numbers stand, and what they are.
+"""Reader of solver text files that consist of blocks with fixed columns.
 
-glstat and matsum write one block per state.  Blocks of one file mostly have the same lines, hence the same
-number of bytes.  So a block is taken apart line by line once; the blocks after it are only compared with it,
-byte by byte where the text must be the same (labels, part numbers, line ends), and the numbers are then
-fetched by address.  Where a block differs, it is taken apart itself.  The comparison also shows which numbers
-are the same in all blocks, as those of a part at rest: they are fetched once.
+glstat and matsum contain one block for each state. Most blocks of a file have the same lines, hence the same number
+of bytes. So a block is parsed line by line once; the blocks after it are only compared with it, byte by byte where
+the text must be the same (labels, part numbers, line ends), and their numbers are then read by address. A block that
+differs is parsed itself. The comparison also shows which numbers are the same in all blocks (for instance those of a
+part at rest); these are read once.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
 
     Fields = NDArray[np.bytes_]
 
-_RECENT: Final = 12  # layouts tried before a block is taken apart
-_LINE: Final = 1 << 10  # no first line of a block is longer
+_RECENT: Final = 12  # layouts that are tried before a block is parsed
+_LINE: Final = 1 << 10  # bytes; the first line of a block is shorter
 
 
 class Blocks(Database):
-    """The whole states of one file; what they hold, and whether a file without any is one, says a database made of it.
+    """The whole states of a text file of blocks; each format derives its `Database` from it.
 
     Parameters
     ----------
@@ -54,20 +54,21 @@ class Blocks(Database):
     grammar : Grammar
         What a block looks like.
     ahead : sequence of names, optional
-        Numbers that will be asked for first, together: they are taken while all blocks are compared.
+        Names of numbers that are needed first, all together: they are copied while all blocks are compared.
 
     Attributes
     ----------
     states : int
         Number of whole states.
     tail : int
-        Address at which the last block of the file starts, whole or not; that behind the head when there is none.
+        Address of the last block of the file, whole or not; the address after the head if there is no block.
     rest : Stretch or None
-        The last block, when the file ends within it: it is no state unless ``admit_rest`` makes it one.
+        The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    many = 64  # of so many blocks it is remembered what differs between them, a small share of the file
-    batch = 1 << 14  # numbers that are converted together: they stay in the cache
+    # A run of at least this many blocks remembers which bytes differ between them, which then is little memory.
+    many = 64
+    batch = 1 << 14  # numbers converted together, which stay in the cache
 
     def __init__(
         self,
@@ -81,22 +82,20 @@ class Blocks(Database):
         self._data = content_of(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        self._runs = array(
-            "q"
-        )  # packed: a file whose blocks all differ must not fill the memory
-        data, end = self._data, self._end  # not self: a circle would keep the file open
+        # Packed, so that a file whose blocks all differ does not fill the memory.
+        self._runs = array("q")
+        data = self._data
+        end = self._end  # not self: a cycle would keep the file open
         self.layout = lru_cache(maxsize=16)(
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        self._trusted = False  # whether a part of each block was compared for numbers that were asked for
-        self._varied: dict[
-            int, Bytes
-        ] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
+        self._trusted = False  # True once part of each block was compared for a request
+        # By the start of a run of many blocks: bits that vary between its blocks.
+        self._varied: dict[int, Bytes] = {}
         self._asked_ahead = tuple(ahead)
-        self._ahead: dict[
-            int, Fields
-        ] = {}  # by the start of such a run: the numbers taken of its blocks, as printed
+        # By the start of such a run: the numbers copied from its blocks, as printed.
+        self._ahead: dict[int, Fields] = {}
         self._walk()
         if not self._compared and not self._is_even():
             self._compared = True
@@ -108,64 +107,61 @@ class Blocks(Database):
         )
 
     def refuse_foreign(self) -> None:
-        """FormatError where there is neither a head nor a state."""
+        """Raise FormatError if the file has neither a head nor a whole state."""
         if not self.version and not self.states:
-            told = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
-            raise FormatError(f"{told} {self.format}; choose another input format")
+            problem = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
+            raise FormatError(f"{problem} {self.format}; choose another input format")
 
     def numbers(
         self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()
     ) -> Samples:
-        """Numbers of all states, shape (states, len(names)).
+        """Return these numbers of all states, shape (states, len(names)).
 
-        ``anchors`` name, for each number, the field or line from which on the text is compared before the
-        number is trusted, in files that were not compared in full when they were opened.
+        ``anchors`` are, for each number, the field or line from which on the text is compared before the number is
+        trusted; they are used in files that were not compared in full when they were opened.
 
         Raises
         ------
         FormatError
             If a state lacks one of the numbers, has it twice, or has something else in its place.
         """
-        if (
-            anchors
-            and not self._compared
-            and (self._trusted or not self._alike(names, anchors))
-        ):
-            self._compare_in_full(
-                names
-            )  # who asks again will go on asking: one comparison is for all
+        is_checked = self._compared or not anchors
+        if not is_checked and (self._trusted or not self._alike(names, anchors)):
+            # A second request is mostly followed by others: one comparison serves all.
+            self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
         if tuple(names) == self._asked_ahead:
-            taken, self._ahead = self._ahead, taken  # who asks again has them
-        values = np.zeros(
-            (self.states, len(names))
-        )  # memory that is never written costs nothing
-        few, row = np.ones(self.states, bool), 0
+            # the copied numbers are used once, since the caller keeps the result
+            taken, self._ahead = self._ahead, taken
+        # memory that is never written costs nothing
+        values = np.zeros((self.states, len(names)))
+        is_scattered = np.ones(self.states, bool)
+        row = 0
         for run in self:
             rows = slice(row, row := row + run.repeats)
             offsets = self._offsets(run, names)
             if run.start in self._varied:
                 self._read(values[rows], run, offsets, taken.get(run.start))
-                few[rows] = False
-            else:  # each address gives way to the number found there
+                is_scattered[rows] = False
+            else:  # write the addresses first; the numbers replace them below
                 np.add(
                     _starts(run, 0, run.repeats),
                     offsets,
                     out=values[rows].view(np.int64),
                 )
-        together = values if few.all() else values[few]
+        together = values if is_scattered.all() else values[is_scattered]
         flat = together.reshape(-1)
         for piece in np.split(flat, range(self.batch, flat.size, self.batch)):
             piece[:] = self._decoded(piece.view(np.int64))
         if together is not values:
-            values[few] = together
+            values[is_scattered] = together
         self._data.check()
         self._refuse_odd(values, names)
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Let the last state count although the file ends within it, if these numbers and a line behind are there."""
+        """Use the last state although the file ends within it, if it contains these numbers and a line after them."""
         if self.rest is None:
             return
         offsets = [
@@ -183,60 +179,64 @@ class Blocks(Database):
         )
 
     def text(self, start: int, size: int) -> bytes:
-        """Copy a piece of the whole lines of the file."""
+        """Return a piece of the whole lines of the file."""
         return self._data[start : min(start + size, self._end)]
 
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of a run of many blocks, which may have been taken; what never changes is read once."""
-        before = np.append(0, np.cumsum(self._varied[run.start] != 0))
-        moves = before[offsets + self._grammar.width] > before[offsets]
+        """Read the numbers of a run of many blocks, using those that were copied; read what never changes only once."""
+        varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
+        moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
         if still.view(np.int64).any():
             values[:, ~moves] = still
-        moving = (
-            slice(None) if moves.all() else np.flatnonzero(moves)
-        )  # without copies, as mostly
+        # a slice, unlike an index array, needs no copies
+        moving = slice(None) if moves.all() else np.flatnonzero(moves)
         step = max(1, self.batch // max(1, offsets[moving].size))
-        for at in range(0, run.repeats if moves.any() else 0, step):
-            end = min(at + step, run.repeats)
+        for begin in range(0, run.repeats if moves.any() else 0, step):
+            end = min(begin + step, run.repeats)
             if taken is None:
-                found = self._decoded((_starts(run, at, end) + offsets[moving]).ravel())
+                addresses = (_starts(run, begin, end) + offsets[moving]).ravel()
+                numbers = self._decoded(addresses)
             else:
-                found = decode(taken[at:end, moving].ravel(), self._grammar.decimals)
-            values[at:end, moving] = found.reshape(end - at, -1)
+                fields = taken[begin:end, moving].ravel()
+                numbers = decode(fields, self._grammar.decimals)
+            values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
-        """Numbers at these addresses, NaN for what is none."""
+        """Return the numbers at these addresses, NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
         return decode(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """FormatError with the line of the first of values (states, len(names)) that is no number."""
+        """Raise FormatError with the line of the first value, shape (states, len(names)), that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return
-        state, place = divmod(int(odd.argmax()), len(names))
+        state, column = divmod(int(odd.argmax()), len(names))
         run, state = self._run_of(state)
-        address = run.start + state * run.stride + int(self._offsets(run, names)[place])
+        address = (
+            run.start + state * run.stride + int(self._offsets(run, names)[column])
+        )
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
-        what = f"{self.source}:{line_at(self._data, address)}: {_spoken(names[place])} is {text!r}"
+        problem = f"{self.source}:{line_at(self._data, address)}: {_spoken(names[column])} is {text!r}"
         raise FormatError(
-            f"{what}, a number in its columns was expected; cut the file before this state"
+            f"{problem}, a number in its columns was expected; cut the file before this state"
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:
-        """Find the run that a state belongs to, and its place there."""
+        """Return the run that contains a state, and the position of the state in the run."""
         for run in self:
             if state < run.repeats:
                 return run, state
             state -= run.repeats
-        raise AssertionError("there is such a state")
+        raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
+        """Return the offsets of these numbers in the blocks of a run; raise FormatError if one is unsure."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
@@ -249,7 +249,7 @@ class Blocks(Database):
     # How blocks are found
 
     def _walk(self) -> None:
-        """Find all runs of blocks, leaving out blocks that are not whole."""
+        """Find all runs of blocks; leave out blocks that are not whole."""
         self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
@@ -264,7 +264,8 @@ class Blocks(Database):
             )
             layout = self.layout(example, stride)
             self.tail = position + (count - 1) * stride
-            is_last = (following := position + count * stride) >= self._end
+            following = position + count * stride
+            is_last = following >= self._end
             if (layout.broken_off or is_last) and not self._is_whole(layout, previous):
                 self._leave_out(Stretch(position, stride, 1, example), is_last)
             else:
@@ -276,13 +277,13 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        return (
-            self._grammar.whole(layout)
-            if previous is None
-            else previous.last in layout.fields
-        )
+        """Return True if a block has the last number of the block before, or is known to be whole alone."""
+        if previous is None:
+            return self._grammar.whole(layout)
+        return previous.last in layout.fields
 
     def _leave_out(self, block: Stretch, is_last: bool) -> None:
+        """Leave out a block that is not whole, with a note."""
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
@@ -293,18 +294,19 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Try the recent layouts: example, stride and count of the blocks that follow one of them."""
+        """Try the recent layouts; return example, stride and count of the blocks that have one of them, or None."""
         start = self._grammar.start
-        fitting = (
-            one for one in recent if self.text(position + one[1], len(start)) == start
-        )
-        counted = ((*one, self._count(position, *one)) for one in fitting)
-        return next((found for found in counted if found[2]), None)
+        for example, stride in recent:
+            if self.text(position + stride, len(start)) == start:
+                count = self._count(position, example, stride)
+                if count:
+                    return example, stride, count
+        return None
 
     def _new(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int]:
-        """Take the block apart: the same for a layout not met before."""
+        """Parse a block whose layout was not met recently; return example, stride and count."""
         following = self._find(position + 1)
         if following is None:
             last = Stretch(position, self._end - position, 1, position)
@@ -317,7 +319,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Find a recent example that the last block of the file is like, or take the block itself."""
+        """Return the recent example that the last block of the file resembles, or the block itself."""
         alike = (
             example
             for example, stride in recent
@@ -332,8 +334,9 @@ class Blocks(Database):
         return next(alike, last.start)
 
     def _count(self, position: int, example: int, stride: int) -> int:
-        """Count the blocks from ``position`` on that look like the example and have another behind them."""
-        literal, start = self.layout(example, stride).literal, self._grammar.start
+        """Count the blocks from ``position`` on that resemble the example and are followed by another block."""
+        literal = self.layout(example, stride).literal
+        start = self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
         if self._compared and run.repeats >= self.many:
             count = self._count_and_take(run, literal)
@@ -345,18 +348,14 @@ class Blocks(Database):
             count = like_example(
                 self._data, run._replace(repeats=count), stride - 1, literal[-1:]
             )
-        return (
-            count
-            if self.text(position + count * stride, len(start)) == start
-            else max(0, count - 1)
-        )
+        if self.text(position + count * stride, len(start)) == start:
+            return count
+        return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
-        """Count the blocks like the example; remember what differs in them, and the numbers that will be asked for."""
-        varied, fields = (
-            np.zeros_like(literal),
-            self.layout(run.example, run.stride).fields,
-        )
+        """Count the blocks like the example; remember the bits that vary and copy the numbers needed first."""
+        varied = np.zeros_like(literal)
+        fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
             [fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64
         )
@@ -383,9 +382,9 @@ class Blocks(Database):
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Tell whether in all blocks the text from the first anchor to the last number is that of their examples.
+        """Return True if all blocks have, from the first anchor to the last number, the text of their examples.
 
-        False without a look where that is most of a block: to compare all of it costs no more.
+        Return False unchecked if that is most of a block: comparing whole blocks costs no more.
         """
         return all(
             self._alike_in(run, self._offsets(run, names), anchors) for run in self
@@ -394,20 +393,20 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
+        """Return the same as `_alike` for one run of blocks."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        text = layout.literal[
-            first : int(offsets.max()) + self._grammar.width + 1
-        ]  # with what follows a number
+        end = int(offsets.max()) + self._grammar.width + 1  # with the next character
+        text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride
             and like_example(self._data, run, first, text) == run.repeats
         )
 
     def _is_even(self) -> bool:
-        """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""
+        """Return True if all blocks but the last have one size, and look alike at both ends of the file."""
         runs = list(self)
         if not runs:
             return True
@@ -425,27 +424,30 @@ class Blocks(Database):
         )
 
     def _compare_in_full(self, names: Sequence[Hashable]) -> None:
-        states, told = self.states, (self.complete, self.notes)
+        """Compare all blocks in full; raise FormatError if there are other states than before."""
+        states = self.states
+        is_complete = self.complete
+        notes = self.notes
         self._compared, self._asked_ahead = True, tuple(names)
         self._walk()
-        self.complete, self.notes = told
+        self.complete, self.notes = is_complete, notes
         if self.states != states:
             raise FormatError(f"{self.source}: states overlap, the file is damaged")
 
     def _find(self, position: int) -> int | None:
-        """Address of the next line that begins a block."""
+        """Return the address of the next line that begins a block."""
         start = self._grammar.start
         if position == 0 and self.text(0, len(start)) == start:
             return 0
-        found = self._data.find(b"\n" + start, max(0, position - 1)) + 1
-        return found if 0 < found < self._end else None
+        address = self._data.find(b"\n" + start, max(0, position - 1)) + 1
+        return address if 0 < address < self._end else None
 
 
-def _starts(run: Stretch, first: int, behind: int) -> Addresses:
-    """Addresses of some blocks of a run, shape (behind - first, 1)."""
-    return run.start + run.stride * np.arange(first, behind)[:, np.newaxis]
+def _starts(run: Stretch, first: int, end: int) -> Addresses:
+    """Return the addresses of the blocks ``first`` to ``end - 1`` of a run, shape (end - first, 1)."""
+    return run.start + run.stride * np.arange(first, end)[:, np.newaxis]
 
 
 def _spoken(name: Hashable) -> str:
-    """Name a field in a message."""
+    """Return the name of a field for a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"

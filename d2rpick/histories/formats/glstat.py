@@ -1,8 +1,8 @@
-"""LS-DYNA glstat: one block of ``label.......   value`` lines per state, for the model as a whole.
+"""LS-DYNA glstat: one block of ``label....... value`` lines per state, for the model as a whole.
 
-A label stands in columns 2-32, padded with dots, its value right-justified in columns 33-46.  Labels are
-taken whole: ``internal energy`` also ends ``eroded internal energy``.  A block begins at its ``time....``
-line; the line before it, on what controls the time step, has too many forms to rely on.
+A label occupies columns 2-32, padded with dots; its value is right-justified in columns 33-46. Labels are compared as
+a whole: ``internal energy`` also ends ``eroded internal energy``. A block begins at its ``time....`` line; the line
+before it, which names the element that controls the time step, has too many forms to rely on.
 """
 
 from __future__ import annotations
@@ -31,25 +31,26 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-_SPRINGS: Final = "spring and damper energy"  # a part of it, which is looked at wherever it is written
+# Part of the internal energy; read in advance since it is used whenever it is there.
+_SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # bytes that hold the head and the first state
+_NEAR: Final = 4096  # bytes that contain the head and the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
-_LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
+# The last line of a state in every known glstat; mass scaling may add lines after it.
+_LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-_VALUE: Final = re.compile(
-    rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)"
-)  # there is a line for each wall
+# A value; each rigid wall has its own line with the number of the wall after the value.
+_VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
-# In lines other than these: numbers, and what controls the time step.
+# What may change in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
 )
 
 
 def recognises(data: bytes) -> bool:
-    """Whether ``data``, the beginning of a file, looks like a glstat; a head alone does, too."""
+    """Return True if ``data``, the start of a file, looks like a glstat; a head without states is enough."""
     if b"\n" + _START in data or data.startswith(_START):
         return True
     _, version, begin = head(data)
@@ -58,7 +59,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run; the selection tells what its last state must have to count."""
+    """Open each file as a leg of the run; the selection gives the lines that its last state must have."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -68,8 +69,8 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
 class Glstat(Blocks):
     """One glstat file; a ``Database`` without parts.
 
-    A last state in which the file stops counts if it has the lines that are ``needed``.  FormatError if there is
-    neither a head nor a state, or a time that is no number.
+    A last state within which the file ends is used if it has the lines that are ``needed``. Raises FormatError if
+    there is neither a head nor a state, or if a time is not a number.
     """
 
     format, digits = "glstat", 6
@@ -82,9 +83,8 @@ class Glstat(Blocks):
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        with suppress(
-            FormatError
-        ):  # that there is no such line is said when it is read
+        # a line that is not there is reported when it is read
+        with suppress(FormatError):
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
         self.refuse_foreign()
@@ -95,29 +95,33 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        self._even = True  # until a state lacks what another has
+        self._even = True  # until a state lacks a line of the others
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
     def channel(self, name: str) -> Samples:
-        """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
-        if name not in self._columns:  # who wants one more mostly wants the others
-            every = dict.fromkeys((*self.channels, name)) if self._even else [name]
-            self._columns |= self._pass_over(
-                [one for one in every if one not in self._columns], [name]
-            )
+        """Return the values of the line ``name``, shape (n,); FormatError unless every state has it once."""
+        if name not in self._columns:
+            wanted = [name]
+            if self._even:  # a request for a further line is mostly followed by others
+                names = dict.fromkeys((*self.channels, name))
+                wanted = [label for label in names if label not in self._columns]
+            self._columns |= self._pass_over(wanted, [name])
         return self._columns[name]
 
-    def _pass_over(self, names: list[str], least: list[str]) -> dict[str, Samples]:
-        """Columns in one pass; where a state lacks one, the least alone, and why is said when it is asked for."""
+    def _pass_over(
+        self, names: list[str], needed_names: list[str]
+    ) -> dict[str, Samples]:
+        """Read lines in one pass; if a state lacks one, read only the needed ones and leave the error to later."""
         try:
             columns = self.numbers(names)
         except FormatError:
-            self._even, names = False, least
-            columns = self.numbers(least)
+            self._even, names = False, needed_names
+            columns = self.numbers(needed_names)
         return dict(zip(names, map(frozen, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
+        """Return the labels of all lines with values, without the time."""
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}
@@ -132,13 +136,14 @@ class Glstat(Blocks):
 def _describe(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
+    """Return the offsets of the values of a block by label, and the last label; UNSURE for a value that is cut."""
     fields: dict[str, int] = {}
-    name, behind, mixed = "", 0, False
+    name, end, is_mixed = "", 0, False
     for line in lines:
-        mixed |= (
-            name in fields and b"..." in block[behind : line.start()]
-        )  # a line that lost some of its columns
-        name, behind = line[1].rstrip(b".").rstrip().decode("latin-1"), line.end()
+        # a line between these lost some of its columns
+        is_mixed |= name in fields and b"..." in block[end : line.start()]
+        name = line[1].rstrip(b".").rstrip().decode("latin-1")
+        end = line.end()
         value = _VALUE.match(line[2])
         if value is None:
             fields[name] = UNSURE
@@ -146,16 +151,17 @@ def _describe(
         if value[1]:
             name += " " + " ".join(value[1].decode().split())
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
-        mixed |= name in fields
+        is_mixed |= name in fields
         fields[name] = line.start(2)
-    if mixed:  # with lines of another state: any of them may be
+    if is_mixed:  # any line of the block may belong to another state
         fields = {
-            name: place if name == _TIME else UNSURE for name, place in fields.items()
+            name: offset if name == _TIME else UNSURE for name, offset in fields.items()
         }
     return fields, name
 
 
 def _is_whole(layout: BlockLayout) -> bool:
+    """Return True if a block has the last line of a state."""
     return _LAST in layout.fields
 
 
@@ -173,7 +179,7 @@ _GRAMMAR: Final = Grammar(
 
 
 def write(title: str, lines: Mapping[str, Samples]) -> bytes:
-    """Blocks of ``label....... value`` with six significant digits (14 columns, E14.5), ``time`` first, all (n,)."""
+    """Return a glstat: blocks of ``label....... value``, six significant digits (E14.5), ``time`` first, all (n,)."""
     states = zip(*(values.tolist() for values in lines.values()), strict=True)
     blocks = (
         f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"

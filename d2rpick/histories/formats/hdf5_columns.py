@@ -1,7 +1,7 @@
-"""Columns of an HDF5 file: those of datasets, matrices, compound types and tables of pandas, and their values.
+"""The columns of an HDF5 file (datasets, matrices, compound types, tables of pandas) and their values.
 
-The library gives zeros for data that are not there, and says nothing of a damaged type: both are looked for.  What
-cannot be seen is a changed byte in data that is stored without a checksum: `fletcher32`, or that of gzip.
+The library returns zeros for data that were never written, and does not notice a damaged type: both are checked here.
+A changed byte in data without a checksum (`fletcher32`, or the one of gzip) cannot be detected.
 """
 
 from __future__ import annotations
@@ -28,17 +28,18 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-_BOOKKEEPING: Final = ("_i_", "#")  # PyTables' index trees, MATLAB's references
+_BOOKKEEPING: Final = ("_i_", "#")  # index trees of PyTables, references of MATLAB
 _ERF_BLOCK: Final = "/erfblock"
-_WIDEST: Final = (
-    64  # a matrix with more columns and no names for them is no table of histories
-)
+_WIDEST: Final = 64  # columns; a wider matrix without names is not a table of histories
+
+# Share of a file; a smaller dataset is copied, since a view of it would keep the whole file in memory.
+_LARGE: Final = 1 / 4
 
 
 class Column(NamedTuple):
-    """One column: the ``path`` by which a user names it, and where in the file it is.
+    """One column: the ``path`` by which a user names it, and where it is in the file.
 
-    ``field`` is the member of a compound dataset, ``place`` the (axis, index) to take in a matrix.
+    ``field`` is the member of a compound dataset, ``place`` the (axis, index) of the column in a matrix.
     """
 
     path: str
@@ -50,12 +51,12 @@ class Column(NamedTuple):
 
     @property
     def group(self) -> str:
-        """Path of what the column is in."""
+        """Path of the group that contains the column."""
         return self.path.rpartition("/")[0]
 
     @property
     def is_time(self) -> bool:
-        """Whether it is called a time; of ``time/value`` the first step counts."""
+        """True if it has the name of a time; ``time/value`` is judged by ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -63,11 +64,11 @@ class Column(NamedTuple):
 
     @property
     def is_whole_number(self) -> bool:
-        """Whether its values are whole numbers, such as those of parts."""
+        """True if its values are integers, such as part ids."""
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Its values, shape (size,), of a file with that ``content``; FormatError unless all are finite."""
+        """Return its values, shape (size,), from a file with this ``content``; FormatError unless all are finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -86,7 +87,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """FormatError if data of a dataset are not there, which would read as zeros, or of a type that nothing writes."""
+    """Raise FormatError if data of a dataset are missing (they would read as zeros) or have a type that is damaged."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := unpacked_beyond(stored, dataset.nbytes):
@@ -107,24 +108,24 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
             for chunk in chunks
         )
         if inside < expected:
-            found = f"{source}: {dataset.name} has {inside} of {expected} chunks of its data"
             raise FormatError(
-                f"{found}; the file is damaged or was not written to its end"
+                f"{source}: {dataset.name} has {inside} of {expected} chunks of its data; "
+                "the file is damaged or was not written to its end"
             )
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
-    """FormatError for numbers of a type that HDF5 does not define: a changed byte in it would change them all."""
+    """Raise FormatError for numbers of a type that HDF5 does not define: a changed byte would change them all."""
     for kind in _numbers(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _standard_types()):
-            found = f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5"
             raise FormatError(
-                f"{found}; the file is damaged, copy it again, or write it with a standard type"
+                f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5; "
+                "the file is damaged, copy it again, or write it with a standard type"
             )
 
 
 def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
-    """Types of the numbers in a type, which may be made of others."""
+    """Yield the types of the numbers in a type, which may be composed of others."""
     import h5py
 
     if isinstance(kind, h5py.h5t.TypeCompoundID):
@@ -141,6 +142,7 @@ def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
 
 @cache
 def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
+    """Return the integer and floating-point types that HDF5 defines."""
     import h5py
 
     names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
@@ -151,67 +153,63 @@ def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
     )
 
 
-# Of a file: smaller data are copied out of it, or what a column keeps in memory would be far more than itself.
-_LARGE: Final = 1 / 4
-
-
 def _values(dataset: h5py.Dataset, content: bytes) -> Any:
-    """Numbers of a dataset; where it makes much of the file with that ``content``, in one piece, they stay there."""
-    start = dataset.id.get_offset()  # None of data in chunks, and in other files
-    if (
-        start is None
-        or not _LARGE * len(content) < dataset.nbytes <= len(content) - start
-    ):
+    """Return the numbers of a dataset; one that is contiguous and most of the file is a view of ``content``."""
+    start = dataset.id.get_offset()  # None for data in chunks or in other files
+    if start is None:
         return dataset[()]
-    return np.frombuffer(content, dataset.dtype, dataset.size, start).reshape(
-        dataset.shape
-    )
+    if not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
+        return dataset[()]
+    values = np.frombuffer(content, dataset.dtype, dataset.size, start)
+    return values.reshape(dataset.shape)
 
 
 def finite(values: Any, path: str, source: str) -> Samples:
-    """``values`` as doubles, read-only so that nobody needs a copy of his own; FormatError unless all are finite."""
+    """Return ``values`` as read-only doubles, which callers can share; raise FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
-    known = np.isfinite(numbers)
-    if not known.all():
-        bad = np.argwhere(~known)[0]
-        found = f"{source}: {path} is {numbers[tuple(bad)]} at state {bad[0] + 1}, not a finite number"
-        raise FormatError(f"{found}; choose another dataset")
+    is_finite = np.isfinite(numbers)
+    if not is_finite.all():
+        bad = np.argwhere(~is_finite)[0]
+        problem = f"{source}: {path} is {numbers[tuple(bad)]} at state {bad[0] + 1}, not a finite number"
+        raise FormatError(f"{problem}; choose another dataset")
     numbers.flags.writeable = False
     return numbers
 
 
 def columns_of(file: h5py.File) -> tuple[Column, ...]:
-    """All columns of numbers in ``file``, sorted by path."""
+    """Return all columns of numbers in ``file``, sorted by path."""
     import h5py
 
-    found: list[Column] = []
-    done: list[str] = []  # groups that were understood as a whole
+    columns: list[Column] = []
+    read_groups: list[str] = []  # groups that a reader of their layout read as a whole
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if any(
-            step.startswith(_BOOKKEEPING) for step in name.split("/")
-        ) or name.startswith(tuple(done)):
+        if any(step.startswith(_BOOKKEEPING) for step in name.split("/")):
+            return
+        if name.startswith(tuple(read_groups)):
             return
         if isinstance(item, h5py.Dataset):
-            found.extend(_dataset_columns(name, item))
+            columns.extend(_dataset_columns(name, item))
             return
-        reader = (
-            _erf_block
-            if name.endswith(_ERF_BLOCK)
-            else _PANDAS.get(_text(item.attrs.get("pandas_type")))
-        )
-        if reader is not None:
-            found.extend(reader(name, item))
-            done.append(name + "/")
+        pandas_type = _text(item.attrs.get("pandas_type"))
+        if name.endswith(_ERF_BLOCK):
+            columns.extend(_erf_block(name, item))
+            read_groups.append(name + "/")
+        elif pandas_type in _PANDAS:
+            columns.extend(_PANDAS[pandas_type](name, item))
+            read_groups.append(name + "/")
 
     file.visititems(visit)
-    return tuple(sorted(found, key=lambda column: column.path))
+    return tuple(sorted(columns, key=lambda column: column.path))
 
 
 def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
+    """Yield the columns of a dataset: members of a compound type, a vector, or the columns of a matrix."""
     import h5py
 
-    plan, shape, dtype = dataset.id.get_create_plist(), dataset.shape, dataset.dtype
+    plan = dataset.id.get_create_plist()
+    shape = dataset.shape
+    dtype = dataset.dtype
     if (
         shape is None
         or plan.get_layout() == h5py.h5d.VIRTUAL
@@ -236,7 +234,7 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Columns along the axis that has as many entries as there are titles, or the shorter one."""
+    """Yield the columns of a matrix along the axis with as many entries as there are titles, or the shorter one."""
     rows, width = dataset.shape
     if rows == width:
         return
@@ -255,10 +253,11 @@ def _matrix_columns(
 
 
 def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
-    """Return the columns of a time history of ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
+    """Yield the columns of a time history of ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
 
-    ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the entities.
-    Only quantities of one component are columns.  Those of entities beside the model have the number in their path.
+    ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the
+    entities. Only quantities of one component are columns. Columns of entities other than the model have the number
+    in their path.
     """
     results, times, entities = (block.get(key) for key in ("res", "indexval", "entid"))
     if (
@@ -275,9 +274,9 @@ def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
     numbers = [] if entities is None else np.ravel(entities[()]).tolist()
-    for place in range(results.shape[1]):
-        number = "" if of_model or place >= len(numbers) else f"/{numbers[place]}"
-        where = None if results.shape[1] == 1 else (1, place)
+    for entity in range(results.shape[1]):
+        number = "" if of_model or entity >= len(numbers) else f"/{numbers[entity]}"
+        where = None if results.shape[1] == 1 else (1, entity)
         yield Column(
             f"{variable}{number}/value",
             states,
@@ -288,31 +287,29 @@ def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
 
 
 def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
-    """Return the names that Exodus keeps beside a matrix of values: ``name_glo_var`` beside ``vals_glo_var``."""
+    """Return the column names that Exodus stores next to a matrix: ``name_glo_var`` next to ``vals_glo_var``."""
     import h5py
 
-    place = (dataset.name or "").rpartition("/")[2]
-    beside = (
-        dataset.parent.get(f"name_{place.removeprefix('vals_')}")
-        if place.startswith("vals_")
-        else None
-    )
+    leaf = (dataset.name or "").rpartition("/")[2]
+    if not leaf.startswith("vals_"):
+        return []
+    names = dataset.parent.get(f"name_{leaf.removeprefix('vals_')}")
     if (
-        not isinstance(beside, h5py.Dataset)
-        or beside.dtype.kind != "S"
-        or beside.ndim != 2
+        not isinstance(names, h5py.Dataset)
+        or names.dtype.kind != "S"
+        or names.ndim != 2
     ):
         return []
     return [
         b"".join(letters).decode("utf-8", "replace").strip("\0 ")
-        for letters in beside[()].tolist()
+        for letters in names[()].tolist()
     ]
 
 
 def _compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
-    """One column for each member, several for a member that is a vector; pandas notes its names beside it."""
+    """Yield a column for each member, several for a vector, whose names pandas stores in an attribute."""
     if len(dataset.shape) != 1:
         return
     base = name.removesuffix("/table")
@@ -325,23 +322,25 @@ def _compound_columns(
             yield Column(path, dataset.shape[0], str(kind), name, field)
             continue
         titles = _pickled_names(dataset.attrs.get(f"{field}_kind"))
-        named = len(titles) == kind.shape[0]
+        has_titles = len(titles) == kind.shape[0]
         for index in range(kind.shape[0]):
-            path = f"{base}/{titles[index]}" if named else f"{base}/{field}[{index}]"
+            leaf = titles[index] if has_titles else f"{field}[{index}]"
+            path = f"{base}/{leaf}"
             yield Column(
                 path, dataset.shape[0], str(kind.base), name, field, (1, index)
             )
 
 
 def _pandas_table(name: str, group: h5py.Group) -> Iterator[Column]:
-    found = _PICKLED_INDEX_NAME.search(bytes(_text(group.attrs.get("info")), "utf-8"))
-    yield from _compound_columns(
-        f"{name}/table", group["table"], found[1].decode() if found else "index"
-    )
+    """Yield the columns of a frame in the "table" store."""
+    info = bytes(_text(group.attrs.get("info")), "utf-8")
+    match = _PICKLED_INDEX_NAME.search(info)
+    index_name = match[1].decode() if match else "index"
+    yield from _compound_columns(f"{name}/table", group["table"], index_name)
 
 
 def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Find the columns of a frame in the "fixed" store: the index, and blocks of columns of one type."""
+    """Yield the columns of a frame in the "fixed" store: the index, and blocks of columns of one type."""
     index = group["axis1"]
     yield from _pandas_index(name, index)
     for number in range(int(group.attrs["nblocks"])):
@@ -355,8 +354,8 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
         across = values.shape[0] == index.size and (
             index.size != len(titles) or bool(values.attrs.get("transposed"))
         )
-        for place, title in enumerate(titles):
-            where = (1 if across else 0, place)
+        for column, title in enumerate(titles):
+            where = (1 if across else 0, column)
             yield Column(
                 f"{name}/{title}",
                 index.size,
@@ -367,6 +366,7 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _pandas_series(name: str, group: h5py.Group) -> Iterator[Column]:
+    """Yield the index and the values of a series."""
     values = group["values"]
     yield from _pandas_index(name, group["index"])
     if values.dtype.kind in "iuf" and values.ndim == 1:
@@ -374,6 +374,7 @@ def _pandas_series(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _pandas_index(name: str, index: h5py.Dataset) -> Iterator[Column]:
+    """Yield the index of a frame or series, if it consists of numbers."""
     title = _text(index.attrs.get("name"))
     title = "index" if title in ("", "N.") else title  # "N." is a pickled None
     if index.dtype.kind in "iuf" and index.ndim == 1:
@@ -388,7 +389,7 @@ _PANDAS: Final = {
 
 
 def _text(value: object) -> str:
-    """Read an attribute as text, whichever way it was stored; empty if it is not text."""
+    """Return an attribute as text, however it was stored; empty if it is not text."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):
@@ -397,7 +398,7 @@ def _text(value: object) -> str:
 
 
 def _titles(value: object) -> list[str]:
-    """Make a list of names from an array of texts or from one text with commas."""
+    """Return the names in an array of texts, or in one text with commas."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
         return [_text(entry) for entry in value.tolist()]
     text = _text(value)
@@ -405,6 +406,7 @@ def _titles(value: object) -> list[str]:
 
 
 def _pickled_names(value: object) -> list[str]:
+    """Return the names in a list of texts that pandas pickled."""
     return [
         name.decode("raw-unicode-escape")
         for name in _PICKLED_NAME.findall(bytes(_text(value), "utf-8"))

@@ -1,7 +1,7 @@
-"""HDF5: time and energy columns from any layout, and the binouts that lasso-python saves.
+"""HDF5: time and energy columns from any layout, and binouts saved by lasso-python.
 
-A file is taken for a saved binout when it has its branches; of any other the columns are offered by their paths, the
-only ones that fit are taken, and the candidates listed where more than one does.
+A file with the branches of a binout is treated as a saved binout. Of any other file, columns are chosen by their
+paths; without a choice, the only column that fits is used, and if several fit the message lists them.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # candidates named in a message
+_MANY: Final = 12  # columns listed in a message
 _BRANCHES: Final = ("glstat", "matsum")
-# What h5py makes of a damaged file.
+# Errors of h5py for a damaged file.
 _DAMAGED: Final = (
     OSError,
     RuntimeError,
@@ -54,34 +54,40 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
+# Offset of the end-of-file address in superblocks of version 0 to 3 with addresses of eight bytes, as all writers use.
+_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
+_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
+# Time-out of a reading: 60 s plus 1 s per 100 kB.  A longer reading means a cyclic B-tree in a damaged file.
+_SECONDS: Final = 60
+_SLOWEST: Final = 100_000  # bytes per second
+_USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
+
 
 def recognises(data: bytes) -> bool:
-    """Whether ``data``, the beginning of a file, is that of an HDF5 file; MATLAB puts 512 bytes before it."""
+    """Return True if ``data`` is the start of an HDF5 file; MATLAB puts 512 bytes before its signature."""
     return SIGNATURE in (data[:8], data[512:520])
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a leg of the run; columns that are named overrule what a saved binout would offer."""
+    """Open each file as a leg of the run; columns of the selection take precedence over those of a saved binout."""
     return [_opened_leg(source, selection) for source in sources]
 
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
+    """Open one file as a saved binout or as columns."""
     _import_library(source.name)
-    # In memory whatever its size: the library crashes on some mixtures of two states of a file.
+    # In memory whatever its size: the library crashes on some mixtures of two versions of a file.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
-    branches = (
-        {} if selection.time or selection.energy else _branches(file, source.name)
-    )
-    return (
-        SavedBinout(source.name, branches)
-        if branches
-        else Columns(file, source.name, selection)
-    )
+    if not selection.time and not selection.energy:
+        branches = _branches(file, source.name)
+        if branches:
+            return SavedBinout(source.name, branches)
+    return Columns(file, source.name, selection)
 
 
 def _branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
+    """Open the glstat and matsum branches that lasso-python saved; {} for a file of another layout."""
     with _opened(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
@@ -93,7 +99,7 @@ def _branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
+    """The columns of an HDF5 file of any layout by their paths; a `Database` without parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -102,9 +108,9 @@ class Columns(Database):
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
-        self._named_time = (
-            _named(selection.time, self._columns, source) if selection.time else None
-        )
+        self._named_time: Column | None = None
+        if selection.time:
+            self._named_time = _named(selection.time, self._columns, source)
         self._energies = [
             _named(path, self._columns, source) for path in selection.energy
         ]
@@ -114,16 +120,16 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column called an internal energy, or beside the time; else FormatError with the candidates."""
+        """The only column named like an internal energy, or next to the time; FormatError lists them otherwise."""
         return _only_energy(self._columns, self._named_time, self.source).path
 
     def find(self, wanted: str) -> str:
-        """Path of the column that is meant."""
+        """Return the path of the column that ``wanted`` means."""
         return _named(wanted, self._columns, self.source).path
 
     @cached_property
     def time(self) -> Samples:
-        """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
+        """Values of the time column, shape (n,) [time]; FormatError if they are not those of one run."""
         path = self._time_column.path
         times = of_one_run(
             self._load(self._time_column),
@@ -133,20 +139,17 @@ class Columns(Database):
             energies = self._energies or [
                 _only_energy(self._columns, self._named_time, self.source)
             ]
-            beside = [
-                column
+            whole_numbers = {
+                column.path: self._load(column).astype(int).tolist()
                 for column in self._columns
                 if column.size == times.size and column.is_whole_number
-            ]
-            others = {
-                column.path: self._load(column).astype(int).tolist()
-                for column in beside
             }
-            refuse_rows_of_parts(self.source, times, self._load(energies[0]), others)
+            energy = self._load(energies[0])
+            refuse_rows_of_parts(self.source, times, energy, whole_numbers)
         return times
 
     def channel(self, name: str) -> Samples:
-        """Values of one column, shape (n,); FormatError when it is not as long as the time."""
+        """Return one column, shape (n,); raise FormatError if its length or times differ from those of the energy."""
         column = _named(name, self._columns, self.source)
         if column.size != self._time_column.size:
             raise FormatError(
@@ -157,22 +160,25 @@ class Columns(Database):
         return self._load(column)
 
     def _check_own_times(self, column: Column) -> None:
-        """Raise FormatError if a column has times beside it that are not those of the energy."""
-        beside = [
+        """Raise FormatError if the group of a column has times that are not those of the energy."""
+        times_of_group = [
             time
             for time in self._columns
             if time.is_time and time.group == column.group
         ]
-        if len(beside) != 1 or beside[0] in (self._time_column, column):
+        if len(times_of_group) != 1:
             return
-        if not np.array_equal(self._load(beside[0]), self.time):
-            found = f"{self.source}: {column.path} has other times ({beside[0].path}) than the energy"
+        own_time = times_of_group[0]
+        if own_time in (self._time_column, column):
+            return
+        if not np.array_equal(self._load(own_time), self.time):
             raise FormatError(
-                f"{found} ({self._time_column.path}); choose columns of the same times"
+                f"{self.source}: {column.path} has other times ({own_time.path}) than the energy "
+                f"({self._time_column.path}); choose columns of the same times"
             )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Digits that the stored types hold."""
+        """Return the precisions of the stored types of the times and of these columns."""
         energies = [_named(name, self._columns, self.source) for name in names]
         digits = [
             DIGITS[4 if column.dtype.endswith("32") else 8]
@@ -182,22 +188,23 @@ class Columns(Database):
 
     @cached_property
     def _time_column(self) -> Column:
+        """The column of the selection, or the time nearest to the energy."""
         if self._named_time:
             return self._named_time
-        energy = (
-            self._energies[0]
-            if self._energies
-            else _only_energy(self._columns, None, self.source)
-        )
+        if self._energies:
+            energy = self._energies[0]
+        else:
+            energy = _only_energy(self._columns, None, self.source)
         return _only_time(self._columns, energy, self.source)
 
     def _load(self, column: Column) -> Samples:
+        """Return the values of a column, shape (size,)."""
         with _opened(self._file, self.source) as opened:
             return column.load(opened, self._file.getvalue(), self.source)
 
 
 class SavedBinout(Database):
-    """A binout that lasso-python saved: channels of its glstat branch, parts of its matsum branch."""
+    """A binout saved by lasso-python: channels of its glstat branch, parts of its matsum branch."""
 
     format = "hdf5"
 
@@ -209,7 +216,7 @@ class SavedBinout(Database):
         self.parts = branches["matsum"].parts if "matsum" in branches else ()
 
     def branch(self, name: str) -> PartGroup:
-        """Give a branch; FormatError where it was not saved."""
+        """Return a branch by name; raise FormatError if it was not saved."""
         if name not in self._branches:
             raise FormatError(
                 f"{self.source}: no {name} in this saved binout; name the run's own files"
@@ -218,7 +225,7 @@ class SavedBinout(Database):
 
 
 class PartGroup(Database):
-    """The glstat or matsum branch of a file that lasso-python saved."""
+    """The glstat or matsum branch of a file saved by lasso-python."""
 
     def __init__(
         self, file: io.BytesIO, source: str, opened: h5py.File, name: str
@@ -245,7 +252,7 @@ class PartGroup(Database):
             )
 
     def channel(self, name: str) -> Samples:
-        """Values of the dataset ``name``, shape (n,)."""
+        """Return the values of the dataset ``name``, shape (n,)."""
         if name not in self.channels:
             raise FormatError(
                 f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}"
@@ -254,23 +261,23 @@ class PartGroup(Database):
             return self._load(opened[self.name], name, (self.time.size,))
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Values of a quantity for the parts ``ids``, shape (n, len(ids))."""
-        known = [part.id for part in self.parts]
-        missing = [id_ for id_ in ids if known.count(id_) != 1]
+        """Return a quantity of the parts ``ids``, shape (n, len(ids))."""
+        part_ids = [part.id for part in self.parts]
+        missing = [id_ for id_ in ids if part_ids.count(id_) != 1]
         if missing:
-            found = f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}"
             raise FormatError(
-                f"{found}; choose from {', '.join(map(str, known)) or 'none'}"
+                f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}; "
+                f"choose from {', '.join(map(str, part_ids)) or 'none'}"
             )
         with _opened(self._file, self.source) as opened:
             group = opened[self.name]
             if quantity not in group:
                 raise FormatError(f"{self.source}: {self.name} has no {quantity}")
-            values = self._load(group, quantity, (self.time.size, len(known)))
-        return values[:, [known.index(id_) for id_ in ids]]
+            values = self._load(group, quantity, (self.time.size, len(part_ids)))
+        return values[:, [part_ids.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
-        """Dataset ``name``, which may lack the axes of length 1 of ``shape``."""
+        """Return the dataset ``name`` in this ``shape``; it may be stored without the axes of length 1."""
         dataset = group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
@@ -283,61 +290,54 @@ class PartGroup(Database):
 
 
 def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
-    """Parts in the order of the columns; titles by ``legend_ids``, which may be in another order."""
+    """Return the parts in the order of the columns; titles belong to ``legend_ids``, which may have another order."""
     check_data(group["ids"], source)
     titles: dict[int, str] = {}
     if "legend" in group and "legend_ids" in group:
         check_data(group["legend_ids"], source)
         ids = np.ravel(group["legend_ids"][()])
         legend = b"".join(np.ravel(group["legend"][()]).tolist())
-        size, rest = divmod(len(legend), max(1, ids.size))
-        if not rest:
-            cut = [legend[size * row : size * (row + 1)] for row in range(ids.size)]
-            titles = {
-                int(id_): text.decode("latin-1").strip()
-                for id_, text in zip(ids, cut, strict=True)
-            }
+        size, remainder = divmod(len(legend), max(1, ids.size))
+        if not remainder:
+            for row, id_ in enumerate(ids.tolist()):
+                text = legend[size * row : size * (row + 1)]
+                titles[int(id_)] = text.decode("latin-1").strip()
     return tuple(
         Part(int(id_), titles.get(int(id_), "")) for id_ in np.ravel(group["ids"][()])
     )
 
 
 def _line(group: h5py.Group, name: str) -> str:
-    """Read a text that was saved as an array of one string."""
+    """Return a text that was saved as an array of one string, empty if there is none."""
     if name not in group:
         return ""
     values = np.ravel(group[name][()])
     text = values[0] if values.size else b""
-    return (
-        text.decode("latin-1").strip("\0 ")
-        if isinstance(text, bytes)
-        else str(text).strip()
-    )
+    if isinstance(text, bytes):
+        return text.decode("latin-1").strip("\0 ")
+    return str(text).strip()
 
 
 def _named(path: str, columns: Sequence[Column], source: str) -> Column:
-    found = [column for column in columns if column.path == path.strip("/")]
-    near = (
-        "" if found else near_miss(path.strip("/"), [column.path for column in columns])
-    )
-    return _only(found, columns, f"{path!r}{near}", source)
+    """Return the column with this path; raise FormatError, with a similar path if there is one."""
+    matching = [column for column in columns if column.path == path.strip("/")]
+    near = ""
+    if not matching:
+        near = near_miss(path.strip("/"), [column.path for column in columns])
+    return _only(matching, columns, f"{path!r}{near}", source)
 
 
 def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
-    """Find the only column called an internal energy, or the only one beside the time."""
-    fitting = [
-        columns[place]
-        for place in find_internal_energies([column.path for column in columns])
-    ]
+    """Return the only column named like an internal energy, or the only one next to a time."""
+    paths = [column.path for column in columns]
+    fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:
         times = [time] if time else [column for column in columns if column.is_time]
+        tables = {(column.group, column.size) for column in times}
         fitting = [
             column
             for column in columns
-            if column not in times
-            and any(
-                (column.group, column.size) == (one.group, one.size) for one in times
-            )
+            if column not in times and (column.group, column.size) in tables
         ]
         if len(fitting) == 1:
             refuse_other_quantity(fitting[0].path, source)
@@ -345,7 +345,7 @@ def _only_energy(columns: Sequence[Column], time: Column | None, source: str) ->
 
 
 def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
-    """Find the time in the group of the energy, else in the nearest group around it."""
+    """Return the time in the group of the energy, or in the nearest group that contains it."""
     group = energy.group
     while True:
         fitting = [
@@ -357,25 +357,21 @@ def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column
 
 
 def _only(
-    fitting: Sequence[Column], columns: Sequence[Column], what: str, source: str
+    fitting: Sequence[Column], columns: Sequence[Column], purpose: str, source: str
 ) -> Column:
+    """Return the only fitting column; raise FormatError with the columns to choose from otherwise."""
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
-    there = (
-        listing(
-            [f"{column.path} ({column.size})" for column in fitting or columns],
-            most=_MANY,
-        )
-        or "there is none"
-    )
+    paths = [f"{column.path} ({column.size})" for column in fitting or columns]
+    menu = listing(paths, most=_MANY) or "there is none"
     raise FormatError(
-        f"{source}: {count} for {what}, one was expected; give its path: {there}"
+        f"{source}: {count} for {purpose}, one was expected; give its path: {menu}"
     )
 
 
 def _import_library(source: str) -> None:
-    """Import h5py, before a process is forked that would import it too; FormatError where it is not installed."""
+    """Import h5py before a process is forked, so that it is imported once; raise FormatError if it is not installed."""
     try:
         import_module("h5py")
     except ImportError:
@@ -386,7 +382,7 @@ def _import_library(source: str) -> None:
 
 @contextmanager
 def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
-    """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
+    """Open the file; turn any error of h5py for a damaged file into a FormatError."""
     import h5py
 
     try:
@@ -399,74 +395,67 @@ def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         ) from error
 
 
-# Damage of which the library crashes or goes round in a circle.
-
-# Place of the end-of-file address in superblocks of version 0 to 3, of addresses of eight bytes, as all writers use.
-_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
-_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# A reading that takes longer than these seconds and one for so many bytes goes round in a circle [s], [bytes].
-_SECONDS: Final = 60
-_SLOWEST: Final = 100_000
-_USER_BLOCK: Final = 512  # MATLAB puts it before the file
+# Checks for damage at which the library crashes or loops endlessly.
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
-    """FormatError where a file has not the size it says, is beyond the bounds, or the library would crash on it.
+    """Raise FormatError if a file is cut or too large, or if the library would crash on it.
 
-    It is read once in a child process, of limited time, so many seconds and one for each 100 kB: what ends that one
-    would end this one, or never end.
+    The file is read once in a child process whose time is limited to ``seconds`` plus 1 s per 100 kB, since a reading
+    that crashes or never ends there would do so here.
     """
     _check_size_of_file(file, source)
     if not hasattr(os, "fork"):
         return
-    reading, told = os.pipe()
+    read_end, write_end = os.pipe()
     child = os.fork()
     if child == 0:
-        _read_and_exit(file, source, seconds, told)
-    os.close(told)
-    with os.fdopen(reading, encoding="utf-8", errors="surrogateescape") as pipe:
+        _read_and_exit(file, source, seconds, write_end)
+    os.close(write_end)
+    with os.fdopen(read_end, encoding="utf-8", errors="surrogateescape") as pipe:
         message = pipe.read()
     _, status = os.waitpid(child, 0)
     if message:
         raise FormatError(message)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        what = (
-            "did not finish reading it"
-            if number == signal.SIGXCPU
-            else f"crashed on it (signal {number})"
-        )
+        failure = f"crashed on it (signal {number})"
+        if number == signal.SIGXCPU:
+            failure = "did not finish reading it"
         raise FormatError(
-            f"{source}: the HDF5 library {what}; the file is damaged, copy it again"
+            f"{source}: the HDF5 library {failure}; the file is damaged, copy it again"
         )
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
+    """Raise FormatError if the size of a file is not the one in its own header."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
     version = head[_VERSION] if len(head) > _VERSION else -1
-    place = _END_OF_FILE.get(version)
+    offset = _END_OF_FILE.get(version)
     if (
-        place is None
-        or len(head) < place + _ADDRESS_SIZE
+        offset is None
+        or len(head) < offset + _ADDRESS_SIZE
         or head[_SIZE[version]] != _ADDRESS_SIZE
     ):
-        return  # the library says what is wrong with it
-    (end,) = struct.unpack_from("<Q", head, place)
+        return  # the library reports what is wrong with it
+    (end,) = struct.unpack_from("<Q", head, offset)
     if size not in (end, end + base):
-        found = f"{source}: the file has {size} bytes, {end} by its own header"
-        raise FormatError(f"{found}; it is damaged or cut, copy it again")
+        raise FormatError(
+            f"{source}: the file has {size} bytes, {end} by its own header; it is damaged or cut, copy it again"
+        )
 
 
 def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
+    """Return the first bytes of a file and its size [byte]."""
     file.seek(0)
     head = file.read(2 * _USER_BLOCK)
     return head, file.seek(0, os.SEEK_END)
 
 
-def _read_and_exit(file: BinaryIO, source: str, seconds: int, told: int) -> None:
-    """Read all that could crash the library; what is beyond the bounds is ``told``, other errors are not for here."""
+def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) -> None:
+    """Read all that could crash the library, write the message of a FormatError to ``write_end``, and exit."""
     try:
         import faulthandler
         import resource
@@ -474,23 +463,24 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, told: int) -> None
         faulthandler.disable()
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         limit = seconds + _head_and_size(file)[1] // _SLOWEST
-        _, most = resource.getrlimit(resource.RLIMIT_CPU)
-        resource.setrlimit(
-            resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most)
-        )
+        _, hard_limit = resource.getrlimit(resource.RLIMIT_CPU)
+        if hard_limit >= 0:
+            limit = min(limit, hard_limit)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard_limit))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         _read(file, source)
     except FormatError as error:
-        os.write(told, str(error).encode(errors="surrogateescape"))
+        os.write(write_end, str(error).encode(errors="surrogateescape"))
     finally:
         os._exit(0)
 
 
 def _read(file: BinaryIO, source: str) -> None:
-    """Read what describes the data, and data in chunks; FormatError where there is more than the bounds allow."""
+    """Read the description of all data, and data in chunks; raise FormatError if the bounds are exceeded."""
     import h5py
 
-    size, unpacked = _head_and_size(file)[1], 0
+    size = _head_and_size(file)[1]
+    unpacked = 0
 
     def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
         nonlocal unpacked
@@ -511,7 +501,7 @@ def _read(file: BinaryIO, source: str) -> None:
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    """Give a file with a dataset of doubles for each column (n,)."""
+    """Return an HDF5 file with a dataset of doubles for each column (n,)."""
     import h5py
 
     content = io.BytesIO()

@@ -1,4 +1,4 @@
-"""What stands above the rows of a table: names and units of the columns, and the title of a curve."""
+"""The lines above the rows of a table: names and units of the columns, and the title of a curve."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from d2rpick.histories.names import is_unit, normalised
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-_SHORT: Final = 60
-# The first columns of th_to_csv of OpenRadioss, in every version; some versions name more or fewer columns behind them
-# than they write (OpenRadioss/Tools, issue 98).
+_SHORT: Final = 60  # characters of a line that a message quotes
+# The first columns of th_to_csv of OpenRadioss in every version; after them, some versions write more or fewer names
+# than columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -36,13 +36,12 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-_SURE_WITHOUT: Final = (
-    2  # columns that may be used below too many names of another program
-)
+# Columns that are used if another program wrote more names than columns: the time and the first value.
+_SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Names and units of columns, empty where there are none; only the first ``sure`` columns have their own name."""
+    """Names and units of the columns, if there are any; only the first ``sure`` columns are sure of their name."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -53,7 +52,7 @@ class Header(NamedTuple):
 def read_header(
     where: str, lines: Sequence[str], separator: str | None, columns: int
 ) -> Header:
-    """Read the lines above the rows of a table of so many ``columns``.
+    """Read the lines above the rows of a table with this number of ``columns``.
 
     Parameters
     ----------
@@ -79,32 +78,34 @@ def read_header(
         return Header(_commented_names(lines, separator, columns), units)
     if composed := _compose_names(rows, columns):
         return Header(tuple(composed), units)
-    names, title = rows[-1], ""
+    names = rows[-1]
+    title = ""
     if len(names) > 1 and not names[-1]:
         names = names[:-1]
-        if len(rows) > 1:  # LS-PrePost: a line of titles, then "Time," or "Time,A8874,"
+        # LS-PrePost writes a line of titles, then "Time," or "Time,A8874,"
+        if len(rows) > 1:
             title = next((cell for cell in reversed(rows[-2]) if cell), "")
     if columns == 2 and len(names) == 1 and is_time(names[0]):
-        names, title = [names[0], title], ""
+        names = [names[0], title]
+        title = ""
     if len(names) == 1:
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        title = " ".join(
-            filter(None, names[2:])
-        )  # 3DEXPERIENCE: the third name is the curve's
+        # 3DEXPERIENCE: the third name is that of the curve
+        title = " ".join(filter(None, names[2:]))
         sure = None
     return Header(tuple(names), units, title, sure)
 
 
 def shorten(line: str) -> str:
-    """Quote a line in a message, cut to what is readable."""
+    """Quote the start of a line for a message."""
     line = line.strip()
     return repr(line if len(line) <= _SHORT else line[:_SHORT] + "...")
 
 
 def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
-    """Return how many columns are sure to have their own name, None for all; FormatError if hardly one is."""
+    """Return the number of columns that are sure of their name, None for all; raise FormatError if there is none."""
     if len(names) == columns:
         return None
     if tuple(map(normalised, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
@@ -118,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names from the last one upwards until each column has its own; nothing if the last is enough.
+    """Join rows of names, from the last one upwards, until all columns have different names; [] if one row is enough.
 
     Examples
     --------
@@ -140,18 +141,19 @@ def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
 
 
 def _join(upper: str, lower: str) -> str:
+    """Join the names of a column from two rows; the name of a time stands alone."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return the cells without empty ones beyond the columns; nothing if there are others, or too few."""
+    """Return one cell per column, without empty cells after them; [] if there are too few or further names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat a name over the empty cells behind it, which a spreadsheet has merged with it; not that of the time."""
+    """Repeat a name over the empty cells after it, which a spreadsheet merged with it, except the name of the time."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -161,7 +163,7 @@ def _fill_from_left(cells: Sequence[str]) -> list[str]:
 def _split_rows(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> Iterator[list[str]]:
-    """Cells of the header lines; a quoted name may go on over a line end."""
+    """Yield the cells of each header line; a quoted name may go on over a line end."""
     pending = ""
     for line in lines:
         if not pending and is_skipped(line):
@@ -175,7 +177,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Cells of a header line; between blanks names may hold blanks, and what does not fit is one title."""
+    """Split a header line. Names between blanks may contain single blanks; a line that does not fit is one title."""
     if separator is not None:
         return split(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -188,7 +190,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Names in the last comment line, as numpy.savetxt writes them: one per column, among them a time."""
+    """Return the names in the last comment line, as numpy.savetxt writes them: one for each column, with a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

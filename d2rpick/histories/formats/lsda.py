@@ -1,15 +1,14 @@
 """LSDA, the container of LS-DYNA's binout: directories of typed variables, found by walking the records.
 
-The file begins with its own header length, the sizes of length, offset, command and type fields, the byte
-order (1: little-endian) and the float format.  Then follow records, each of length, command and body:
+The file begins with the length of its header, the sizes of length, offset, command and type fields, the byte order
+(1: little-endian) and the float format. Records follow, each of length, command and body:
 
-* a change of directory, absolute or relative to the last one;
-* a variable: its type, the length of its name, the name, the values;
-* symbol tables, which repeat after every flush where the variables lie.
+* a change of directory, absolute or relative to the last one; * a variable: its type, the length of its name, the
+name, the values; * symbol tables, which list the positions of the variables after every flush.
 
-The symbol tables are not used.  They are a chain that a killed run leaves broken, while the records
-themselves are whole up to the byte where the run stopped.  Most files repeat one pattern of records at a
-constant stride; `repeat` checks that by whole blocks instead of record by record.
+The symbol tables are not used: they form a chain that is broken after a killed run, while the records are whole up to
+the byte at which the run stopped. Most files repeat one pattern of records at a constant stride; `repeats` compares
+whole blocks instead of single records.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # symbol tables and what is in them
-_LONGEST: Final = 1 << 32  # bytes that no symbol table has
+_TABLES: Final = range(4, 8)  # symbol tables and their entries
+_LONGEST: Final = 1 << 32  # bytes; a symbol table is shorter
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {
@@ -52,20 +51,20 @@ _TYPES: Final = {
     10: "f8",
 }
 
-# Head, type and name of a variable are not longer than this; more around them is read with them.
+# Bytes that contain record head, type and name of a variable; more bytes around them are read together.
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# Fewer repetitions than these are walked faster than they are compared by arrays.
+# From this number of repetitions on, comparing arrays is faster than walking the records.
 _WORTH: Final = 64
 
-# Directories of states end in d and the number of the state, with at least 6 digits; 18 fit an int64.
+# Names of state directories: d and the number of the state, with 6 to 18 digits (which fit an int64).
 _STATE: Final = re.compile(rb"(?:^|/)d(\d{1,18})$")
 
 
 @dataclass(frozen=True)
 class Variable:
-    """Where the values of a variable lie, ``offset`` bytes behind the start of its directory."""
+    """A variable of a directory: its values begin ``offset`` bytes after the start of the directory."""
 
     offset: int
     dtype: np.dtype[Any]
@@ -73,17 +72,17 @@ class Variable:
 
 
 class DirectoryLayout(NamedTuple):
-    """The variables of a directory; ``doubled`` are the names that stand in it more than once."""
+    """The variables of a directory; ``doubled`` are the names that occur in it more than once."""
 
     variables: dict[str, Variable]
     doubled: frozenset[str]
 
 
 class _Form(NamedTuple):
-    """All bytes of a directory's records as one integer, to find the same records again at once.
+    """The bytes of a directory's records as one integer, to recognise the same records in another directory at once.
 
-    ``heads`` are the records without their values; ``fixed`` are those bytes in their places, ``mask``
-    selects them from ``length`` bytes.
+    ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
+    them from ``length`` bytes.
     """
 
     heads: tuple[bytes, ...]
@@ -102,24 +101,24 @@ class Lsda:
     source : str
         Name of the file, for messages.
     branches : collection of str
-        Directories of states whose variables are wanted, by their paths; of the others only the names are kept.
+        Paths of the directories whose states and variables are wanted; of the others only the names are kept.
 
     Attributes
     ----------
     visits : dict of str to array of int
-        Every time the file enters a numbered directory of each wanted branch, in the order of the file: the number of
-        the state, the byte where its records start, and which of ``layouts`` it has; packed, there may be a million.
+        For each wanted branch, every visit to a state directory, in the order of the file: number of the state, byte at
+        which its records start, and index in ``layouts``; packed, since there may be a million.
     metadata : dict of str to list of (int, int)
         Start and layout of each visit to the directory ``metadata`` of a wanted branch.
     odd : dict of str to list of str
-        Other directories of each wanted branch that hold variables.
+        Directories of each wanted branch that are neither states nor metadata but contain variables.
     layouts : list of DirectoryLayout
     names : set of str
         All top-level directories.
     stop : str
-        Why the walk ended before the end of the file; empty when it did not.
+        Why the walk ended before the end of the file; empty if it did not.
     unfinished : str
-        The branch in whose last state the records end, so that more variables may have been meant to follow.
+        The branch whose last state ends the records, so that further variables may be missing.
 
     Raises
     ------
@@ -146,34 +145,41 @@ class Lsda:
         self._walk(begin)
 
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
-        """Values at any bytes of the file, in the shape of ``positions``."""
-        found = self.data.fields(positions.ravel(), dtype.itemsize)
+        """Return values at any bytes of the file, in the shape of ``positions``."""
+        fields = self.data.fields(positions.ravel(), dtype.itemsize)
         self.data.check()
-        return np.asarray(found.view(dtype).reshape(positions.shape))
+        return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Number, start and layout of each visit to a state of a branch, shape (n, 3)."""
+        """Return number, start and layout of each visit to a state of a branch, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def raw(self, start: int, variable: Variable) -> bytes:
-        """Bytes of one variable in the directory that starts at byte ``start``."""
+        """Return the bytes of a variable in the directory that starts at byte ``start``."""
         begin = start + variable.offset
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        data, unpack, head = self.data, self._head.unpack_from, self._head.size
+        """Walk the records from a byte on, and collect the directories of the wanted branches."""
+        data = self.data
+        unpack = self._head.unpack_from
+        head = self._head.size
         size, name_length = len(data), head + self._type.size
         near, base = b"", 0  # the bytes around the position
         path: tuple[str, ...] = ()
-        number, start, records, command = -1, position, list[bytes](), 0
-        anchors: dict[
-            tuple[str, ...], int
-        ] = {}  # where the last state of each branch began
+        number = -1
+        start = position
+        records = list[bytes]()
+        command = 0
+        # where the last state of each branch began
+        anchors: dict[tuple[str, ...], int] = {}
         heads: set[bytes] = set()
         while position + head <= size:
             at = position - base
             if at + _HEAD > len(near):
-                near, base, at = data[position : position + _AROUND], position, 0
+                near = data[position : position + _AROUND]
+                base = position
+                at = 0
             length, command = unpack(near, at)
             end = position + length
             if length < head or end > size or command not in _COMMANDS:
@@ -195,20 +201,18 @@ class Lsda:
                         position += ahead
                         continue
                     anchors[branch] = position
-                path, number, start = entered, int(state[1]) if state else -1, end
+                path = entered
+                number = int(state[1]) if state else -1
+                start = end
                 self.names.update(path[:1])
                 form = self._same_again(path, start) if state else None
                 if form:
-                    records, command = list(form.heads), VARIABLE
+                    records = list(form.heads)
+                    command = VARIABLE
                     end = start + form.length
             elif command == VARIABLE and length > name_length:
-                records.append(
-                    near[
-                        at : min(
-                            at + length, at + name_length + 1 + near[at + name_length]
-                        )
-                    ]
-                )
+                name_end = at + name_length + 1 + near[at + name_length]
+                records.append(near[at : min(at + length, name_end)])
             else:
                 records.append(near[at : at + head])
             position = end
@@ -222,22 +226,22 @@ class Lsda:
         if number >= 0 and (self.stop or command == VARIABLE):
             self.unfinished = "/".join(path[:-1])
 
-    def _goes_on(self, rest: bytes, heads: set[bytes]) -> bool:
-        """Whether the file was cut in the record that begins so; else bytes are lost or too many in the one before.
+    def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
+        """Return True if the file was cut in the record that begins ``last_bytes``; else the last record is damaged.
 
-        Records of a state are as long as those of the last one, but no symbol table is like another.
+        Records of a state have the heads of the last state, but symbol tables differ from each other.
         """
-        if any(known.startswith(rest) for known in heads):
+        if any(head.startswith(last_bytes) for head in heads):
             return True
-        length, command = self._head.unpack(rest.ljust(self._head.size, b"\0"))
+        length, command = self._head.unpack(last_bytes.ljust(self._head.size, b"\0"))
         return command in _TABLES and length < _LONGEST
 
     def _leave(
         self, path: tuple[str, ...], number: int, start: int, records: list[bytes]
     ) -> None:
-        """Keep what the directory that is now left held, if it is wanted."""
+        """Keep the variables of the directory that the walk leaves, if they are wanted."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
-            records.pop()  # a symbol table behind the variables is no part of their layout
+            records.pop()  # a symbol table after the variables is not part of the layout
         branch = "/".join(path[:-1])
         if not records or branch not in self.visits:
             return
@@ -256,7 +260,7 @@ class Lsda:
             self.odd[branch].append(path[-1])
 
     def _layout(self, records: list[bytes]) -> DirectoryLayout:
-        """Sort out the heads of a directory's records; one that makes no sense holds no variable."""
+        """Return the variables that the record heads of a directory define; a head that makes no sense defines none."""
         variables: dict[str, Variable] = {}
         doubled = set()
         offset = 0
@@ -265,10 +269,11 @@ class Lsda:
             begin = self._head.size + self._type.size + 1
             if command == VARIABLE and len(record) > begin:
                 (code,) = self._type.unpack_from(record, self._head.size)
-                name, values = record[begin:].decode("latin-1"), length - len(record)
+                name = record[begin:].decode("latin-1")
+                values = length - len(record)
                 dtype = np.dtype(self._order + _TYPES.get(code, "V1"))
-                whole = name.isprintable() and len(name) == record[begin - 1]
-                if code in _TYPES and whole and values % dtype.itemsize == 0:
+                is_whole = name.isprintable() and len(name) == record[begin - 1]
+                if code in _TYPES and is_whole and values % dtype.itemsize == 0:
                     doubled.update({name} & variables.keys())
                     variables[name] = Variable(
                         offset + len(record), dtype, values // dtype.itemsize
@@ -277,6 +282,7 @@ class Lsda:
         return DirectoryLayout(variables, frozenset(doubled))
 
     def _form(self, heads: tuple[bytes, ...]) -> _Form:
+        """Return the form of a directory with these record heads."""
         mask, fixed = bytearray(), bytearray()
         for head in heads:
             values = bytes(self._head.unpack_from(head)[0] - len(head))
@@ -285,27 +291,27 @@ class Lsda:
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
     def _same_again(self, path: tuple[str, ...], start: int) -> _Form | None:
-        """Look whether a state has the records of the last one of its branch."""
+        """Return the form of the last state of the branch if this state has the same records, else None."""
         branch = "/".join(path[:-1])
         if branch not in self._forms:
             return None
         form = self._forms[branch][1]
-        block = int.from_bytes(self.data[start : start + form.length])
-        return (
-            form
-            if start + form.length <= len(self.data) and block & form.mask == form.fixed
-            else None
-        )
+        end = start + form.length
+        block = int.from_bytes(self.data[start:end])
+        if end <= len(self.data) and block & form.mask == form.fixed:
+            return form
+        return None
 
     def _skip(self, previous: int | None, position: int) -> int:
-        """Bytes to go on when the records from ``previous`` to ``position`` repeat; their states are kept.
+        """Return the bytes to skip if the records from ``previous`` to ``position`` repeat; keep the skipped states.
 
-        The last repetition is left to the walk, which then goes on as if it had come there by itself.
+        The last repetition is left to the walk, which then goes on as usual.
         """
         if previous is None or not self._alike(previous, position):
             return 0
-        if any(known and known[-1][0] > previous for known in self.metadata.values()):
-            return 0
+        for metadata in self.metadata.values():
+            if metadata and metadata[-1][0] > previous:
+                return 0
         stride = position - previous
         fixed, numbers = self._pattern(previous, position)
         times, steps = repeats(self.data, previous, fixed, numbers)
@@ -317,41 +323,45 @@ class Lsda:
             for (at, width), step in zip(numbers, steps, strict=True)
         }
         ahead = np.arange(1, times)[:, None, None]
-        for visits in filter(
-            None, self.visits.values()
-        ):  # a branch that is not there has none
-            known = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
-            repeated = known[np.isin(known[:, 1], [*growth])]
-            more = [[growth[start], stride, 0] for start in repeated[:, 1].tolist()]
-            visits.frombytes(
-                (repeated + ahead * np.array(more, np.int64).reshape(-1, 3)).tobytes()
-            )
+        for visits in self.visits.values():
+            if not visits:  # a branch that the file does not have
+                continue
+            last_visits = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
+            repeated = last_visits[np.isin(last_visits[:, 1], [*growth])]
+            steps_of_visits = np.array(
+                [[growth[start], stride, 0] for start in repeated[:, 1].tolist()],
+                np.int64,
+            ).reshape(-1, 3)
+            visits.frombytes((repeated + ahead * steps_of_visits).tobytes())
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Whether it is worth to look for repetitions: a cheap look at heads one stride apart."""
-        head, stride = self._head.size, position - previous
+        """Return True if a search for repetitions is worthwhile, by a quick look at the records one stride apart."""
+        head = self._head.size
+        stride = position - previous
         first = self.data[previous : previous + head]
         ahead = range(position, position + _WORTH * stride, stride)
-        return all(self.data[place : place + head] == first for place in ahead)
+        return all(self.data[start : start + head] == first for start in ahead)
 
     def _pattern(
         self, begin: int, end: int
     ) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
-        """Which bytes from one record to another are structure, and where states are numbered."""
+        """Return which bytes between two addresses are structure (255), not data, and where states are numbered."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
         block = self.data[begin:end]
-        head, position = self._head.size, begin
+        head = self._head.size
+        position = begin
         while position < end:
             at = position - begin
             length, command = self._head.unpack_from(block, at)
-            kept = head
+            structure = head
             if command == DIRECTORY:
-                kept = length
+                structure = length
             elif command == VARIABLE and length > head + self._type.size:
-                kept = head + self._type.size + 1 + block[at + head + self._type.size]
-            fixed[at : at + min(kept, length)] = 0xFF
+                name_length = block[at + head + self._type.size]
+                structure = head + self._type.size + 1 + name_length
+            fixed[at : at + min(structure, length)] = 0xFF
             if command == DIRECTORY:
                 state = _STATE.search(block[at + head : at + length])
                 if state:
@@ -364,11 +374,11 @@ class Lsda:
 def _header(
     data: Content, source: str
 ) -> tuple[int, str, struct.Struct, struct.Struct]:
-    """Where the records begin, the byte order, how a record begins and how a type is written."""
+    """Return the byte at which records begin, the byte order, the form of a record head and the form of a type."""
     header = data[:8]
     if not recognises(header):
-        found = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"
-        raise FormatError(f"{found}; name another file")
+        problem = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"
+        raise FormatError(f"{problem}; name another file")
     begin, length, _, command, type_id, little = header[:6]
     order = "<" if little else ">"
     head = struct.Struct(order + _FIELDS[length] + _FIELDS[command])
@@ -376,7 +386,7 @@ def _header(
 
 
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is an LSDA container; never raises.
+    """Return True if a file with these first bytes is an LSDA container; never raises.
 
     Examples
     --------
@@ -393,7 +403,7 @@ def recognises(head: bytes) -> bool:
 
 
 def _resolved(path: tuple[str, ...], change: str) -> tuple[str, ...]:
-    """Directory that a change of directory leads to.
+    """Return the directory to which a change of directory leads.
 
     Examples
     --------

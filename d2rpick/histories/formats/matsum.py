@@ -1,9 +1,8 @@
 """LS-DYNA matsum: one block per state, with three or four lines for each part.
 
-A part begins with its ``mat.#=`` line and reaches to the next.  Numbers have 13 columns behind their name and
-an equals sign; which names there are depends on the version.  Titles are in a legend at the top, by number.
-Parts may be in some states only: such a part is named in a note and refused when it is asked for, because
-its column would have holes.
+The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; which names
+there are depends on the version. A legend at the top lists the titles by part number. A part may be in some states
+only: a note names it, and it is refused if it is requested, since its column would have holes.
 """
 
 from __future__ import annotations
@@ -39,13 +38,18 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-_AXES: Final = ("x_momentum", "y_momentum", "z_momentum")  # side by side in the file
+# next to each other in the file
+_AXES: Final = (
+    "x_momentum",
+    "y_momentum",
+    "z_momentum",
+)
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
-_MAT: Final = "mat.#"  # the line a part begins with
-_LUMPED: Final = 0  # "mat.#=    0" holds the kinetic energy of lumped masses
-_UNREADABLE: Final = -1  # in place of a part number that is damaged or has overflowed
+_MAT: Final = "mat.#"  # begins the lines of a part
+_LUMPED: Final = 0  # "mat.#=    0" has the kinetic energy of lumped masses
+_UNREADABLE: Final = -1  # replaces a part number that is damaged or has overflowed
 _WIDEST: Final = 99_999_999  # larger part numbers overflow their eight columns
 
 _LEGEND: Final = re.compile(
@@ -54,13 +58,13 @@ _LEGEND: Final = re.compile(
 _ENTRY: Final = re.compile(
     rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE
 )
-_LONGEST: Final = 1 << 24  # no legend has more bytes
+_LONGEST: Final = 1 << 24  # bytes; a legend is shorter
 _LINE: Final = re.compile(
     rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$",
     re.MULTILINE,
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
-# A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
+# A part number has 5 or, from 100000 on, 8 columns; a longer one shifts the rest of the line.
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
@@ -84,7 +88,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
 class Matsum(Blocks):
     """One matsum file; a ``Database`` without channels of the whole model.
 
-    FormatError if it has neither a head nor a state, or a time that is no number.
+    Raises FormatError if it has neither a head nor a state, or if a time is not a number.
     """
 
     format, digits = "matsum", 5
@@ -94,10 +98,8 @@ class Matsum(Blocks):
 
     def __init__(self, data: bytes | Content, source: str) -> None:
         self._legend = _legend(data)
-        describe, whole = (
-            partial(_describe, self._legend),
-            partial(_is_whole, self._legend),
-        )
+        describe = partial(_describe, self._legend)
+        whole = partial(_is_whole, self._legend)
         grammar = Grammar(
             _START,
             _LINE,
@@ -112,9 +114,8 @@ class Matsum(Blocks):
         super().__init__(data, source, grammar)
         self.refuse_foreign()
         self.part_time = self.numbers([_TIME])[:, 0]
-        self._together: dict[
-            tuple[str | int, ...], Samples
-        ] = {}  # read with what was asked for
+        # Columns that were read together with requested ones.
+        self._together: dict[tuple[str | int, ...], Samples] = {}
         present = self._present()
         self.parts = tuple(
             Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED
@@ -122,7 +123,7 @@ class Matsum(Blocks):
         self.notes += self._remarks(present)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Values of one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
+        """Return one of ``QUANTITIES`` of the parts ``ids``, shape (n, len(ids)).
 
         Raises
         ------
@@ -133,28 +134,29 @@ class Matsum(Blocks):
             raise FormatError(
                 f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(QUANTITIES)}"
             )
-        known = {part.id for part in self.parts}
-        missing = [id_ for id_ in ids if id_ not in known]
+        part_ids = {part.id for part in self.parts}
+        missing = [id_ for id_ in ids if id_ not in part_ids]
         if missing:
-            found = f"{self.source}: no part {', '.join(map(str, missing))}"
+            problem = f"{self.source}: no part {', '.join(map(str, missing))}"
             raise FormatError(
-                f"{found}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
+                f"{problem}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
             )
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._together:
-            together = (
-                _AXES if quantity in _AXES else (quantity,)
-            )  # who asks for one component asks for the others
-            names = [(id_, QUANTITIES[one]) for id_ in ids for one in together]
+            # a request for one component is followed by requests for the others
+            together = _AXES if quantity in _AXES else (quantity,)
+            names = [
+                (id_, QUANTITIES[component]) for id_ in ids for component in together
+            ]
             values = self.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
             self._together = {
-                (one, *ids): values[:, place :: len(together)]
-                for place, one in enumerate(together)
+                (component, *ids): values[:, column :: len(together)]
+                for column, component in enumerate(together)
             }
         return self._together.pop(wanted)
 
     def _present(self) -> Counter[int]:
-        """In how many states each part is, in the order in which the parts appear."""
+        """Count the states that have each part, in the order in which the parts appear."""
         states = Counter[int]()
         for run in self:
             names = self.layout(run.example, run.stride).fields
@@ -167,6 +169,7 @@ class Matsum(Blocks):
         return states
 
     def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
+        """Return notes on parts that are not in all states, or whose number cannot be read."""
         unseen = [id_ for id_ in self._legend if id_ not in present]
         passing = [
             id_ for id_, states in present.items() if id_ > 0 and states < self.states
@@ -186,7 +189,7 @@ class Matsum(Blocks):
 
 
 def _legend(data: bytes | Content) -> dict[int, str]:
-    """Titles of the parts by number, in the order of the legend."""
+    """Return the titles of the parts by number, in the order of the legend."""
     first_state = data.find(b"\n" + _START)
     match = _LEGEND.search(
         data[: min(first_state, _LONGEST) if first_state >= 0 else _LONGEST]
@@ -196,7 +199,7 @@ def _legend(data: bytes | Content) -> dict[int, str]:
 
 
 class PartColumns(NamedTuple):
-    """Histories of one part to be written, all of the same shape (n,)."""
+    """Histories of one part that are written, all of the same shape (n,)."""
 
     title: str
     internal_energy: Samples
@@ -206,7 +209,7 @@ class PartColumns(NamedTuple):
 
 
 def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
-    """Blocks of the parts, numbered from 1, with five significant digits (13 columns, E13.4); ``time`` is (n,)."""
+    """Return a matsum of parts, numbered from 1, with five significant digits (13 columns, E13.4); ``time`` is (n,)."""
     legend = "".join(
         f"{number:9d}     {part.title:<70}\n"
         for number, part in enumerate(parts, start=1)
@@ -229,6 +232,7 @@ def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
 def _written(
     number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float
 ) -> str:
+    """Return the lines of a part in one state."""
     return (
         f" mat.#={number:5d}             inten={internal:13.4E}     kinen={kinetic:13.4E}"
         f"     eroded_ie={0:13.4E}     eroded_ke={0:13.4E}\n"
@@ -239,7 +243,7 @@ def _written(
 
 
 def _is_whole(legend: Mapping[int, str], layout: BlockLayout) -> bool:
-    """Judge a state that stands alone: only the legend can tell."""
+    """Return True if the only state of a file has all parts of the legend; without a legend this cannot be known."""
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
@@ -249,6 +253,7 @@ def _describe(
     lines: Sequence[re.Match[bytes]],
     literal: Bytes,
 ) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
+    """Return the offsets of the numbers of a block by part and name, and the last name; UNSURE if a number is cut."""
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
     doubled = False
@@ -257,11 +262,10 @@ def _describe(
         if line[1] is not None:
             part = _part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
-            if doubled:  # two groups of lines: neither is sure
+            if doubled:  # two groups of lines of one part: neither is sure
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            fields[part, _MAT] = (
-                UNSURE if doubled else line.start() - 1
-            )  # with the line end before it
+            # with the line end before it
+            fields[part, _MAT] = UNSURE if doubled else line.start() - 1
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())
             if field[2] is None or doubled or name in fields:
@@ -273,10 +277,9 @@ def _describe(
 
 
 def _part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
-    """Find the number of the part whose line goes on with ``text``.
+    """Return the number of the part whose first line continues with ``text``.
 
-    A single overflowed number is the single one of the legend that is too wide; of several, it could
-    not be told which is which.
+    A single overflowed number is the only number of the legend that is too wide; several could not be told apart.
     """
     if match := _ID.match(text):
         return int(match[1])

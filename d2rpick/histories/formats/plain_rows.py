@@ -1,4 +1,4 @@
-"""Rows of numbers that are all alike, read at once: every number is the one that `float` reads, with any pandas."""
+"""Rows of numbers that are all alike, read at once: with any pandas, each number is exactly what `float` reads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _UNIT_SEPARATOR: Final = "\x1f"  # no table has this control character
-# How far a reader that rounds may be off, of the number: the fast one of pandas takes 17 digits, with leading zeros.
+# How far a number of the fast pandas reader may be off, relative to it: that reader uses 17 digits, leading zeros too.
 _ROUNDED: Final = 1e-9
 
 
@@ -22,8 +22,8 @@ def plain_rows(
 ) -> Samples | None:
     """Read the columns ``used`` of whole lines, shape (rows, len(used)).
 
-    ``is_large`` is whether they are part of a large text, for which the import of a fast reader pays.  None unless all
-    rows have all cells and no other line is between them.
+    Return None unless each line is a row with all its cells. ``is_large`` states that the piece belongs to a large
+    text, for which importing pandas pays.
     """
     if layout.thousands:
         return None
@@ -31,39 +31,40 @@ def plain_rows(
         unquoted = _without_quotes(piece, layout)
         if unquoted is None:
             return None
-        piece, layout = unquoted, layout._replace(separator=_UNIT_SEPARATOR)
+        piece = unquoted
+        layout = layout._replace(separator=_UNIT_SEPARATOR)
     if layout.decimal == ",":
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    taken, chosen = [*range(layout.columns)], None
-    closed = piece[: piece.index(b"\n")].endswith(
-        (layout.separator or "\n").encode("latin-1")
-    )
-    if layout.separator and (closed or sorted(used) != taken):
-        # otherwise the parser sees to it that each row has its cells
+    read_columns = [*range(layout.columns)]
+    chosen = None
+    separator_bytes = (layout.separator or "\n").encode("latin-1")
+    closed = piece[: piece.index(b"\n")].endswith(separator_bytes)
+    if layout.separator and (closed or sorted(used) != read_columns):
+        # otherwise the parser makes sure that each row has its cells
         if not _has_all_cells(piece, layout):
             return None
-        taken = sorted({0, *used})  # a comment would show in the first column
-        chosen = taken if closed or len(taken) < layout.columns else None
+        # a comment would show in the first column, so it is read too
+        read_columns = sorted({0, *used})
+        if closed or len(read_columns) < layout.columns:
+            chosen = read_columns
+    read_table = _by_pandas if is_large else _by_numpy
     try:
-        table = (
-            _by_pandas(piece, layout, chosen)
-            if is_large
-            else _by_numpy(piece, layout, chosen)
-        )
+        table = read_table(piece, layout, chosen)
     except ValueError:
         return None
-    lines = np.count_nonzero(
-        np.frombuffer(piece, np.uint8) == ord("\n")
-    )  # count() is slow where they are short
-    if table.shape != (lines, len(taken)):
-        return None  # blank lines were passed over
-    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+    # bytes.count() is slow if the lines are short
+    lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
+    if table.shape != (lines, len(read_columns)):
+        return None  # the reader skipped blank lines
+    if read_columns == [*used]:
+        return table
+    return table[:, np.searchsorted(read_columns, used)]
 
 
 def _without_quotes(piece: bytes, layout: Layout) -> bytes | None:
-    """Put a sign that no text has between the cells of rows that are all in quotes; None if there are others."""
+    """Replace the separators of rows with all cells in quotes by a control character; return None for other rows."""
     if layout.separator is None:
         return None
     between = f'"{layout.separator}"'.encode("latin-1")
@@ -77,19 +78,18 @@ def _without_quotes(piece: bytes, layout: Layout) -> bytes | None:
 
 
 def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
-    """Columns of rows of numbers, all unless some are chosen; ValueError where there is something else."""
-    lines = piece.decode("latin-1").split("\n")[
-        :-1
-    ]  # no character beside those of latin-1 belongs to a number
+    """Read rows of numbers with numpy, all columns unless some are chosen; raise ValueError for anything else."""
+    # no character outside latin-1 belongs to a number
+    lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
-        raise ValueError  # numpy passes over it, and warns where there is no other
+        raise ValueError  # numpy skips blank lines, and warns if there are no others
     return np.loadtxt(
         lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns
     )
 
 
 def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
-    """The same, five times as fast."""
+    """Read rows of numbers with pandas, which is five times as fast as numpy."""
     from csv import QUOTE_NONE
     from io import BytesIO
 
@@ -103,10 +103,8 @@ def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> S
         "quoting": QUOTE_NONE,
     }
     options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
-    if [*map(int, pd.__version__.split(".")[:2])] < [
-        3,
-        1,
-    ]:  # from there on always exact, as `float` is
+    # From pandas 3.1 on the default is exact, as `float` is.
+    if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:
         if columns is None and layout.separator:
             fast = pd.read_csv(
                 BytesIO(piece), sep=separator, float_precision="high", **options
@@ -120,10 +118,10 @@ def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> S
 
 
 def exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
-    """Read rows of numbers exactly, by scipy; None if it cannot or reads something else than a reader that rounds.
+    """Read rows of numbers exactly with scipy; return None if scipy fails or disagrees with the numbers ``fast``.
 
-    Scipy takes them as a matrix with one number a line, and passes over what is behind a number in its line: so it is
-    not trusted alone.  ``fast``, shape (rows, columns), are the numbers to some nine digits.
+    Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
+    result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
     """
     from io import BytesIO
 
@@ -136,25 +134,26 @@ def exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # what is not finite does not agree
+    with np.errstate(invalid="ignore"):  # a number that is not finite does not agree
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 
 
 def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Whether all rows have their number of cells, and end alike."""
+    """Return True if all rows have their number of cells and either all or none end with a separator."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     ends = signs == ord("\n")
     closed = piece.startswith(
         layout.separator.encode("latin-1"), piece.index(b"\n") - 1
-    )  # rows end with a separator
-    each, rows = layout.columns + closed, np.count_nonzero(ends)
+    )
+    marks_per_row = layout.columns + closed
+    rows = np.count_nonzero(ends)
     marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
-    if marks.size != rows * each:
+    if marks.size != rows * marks_per_row:
         return False
-    table = marks.reshape(rows, each)
-    return bool(
-        np.all(ends[table[:, -1]])
-        and (not closed or np.all(np.diff(table[:, -2:]) == 1))
+    table = marks.reshape(rows, marks_per_row)
+    rows_end_in_time = bool(np.all(ends[table[:, -1]]))
+    return rows_end_in_time and (
+        not closed or bool(np.all(np.diff(table[:, -2:]) == 1))
     )

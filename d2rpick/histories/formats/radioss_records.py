@@ -1,10 +1,9 @@
-"""The records of Radioss time histories, in their two containers: binary, and the text of ``/TFILE/3``.
+"""The records of Radioss time histories in both containers: binary, and the text of ``/TFILE/3``.
 
-A binary record is its length, its bytes and its length again, all big-endian.  A record of text is a line that begins
-with ``ZZZZZEOR`` and says of how many integers (I), characters (C) and reals (R) it consists, and lines of
-fixed columns: ten of an integer, 16 to a line; 16 of a real, five to a line.  Records of the head are given in their
-binary form here, whichever they have in the file; records of states are only described, since their numbers are read
-column by column.
+A binary record is its length, its bytes and its length again, all big-endian. A record of text begins with a line
+``ZZZZZEOR`` that gives its numbers of integers (I), characters (C) and reals (R); lines of fixed columns follow: ten
+columns for an integer, 16 to a line; 16 for a real, five to a line. Records of the head are returned in binary form
+for both containers. Records of states are only described, since their numbers are read column by column.
 """
 
 from __future__ import annotations
@@ -24,10 +23,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-WIDTH: Final = (
-    4  # bytes of a binary number, and of the length before and behind a record
-)
-RUN: Final = 84  # bytes of the first record: a code and a title of 80
+# bytes of a binary number, and of the length before and after a record
+WIDTH: Final = 4
+RUN: Final = 84  # bytes of the first record: a code and a title of 80 bytes
 
 _MARK: Final = b"ZZZZZEOR"
 _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n")
@@ -35,19 +33,17 @@ _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
 _LONG, _SHORT = 10, 5  # columns of integers
-_STARS: Final = b"*" * _SHORT  # what Fortran shows of a number that is too long
-_ROOM: Final = 1024  # more than a record of the head has but for integers [byte]
-_RUN_TITLE: Final = (
-    72  # characters of the title of the run, of the 80 of the binary form
-)
-_REAL: Final = 16  # columns of a real, and its point is the fourth
+_STARS: Final = b"*" * _SHORT  # printed by Fortran for a number that is too long
+_ROOM: Final = 1024  # bytes; a record of the head is shorter, apart from its integers
+_RUN_TITLE: Final = 72  # characters of the title of the run in text (80 in binary)
+_REAL: Final = 16  # columns of a real, whose point is in the fourth
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
-_JUDGED: Final = 100  # times that tell the precision
+_JUDGED: Final = 100  # last times by which the precision is judged
 
 
 def is_binary(head: bytes) -> bool:
-    """Whether a file that begins like this is a binary time history."""
+    """Return True if a file with these first bytes is a binary time history."""
     return (
         len(head) >= 8
         and INT.unpack_from(head)[0] == RUN
@@ -56,12 +52,12 @@ def is_binary(head: bytes) -> bool:
 
 
 def is_text(head: bytes) -> bool:
-    """Whether a file that begins like this is a time history in any form of text."""
+    """Return True if a file with these first bytes is a time history in any form of text."""
     return any(_MARK in line for line in head.split(b"\n", 4)[:4])
 
 
 def records_of(data: Content, source: str) -> Records:
-    """Records of a file; FormatError where it is text of another form, as ``/TFILE/2`` writes it."""
+    """Return the records of a file; raise FormatError for text of another form, such as ``/TFILE/2``."""
     head = data[:_ROOM]
     begin = _BEGIN.match(head)
     if begin:
@@ -75,55 +71,53 @@ def records_of(data: Content, source: str) -> Records:
 
 
 class Records:
-    """How records lie in a binary file; ``at`` is where the next one of the head begins [byte]."""
+    """The layout of the records in a binary file; ``at`` is the byte of the next record of the head."""
 
-    width = WIDTH  # of a number in a state [bytes]
+    width = WIDTH  # bytes of a number in a state
 
     def __init__(self, data: Content, at: int = 0) -> None:
         self._data, self.at = data, at
 
     def take(self) -> bytes | None:
-        """Take the next record of the head; None where there is no complete one."""
+        """Return the next record of the head and move on; None if there is no complete record."""
         begin = self.at + WIDTH
-        found = (
-            INT.unpack(self._data[self.at : begin])[0]
-            if begin <= len(self._data)
-            else -1
-        )
-        end = begin + found
-        if (
-            found < 0
-            or end + WIDTH > len(self._data)
-            or INT.unpack(self._data[end : end + WIDTH])[0] != found
-        ):
+        if begin > len(self._data):
+            return None
+        (length,) = INT.unpack(self._data[self.at : begin])
+        end = begin + length
+        if length < 0 or end + WIDTH > len(self._data):
+            return None
+        if INT.unpack(self._data[end : end + WIDTH])[0] != length:
             return None
         self.at = end + WIDTH
         return self._data[begin:end]
 
     def size(self, count: int) -> int:
-        """Bytes of a record with so many reals."""
+        """Return the bytes of a record with ``count`` reals."""
         return (count + 2) * WIDTH
 
     def place(self, number: int) -> int:
-        """Where a real begins in its record, counted from 0 [byte]."""
+        """Return the offset of a real, counted from 0, in its record [byte]."""
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Bytes that every record with so many reals has at these places, all of one length."""
+        """Return offsets and bytes of the marks that every record with ``count`` reals has, all of one length."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
-        """Reals from their bytes (n, width), shape (n,); NaN for what is no number."""
-        with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
+        """Return the reals in their bytes (n, width), shape (n,); NaN for bytes that are not a number."""
+        with np.errstate(invalid="ignore"):  # a NaN is refused later, or not used
             return fields.view(">f4").ravel().astype(np.float64)
 
-    def digits(self, times: Samples) -> int:  # noqa: ARG002  as in text
-        """Significant decimal digits of the reals."""
+    def digits(self, times: Samples) -> int:  # noqa: ARG002
+        """Return the significant decimal digits of the reals."""
         return DIGITS[WIDTH]
 
 
 class _TextRecords(Records):
+    """The layout of the records in a text file of ``/TFILE/3``."""
+
     width = _REAL
 
     def __init__(self, data: Content, name: bytes, line_end: bytes) -> None:
@@ -137,36 +131,34 @@ class _TextRecords(Records):
             return None
         first, characters, last = (int(count or 0) for count in shape.group(1, 2, 3))
         begin = self.at + len(line) + len(self._line_end)
+        # the body ends at the next mark, since a title may contain line ends
         room = self._data[begin : begin + _ROOM + (_LONG + 1) * first]
-        body, mark, _ = room.partition(
-            self._line_end + _MARK
-        )  # a title may hold line ends
+        body, mark, _ = room.partition(self._line_end + _MARK)
         if not mark and not body.endswith(self._line_end):
             return None
         body = body.removesuffix(b"" if mark else self._line_end)
         self.at = begin + len(body) + len(self._line_end)
-        if shape[4] == b"R":  # factors of the units, which are not used
+        if shape[4] == b"R":  # conversion factors of the units, which are not used
             return bytes(WIDTH * last)
         return self._packed(body.removesuffix(self._name), first, characters, last)
 
     def _packed(
         self, body: bytes, first: int, characters: int, last: int
     ) -> bytes | None:
-        """Make one record what it is in binary; None where it does not hold what its shape says."""
+        """Return a record in binary form; None if it has not the content that its first line announces."""
         if not characters:
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
         width = _SHORT if is_run or len(body) == _SHORT else _LONG
-        begin, end = first * width, len(body) - last * _SHORT
+        begin = first * width
+        end = len(body) - last * _SHORT
         title = body[begin:end].ljust(RUN - WIDTH if is_run else characters)
         try:
-            return (
-                _binary(body[:begin], first, width)
-                + title
-                + _binary(body[end:], last, _SHORT)
-            )
+            integers_before = _binary(body[:begin], first, width)
+            integers_after = _binary(body[end:], last, _SHORT)
         except (ValueError, struct.error):
             return None
+        return integers_before + title + integers_after
 
     def size(self, count: int) -> int:
         lines = -(-count // _PER_LINE)
@@ -183,12 +175,9 @@ class _TextRecords(Records):
         return [(0, self._mark(count))]
 
     def _mark(self, count: int) -> bytes:
-        return (
-            _MARK
-            + (b"%5d" % count if count < 10**_SHORT else _STARS)
-            + b"R"
-            + self._line_end
-        )
+        """Return the first line of a record with ``count`` reals."""
+        number = b"%5d" % count if count < 10**_SHORT else _STARS
+        return _MARK + number + b"R" + self._line_end
 
     def values(self, fields: Bytes) -> Samples:
         values = decode(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
@@ -197,7 +186,7 @@ class _TextRecords(Records):
         return values
 
     def digits(self, times: Samples) -> int:
-        """Those of single precision where all times are printed like singles: the solver computed in it."""
+        """Return the digits of single precision if all times are singles: then the solver computed in it."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()
@@ -209,14 +198,14 @@ class _TextRecords(Records):
 
 
 def integers(record: bytes) -> tuple[int, ...]:
-    """Give the integers that a record in binary form consists of."""
+    """Return the integers of a record in binary form."""
     return tuple(
         number for (number,) in INT.iter_unpack(record[: len(record) // WIDTH * WIDTH])
     )
 
 
 def _binary(text: bytes, count: int, width: int) -> bytes:
-    """Pack integers of so many columns; a material or property that shows as stars is one, and not 0."""
+    """Pack ``count`` integers of ``width`` columns; stars (for a material or property) become 1, not 0."""
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))

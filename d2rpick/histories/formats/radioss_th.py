@@ -1,9 +1,9 @@
-"""Radioss and OpenRadioss time histories, T01, T02, ... (one per leg of a run), binary or text.
+"""Radioss and OpenRadioss time histories, T01, T02, ... (one for each leg of a run), binary or text.
 
-The head names the run, then says how many parts, materials, properties, subsets, groups and global variables there
-are and describes each; every state after it is a record with the time and one for the global variables, the parts, the
-subsets and each group, if there are any.  All states have the same lengths, so a column is a strided view of the file.
-How a record lies in the file is said in `radioss_records`.
+The head names the run, gives the numbers of parts, materials, properties, subsets, groups and global variables, and
+describes each of them. Each state is a record with the time, and one record each for the global variables, the parts,
+the subsets and every group that there is. All states have the same lengths, so a column is a strided view of the
+file. The layout of a record is in `radioss_records`.
 """
 
 from __future__ import annotations
@@ -38,9 +38,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
-_TITLES: Final = (40, 80, 100)  # bytes of the other titles, by age of the format
+# bytes of a title other than that of the run, by age of the format
+_TITLES: Final = (
+    40,
+    80,
+    100,
+)
 
-# Global variables by their number in the file: 12 up to 2024, 16 in 2025, 22 from 2026 on.
+# Global variables in the order of the file: the first 12 up to 2024, 16 in 2025, 22 from 2026 on.
 _GLOBALS: Final = (
     "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum", "mass", "time_step",
     "rotation_energy", "external_work", "spring_energy", "contact_energy", "hourglass_energy",
@@ -48,7 +53,7 @@ _GLOBALS: Final = (
     "added_mass", "percentage_added_mass", "inlet_mass", "outlet_mass", "inlet_energy", "outlet_energy",
 )  # fmt: skip
 
-# Variables of parts that matter here, by their number in the file.
+# Variables of parts that are used, by their code in the file.
 _PART_VARIABLES: Final = {
     1: "internal_energy", 2: "kinetic_energy", 3: "x_momentum", 4: "y_momentum", 5: "z_momentum", 6: "mass",
     7: "hourglass_energy", 9: "x_center", 10: "y_center", 11: "z_center", 21: "rotational_internal_energy",
@@ -56,15 +61,15 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-# Kinds of groups that have forces: interfaces and rigid walls, and their variables: normal and tangential impulses.
+# Kinds of groups with forces; codes of the normal and tangential impulses among their variables.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
 
 class _Group(NamedTuple):
-    """A group with a history: its kind, its members, the numbers of its variables.
+    """A group with a history: its kind, the number of its members, and the codes of its variables.
 
-    ``named`` are number and title of each member, of a group of forces alone.
+    ``named`` are number and title of each member; empty for a group without forces.
     """
 
     kind: int
@@ -74,26 +79,25 @@ class _Group(NamedTuple):
 
     @property
     def values(self) -> int:
-        """Values of a state."""
+        """Number of values in a state."""
         return self.members * len(self.variables)
 
 
 class _Head(NamedTuple):
-    """What the records before the first state say."""
+    """The content of the records before the first state."""
 
     title: str
     version: str
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
-    columns: dict[
-        tuple[int, str], int
-    ]  # number of a part's variable among those of all parts
+    # number of a part's variable among the variables of all parts
+    columns: dict[tuple[int, str], int]
     counts: tuple[int, ...]  # of numbers in the records of one state
-    groups: tuple[_Group, ...]  # whose records are the last ones
+    groups: tuple[_Group, ...]  # their records are the last ones of a state
 
 
 def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is a time history; never raises.
+    """Return True if a file with these first bytes is a time history; never raises.
 
     Examples
     --------
@@ -106,7 +110,8 @@ def recognises(head: bytes) -> bool:
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     """Open each file as a leg of the run.
 
-    A time history of its own output interval (T01a, by /ATFILE) has no global values: beside others it is no leg.
+    A time history with its own output interval (T01a, by /ATFILE) has no global values and is no leg next to other
+    files.
     """
     histories = [TimeHistory(source.data, source.name) for source in sources]
     legs = [history for history in histories if history.channels] or histories
@@ -120,7 +125,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
 
 
 class TimeHistory(Database):
-    """One time history file, read as a `Database`; parts and the whole model share their times.
+    """One time history file as a `Database`; parts and the whole model have the same times.
 
     Parameters
     ----------
@@ -132,7 +137,7 @@ class TimeHistory(Database):
     Raises
     ------
     FormatError
-        If the head is not whole, a record is not as long as the head says, or it is coded text.
+        If the head is not whole, a record has not the length in the head, or the text is coded.
     """
 
     format = "radioss-th"
@@ -143,10 +148,11 @@ class TimeHistory(Database):
         self._records = records_of(self._data, source)
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
-        known = {id_ for id_, _ in head.columns}
+        # only parts of a card /TH/PART have variables
+        parts_with_variables = {id_ for id_, _ in head.columns}
         self.parts = tuple(
-            part for part in head.parts if part.id in known
-        )  # those of a card /TH/PART
+            part for part in head.parts if part.id in parts_with_variables
+        )
         *self._begins, self._stride = accumulate(
             map(self._records.size, self._head.counts), initial=0
         )
@@ -165,7 +171,7 @@ class TimeHistory(Database):
         return self._columns(0, [0])[:, 0]
 
     def channel(self, name: str) -> Samples:
-        """One global variable, shape (n,)."""
+        """Return a global variable, shape (n,)."""
         if name not in self.channels:
             raise FormatError(
                 f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}"
@@ -178,109 +184,107 @@ class TimeHistory(Database):
         groups = [group for group in self._head.groups if group.values]
         first = len(self._begins) - len(groups)
         return tuple(
-            self._force_of(record, group, place)
+            self._force_of(record, group, member)
             for record, group in enumerate(groups, start=first)
             if group.kind in _TOUCHING and {*_IMPULSES[0]} <= {*group.variables}
-            for place in range(group.members)
+            for member in range(group.members)
         )
 
-    def _force_of(self, record: int, group: _Group, place: int) -> ContactForce:
-        number, title = group.named[place]
-        axes = [axes for axes in _IMPULSES if {*axes} <= {*group.variables}]
-        places = [
-            place * len(group.variables) + group.variables.index(axis)
-            for triple in axes
-            for axis in triple
-        ]
-        impulses = (
-            self._columns(record, places)
-            .reshape(self._states, len(axes), 3)
-            .sum(axis=1)
-        )
+    def _force_of(self, record: int, group: _Group, member: int) -> ContactForce:
+        """Return the force of one interface or rigid wall of a group, from its normal and tangential impulses."""
+        number, title = group.named[member]
+        triples = [codes for codes in _IMPULSES if {*codes} <= {*group.variables}]
+        first = member * len(group.variables)
+        columns = []
+        for codes in triples:
+            columns += [first + group.variables.index(code) for code in codes]
+        values = self._columns(record, columns)
+        impulses = values.reshape(self._states, len(triples), 3).sum(axis=1)
         name = f"{_TOUCHING[group.kind]} {number}{f' {title!r}' if title else ''}"
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def size_until(self, time: float) -> int:
-        """Bytes of the head and of the states up to a time [time]."""
+        """Return the bytes of the head and of the states up to a time [time]."""
         return self._records.at + self._stride * int(
             np.searchsorted(self.time, time, side="right")
         )
 
     @cached_property
     def part_time(self) -> Samples:
-        """Return the times of all states, shape (n,) [time]."""
+        """Times of all states, shape (n,) [time]."""
         return self.time
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One variable of some parts, shape (n, len(ids)).
+        """Return a variable of some parts, shape (n, len(ids)).
 
         Raises
         ------
         FormatError
-            If a part is not in the file, or without this variable.
+            If a part is not in the file, or has not this variable.
         """
         record = 1 + bool(self.channels)
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:
-        place = self._head.columns.get((id_, quantity))
-        if place is None:
-            known = [name for part, name in self._head.columns if part == id_]
+        """Return the number of a part's variable in the record of the parts; raise FormatError if there is none."""
+        column = self._head.columns.get((id_, quantity))
+        if column is None:
+            quantities = [name for part, name in self._head.columns if part == id_]
             parts = listing([part.id for part in self.parts]) or "none"
-            there = (
-                f"only {listing(known)}" if known else f"parts with variables: {parts}"
-            )
+            choice = f"parts with variables: {parts}"
+            if quantities:
+                choice = f"only {listing(quantities)}"
             raise FormatError(
-                f"{self.source}: no {quantity} of part {id_}, {there}; ask for it with /TH/PART"
+                f"{self.source}: no {quantity} of part {id_}, {choice}; ask for it with /TH/PART"
             )
-        return place
+        return column
 
-    def _columns(self, record: int, places: Sequence[int]) -> Samples:
-        """Some numbers of one record of each state, shape (n, places)."""
+    def _columns(self, record: int, columns: Sequence[int]) -> Samples:
+        """Return some numbers of one record of each state, shape (n, columns)."""
         offsets = [
-            self._begins[record] + self._records.place(place) for place in places
+            self._begins[record] + self._records.place(column) for column in columns
         ]
         addresses = self._addresses(self._states, offsets)
-        found = self._data.fields(addresses, self._records.width)
+        fields = self._data.fields(addresses, self._records.width)
         self._data.check()
-        return self._records.values(found).reshape(self._states, len(places))
+        return self._records.values(fields).reshape(self._states, len(columns))
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
-        """Where some bytes of each of the first states lie, shape (states * offsets,)."""
+        """Return the addresses of some offsets in each of the first states, shape (states * offsets,)."""
         return np.add.outer(
             self._records.at + self._stride * np.arange(states),
             np.array(offsets, np.int64),
         ).ravel()
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
-        """Count the states; the file may stop inside one, but nothing else may stand between them.
+        """Count the whole states; the file may end within a state, but nothing else may be between states.
 
-        Records carry no name or number: where one is lost or put in, no state of the file is above suspicion.
+        Records have neither name nor number: if one is lost or inserted, no state of the file can be trusted.
         """
-        states, rest = divmod(len(self._data) - self._records.at, self._stride)
-        marks = [
-            (begin, begin + place, count, mark)
-            for begin, count in zip(self._begins, self._head.counts, strict=True)
-            for place, mark in self._records.marks(count)
-        ]
+        states, bytes_left = divmod(len(self._data) - self._records.at, self._stride)
+        marks = []
+        for begin, count in zip(self._begins, self._head.counts, strict=True):
+            for offset, mark in self._records.marks(count):
+                marks.append((begin, begin + offset, count, mark))
         width = len(marks[0][-1])
         expected = np.frombuffer(b"".join(mark for *_, mark in marks), f"V{width}")
-        places = self._addresses(states + 1, [place for _, place, *_ in marks])
-        places = places[places + width <= len(self._data)]
-        found = self._data.fields(places, width).view(expected.dtype).ravel()
+        addresses = self._addresses(states + 1, [offset for _, offset, *_ in marks])
+        addresses = addresses[addresses + width <= len(self._data)]
+        actual = self._data.fields(addresses, width).view(expected.dtype).ravel()
         self._data.check()
-        bad = np.flatnonzero(found != np.resize(expected, found.size))
+        bad = np.flatnonzero(actual != np.resize(expected, actual.size))
         if bad.size:
-            state, mark = divmod(int(bad[0]), len(marks))
-            begin, _, count, _ = marks[mark]
+            state, index = divmod(int(bad[0]), len(marks))
+            begin, _, count, _ = marks[index]
             start = self._records.at + state * self._stride
             where = f"{self.source}: state {state + 1}: a record of {count} numbers was expected"
             cure = f"if the states before are good, cut the file to {start} bytes"
             raise FormatError(f"{where} at byte {start + begin}; {cure}")
         stop = f"{self.source}: the file ends within state {states + 1}, which was left out"
-        return states, (stop,) if rest else ()
+        return states, (stop,) if bytes_left else ()
 
     def _silent_parts(self) -> tuple[str, ...]:
+        """Return a note on parts without variables."""
         silent = [part.id for part in self._head.parts if part not in self.parts]
         if not silent:
             return ()
@@ -289,24 +293,22 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """The records of the head, taken one after the other."""
+    """The reader of the head, which takes its records one after the other."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        self._title = (
-            0  # bytes of a title, the same in all records; 0 until the first was seen
-        )
+        # bytes of a title, the same in all records; 0 until the first one was read
+        self._title = 0
 
     def head(self) -> _Head:
-        """Read everything up to the first state."""
+        """Read the records up to the first state."""
         run = self._next(RUN)
         version = plain_text(self._next(80))
         hierarchy = self._next()
-        if (
-            len(hierarchy) == WIDTH
-        ):  # newer codes put records between, as many as this one says
+        # newer releases write a record with the number of additional records
+        if len(hierarchy) == WIDTH:
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
             hierarchy = self._next()
@@ -345,7 +347,7 @@ class _HeadRecords:
     def _parts(
         self, count: int
     ) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
-        """Parts: id, title, subset, material, property and number of variables; then the variables."""
+        """Read the parts: id, title, subset, material, property and number of variables; then the variables."""
         described: dict[int, Part] = {}
         columns: dict[tuple[int, str], int] = {}
         values = 0
@@ -354,24 +356,22 @@ class _HeadRecords:
             id_ = INT.unpack_from(record)[0]
             material, properties, variables = integers(record[-3 * WIDTH :])
             codes = self._integers(self._count(variables))
-            # A group of elements with a history is listed like a part, but without material and property.
+            # An element group with a history is listed like a part, but without material and property.
             if material or properties:
-                known_codes = [
-                    code for code in codes if code
-                ]  # a solver may write 0 for every variable
-                if id_ in described or len(set(known_codes)) < len(known_codes):
+                # a solver may write 0 for every variable
+                nonzero_codes = [code for code in codes if code]
+                is_repeated = len(set(nonzero_codes)) < len(nonzero_codes)
+                if id_ in described or is_repeated:
                     raise self._broken("a part, and a variable of it, only once")
                 described[id_] = Part(id_, plain_text(record[WIDTH : -4 * WIDTH]))
-                known = (
-                    (_PART_VARIABLES.get(code), place)
-                    for place, code in enumerate(codes, start=values)
-                )
-                columns.update({(id_, name): place for name, place in known if name})
+                for column, code in enumerate(codes, start=values):
+                    if code in _PART_VARIABLES:
+                        columns[id_, _PART_VARIABLES[code]] = column
             values += variables
         return tuple(described.values()), columns, values
 
     def _subset(self) -> int:
-        """Pass over a subset and its lists of children, parts and variables; the number of variables."""
+        """Skip a subset and its lists of children, parts and variables; return its number of variables."""
         children, parts, variables = (
             self._count(n) for n in integers(self._titled(5)[2 * WIDTH : 5 * WIDTH])
         )
@@ -383,20 +383,20 @@ class _HeadRecords:
         """Read a group, its elements and its list of variables."""
         record = self._titled(5)
         kind, elements, variables = (
-            INT.unpack_from(record, WIDTH * place)[0] for place in (1, 3, 4)
+            INT.unpack_from(record, WIDTH * word)[0] for word in (1, 3, 4)
         )
         for number in (elements, variables):
             self._count(number)
         members = [self._titled(1) for _ in range(elements)]
         forces = members if kind in _TOUCHING else []
-        named = tuple(
+        names = tuple(
             (INT.unpack_from(member)[0], plain_text(member[WIDTH:]))
             for member in forces
         )
-        return _Group(kind, elements, named, self._integers(variables))
+        return _Group(kind, elements, names, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:
-        """Read a record of a title and so many integers."""
+        """Read a record of a title and this number of integers."""
         record = self._next(WIDTH * numbers + self._title if self._title else None)
         self._title = len(record) - WIDTH * numbers
         if self._title not in _TITLES:
@@ -404,17 +404,17 @@ class _HeadRecords:
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read a record of so many integers; there is none for 0."""
+        """Read a record of ``count`` integers; there is no record for 0."""
         return integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
-        """Check a count from the file against what the file could hold."""
+        """Return a count from the file; raise FormatError if the file is too short for it."""
         if not 0 <= number <= self._most:
             raise self._broken("a count")
         return number
 
     def _next(self, length: int | None = None) -> bytes:
-        """Take one record, of a known length if it is given."""
+        """Read the next record; raise FormatError if it is not whole, or has not this length."""
         record = self._records.take()
         if record is None:
             raise self._broken("a complete record")
@@ -423,5 +423,7 @@ class _HeadRecords:
         return record
 
     def _broken(self, expected: str) -> FormatError:
-        found = f"{self._source}: {expected} was expected in the head of the time history near byte {self._records.at}"
-        return FormatError(f"{found}; the file is cut or damaged, copy it again")
+        """Return the error for a head that lacks what was expected."""
+        at = self._records.at
+        problem = f"{self._source}: {expected} was expected in the head of the time history near byte {at}"
+        return FormatError(f"{problem}; the file is cut or damaged, copy it again")

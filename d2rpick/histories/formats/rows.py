@@ -1,4 +1,4 @@
-"""The numbers in the rows of a table: all at once where they are alike, line by line where they are not."""
+"""The numbers in the rows of a table: read together if all rows of a piece are alike, otherwise line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table, in the order they were asked for, and notes on what stands below it."""
+    """Columns (rows,) of a table in the requested order, and notes on lines below the table that were left out."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -31,10 +31,10 @@ class ReadColumns(NamedTuple):
 def read_columns(
     text: Text, begin: int, layout: Layout, used: Sequence[int]
 ) -> ReadColumns:
-    """Read the columns ``used`` of the rows from byte ``begin`` on, that of the times first.
+    """Read the columns ``used`` of the rows from byte ``begin`` on; the first of them is the time.
 
-    Between the rows may be comments and blank lines, behind them words, such as a total, and the same table again.
-    Where all cells are empty the curve has ended: another one beside it goes on.
+    Between the rows there may be comments and blank lines; below them words (such as a total) and the same table
+    again. A row whose used cells are all empty ends the curve, while a longer curve next to it may go on.
 
     Raises
     ------
@@ -47,26 +47,30 @@ def read_columns(
     ]
     return ReadColumns(
         [
-            np.concatenate([table[:, place] for table in tables])
-            for place in range(len(used))
+            np.concatenate([table[:, column] for table in tables])
+            for column in range(len(used))
         ],
         curve.notes,
     )
 
 
-def find_line(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
-    """Return the number of the line in which a state stands, counted from 0."""
-    for numbers, _ in _read_tables(text, begin, _Curve(text.name, layout, [time])):
+def find_line(
+    text: Text, begin: int, layout: Layout, time_column: int, state: int
+) -> int:
+    """Return the number of the line that contains a state; states and lines are counted from 0 and 1."""
+    for numbers, _ in _read_tables(
+        text, begin, _Curve(text.name, layout, [time_column])
+    ):
         if state < len(numbers):
             return numbers[state]
         state -= len(numbers)
-    raise AssertionError("there is such a state")
+    raise AssertionError("the table has this state")
 
 
 def _read_tables(
     text: Text, begin: int, curve: _Curve
 ) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
+    """Yield line numbers and values (rows, used) of each piece; read line by line only if its rows are not alike."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
@@ -89,7 +93,7 @@ def _read_tables(
 
 
 class _Below(NamedTuple):
-    """The first line below a table that is no row: its number, and what is wrong with it between rows."""
+    """The first line below the table that is not a row: its number and text, and its error if rows follow it."""
 
     line: int
     text: str
@@ -97,33 +101,32 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """What of a table was seen so far, where it is taken line by line."""
+    """The state of reading a table: the last time, gaps, and what was found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
         self._name = name
         self._before: float | None = None  # time of the last state
         self._gap = self._ended = False
-        self._read: list[Samples] = []  # states of the pieces before
+        self._read: list[Samples] = []  # states of the earlier pieces
         self._current: list[list[float]] = []  # states of this piece so far
         self._below: _Below | None = None
-        self._repeated = 0  # states of the table that stand once more below it
-        self._repeated_from = 0  # the line in which the first of them stands
+        self._repeated = 0  # states of the table that are repeated below it
+        self._repeated_from = 0  # line of the first repeated state
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out below the table."""
+        """Notes on what was left out below the table."""
         if self._below is None:
             return ()
-        found = f"line {self._below.line} ({shorten(self._below.text)}) and what follows are below the table"
+        omitted = f"line {self._below.line} ({shorten(self._below.text)}) and the lines after it are below the table"
         if self._repeated:
-            return (
-                f"{found}, with the same table again from line {self._repeated_from} on; they were left out",
-            )
-        return (f"{found} and were left out",)
+            repeated = f"the same table is repeated from line {self._repeated_from} on"
+            return (f"{omitted}; {repeated}; they were left out",)
+        return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Remember states (rows, used) that were read together."""
+        """Remember states (rows, used) of a piece that was read at once."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
@@ -134,14 +137,14 @@ class _Curve:
             self._current.clear()
 
     def stops_before(self, time: float) -> bool:
-        """Whether a state of this time is one of another curve, or stands below the table."""
+        """Return True if a state at this time belongs to another curve, or is below the table."""
         starts_again = self._gap and self._before is not None and time <= self._before
         return self._ended or starts_again or self._below is not None
 
     def states(
         self, rows: Sequence[str], first: int
     ) -> Iterator[tuple[int, list[float]]]:
-        """Give line and values of each state in rows of which ``first`` is the number of the first."""
+        """Yield line number and values of each state in ``rows``, the first of which has the line number ``first``."""
         for number, row in enumerate(rows, first):
             if is_skipped(row):
                 self._gap = True
@@ -164,7 +167,7 @@ class _Curve:
                 yield number, state
 
     def _read_state(self, number: int, row: str) -> list[float] | None:
-        """Return the values of a row; None if all its cells are empty behind other rows."""
+        """Return the values of the used columns of a row; None if all of them are empty after the first state."""
         where = f"{self._name}:{number}"
         cells = _cells(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
@@ -174,7 +177,7 @@ class _Curve:
         ]
 
     def _is_below(self, row: str) -> bool:
-        """Return True if a line that is no row may stand below the table: it begins with a word, and has no time."""
+        """Return True if a line that is not a row may be below the table: it begins with a word and has no time."""
         cells = split(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
@@ -184,42 +187,48 @@ class _Curve:
         )
 
     def _check_goes_on(self, number: int, time: float) -> None:
+        """Raise FormatError if the state at this time does not continue the curve."""
         if self.stops_before(time):
-            found = (
-                "a curve continues after empty cells"
-                if self._ended
-                else "the time starts again after a gap"
+            interruption = "the time starts again after a gap"
+            if self._ended:
+                interruption = "a curve continues after empty cells"
+            problem = f"{self._name}:{number}: {interruption}, one curve was expected"
+            raise FormatError(
+                f"{problem}; repair the line or put each curve into its own file"
             )
-            what = f"{self._name}:{number}: {found}, one curve was expected"
-            raise FormatError(f"{what}; repair it or put each curve into its own file")
 
     def _check_repeated(self, number: int, state: Sequence[float]) -> None:
-        """Raise FormatError unless a row below the table is the next one of the same table once more."""
+        """Raise FormatError unless a row below the table repeats the next row of the table."""
         self.keep_piece()
         if len(self._read) > 1:
             self._read = [np.concatenate(self._read)]
-        table, below = self._read[0], self._below
-        assert below is not None  # a line below the table comes first
+        table = self._read[0]
+        below = self._below
+        assert below is not None  # a line below the table was met before this row
         is_first = np.array_equal(table[0], state)
-        place = 0 if is_first else self._repeated
+        position = 0 if is_first else self._repeated
+        is_started = position > 0 or is_first
         if (
-            place < len(table)
-            and (place or is_first)
-            and np.array_equal(table[place], state)
+            is_started
+            and position < len(table)
+            and np.array_equal(table[position], state)
         ):
             self._repeated_from = self._repeated_from or number
-            self._repeated = place + 1
+            self._repeated = position + 1
             return
         is_header = is_time(split(below.text, self.layout.separator)[0])
-        if is_header or state[0] > float(
-            table[-1, 0]
-        ):  # if the table goes on, the line between is damaged
+        continues = state[0] > float(table[-1, 0])
+        if is_header or continues:  # the table goes on, so the line between is damaged
             raise below.error
-        found = f"{self._name}:{number}: another table begins here, behind line {below.line} ({shorten(below.text)})"
-        raise FormatError(f"{found}; one was expected; put each into its own file")
+        problem = (
+            f"{self._name}:{number}: another table begins here, after line {below.line} "
+            f"({shorten(below.text)}); one table was expected"
+        )
+        raise FormatError(f"{problem}; put each table into its own file")
 
 
 def _cells(where: str, row: str, layout: Layout) -> list[str]:
+    """Split a row into its cells; raise FormatError for a second header or another number of cells."""
     cells = split(row, layout.separator)
     if len(cells) == layout.columns + 1 and not cells[-1]:
         cells.pop()
@@ -228,18 +237,19 @@ def _cells(where: str, row: str, layout: Layout) -> list[str]:
             f"{where}: a second header, another curve begins here; put each curve into its own file"
         )
     if len(cells) != layout.columns:
-        found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
+        count = "1 value" if len(cells) == 1 else f"{len(cells)} values"
         raise FormatError(
-            f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line"
+            f"{where}: {count}, {layout.columns} were expected as in the other rows; repair the line"
         )
     return cells
 
 
 def _value(where: str, layout: Layout, column: int, cell: str) -> float:
+    """Return the finite number in a cell; raise FormatError for anything else."""
     value = layout.number(cell)
     if value is None or not np.isfinite(value):
-        found = (
+        problem = (
             f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
         )
-        raise FormatError(f"{found}; repair or delete the line")
+        raise FormatError(f"{problem}; repair or delete the line")
     return value

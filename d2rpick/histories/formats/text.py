@@ -1,4 +1,4 @@
-"""A text by its lines, whatever its encoding and line ends, and what the printed form of its numbers tells."""
+"""The lines of a text file, whatever its encoding and line ends, and the precision of its printed numbers."""
 
 from __future__ import annotations
 
@@ -22,44 +22,50 @@ if TYPE_CHECKING:
 UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8: Final = b"\xef\xbb\xbf"
 
-# What these lines do not tell about the form of a text, the others will not.
+# Lines in which the form of a text is searched; a form that these do not show is not found.
 HEAD: Final = 10_000
+
+# Digits before and after the point, and the exponent.
+_PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
+# Significant digits that restore every double, and the form of a number without an exponent.
+_LONGEST = 17
+_PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
+# Every double keeps 15 significant digits; a format that prints so many is treated as lossless.
+_FULL = 15
 
 
 class Text:
-    """Lines of a file, line ends as line feeds; ``unended`` is the last one when it has no end, else empty.
+    """The lines of a file, each with a line feed as its end; ``unended`` is a last line without end, or empty.
 
-    A big file in plain ASCII stays on its disk.  FormatError for binary data, and for a line beyond the bound.
+    A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # How much is looked at together.
-    top = HEAD  # lines that tell its form
-    piece = 1 << 17  # bytes: their cells stay in the processor's cache
-    short = (
-        1 << 16
-    )  # a text of no more bytes is looked at as a whole to judge the printed format
-    some = 100  # of others so many lines from the start, the end and between
-    large = (
-        1 << 22
-    )  # bytes of a large text: each call of pandas or scipy takes milliseconds
+    # How much is read together.
+    top = HEAD  # lines in which the form of the text is searched
+    # bytes of a piece, whose cells then fit into the cache of the processor
+    piece = 1 << 17
+    # A text of at most these bytes is used as a whole to find the printed precision.
+    short = 1 << 16
+    some = 100  # lines sampled at the start, at the end and between of a longer text
+    # Bytes of a piece of a large text: each call of pandas or scipy costs milliseconds.
+    large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _plain(source, self.piece)
         self._check_lines()
-        self._end = (
-            self._data.rfind(b"\n", 0, len(self._data)) + 1
-        )  # behind the last line that counts
+        # Address after the last line that has an end.
+        self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first lines that have an end, as many as tell its form."""
+        """The first lines that have an end, as many as are searched for the form of the text."""
         return self._first[: self.top]
 
     @property
     def is_short(self) -> bool:
-        """Whether ``head`` holds all lines but the last one without end."""
+        """True if ``head`` holds all lines (apart from a last one without end)."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -67,55 +73,55 @@ class Text:
         return list(islice(self.lines(0), self.top + 1))
 
     def place(self, line: int) -> int:
-        """Where a line begins, counted from 0 [byte]; the end of the lines where there are fewer."""
-        at = 0
+        """Return the address of a line, counted from 0 [byte]; the end of the last line if there are fewer lines."""
+        address = 0
         for _ in range(line):
-            at = self._data.find(b"\n", at) + 1 or self._end
-        return at
+            address = self._data.find(b"\n", address) + 1 or self._end
+        return address
 
     def take_rest(self) -> None:
-        """Count the last line, which has no end, as whole."""
+        """Treat the last line, which has no end, as a whole line from now on."""
         self._end = len(self._data)
 
     @property
     def is_large(self) -> bool:
-        """Whether it stayed on its disk, and so is plain ASCII."""
+        """True if the file stays on disk, and so is plain ASCII."""
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
-        """Whole lines from byte ``begin`` on, some or many at a time, each with its end.
+        """Yield whole lines from byte ``begin`` on, in pieces of many lines (``large`` for larger pieces).
 
-        FormatError behind the last of them where the file was written anew meanwhile.
+        Raises FormatError after the last piece if the file was rewritten meanwhile.
         """
         size = self.large if large else self.piece
         while begin < self._end:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
             if not end and begin + size < self._end:
-                size *= 2  # for the sake of a long line
+                size *= 2  # a single line is longer than the piece
                 continue
             yield piece[:end] or piece + b"\n"
             begin += end or len(piece)
         self._data.check()
 
     def lines(self, begin: int) -> Iterator[str]:
-        """Lines from byte ``begin`` on, without their ends."""
+        """Yield the lines from byte ``begin`` on, without their ends."""
         for piece in self.pieces(begin):
             yield from self.rows(piece)
 
     def rows(self, piece: bytes) -> list[str]:
-        """Lines of a piece, without their ends."""
+        """Return the lines of a piece, without their ends."""
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
-        data, end, count = self._data, self._end, self.some
+        """Return lines after byte ``begin`` from the start, the end and evenly between; all of a short text."""
+        data = self._data
+        end = self._end
+        count = self.some
+        if begin >= end:
+            return []
         if end - begin <= self.short:
-            return (
-                []
-                if begin >= end
-                else self._text(data[begin:end]).removesuffix("\n").split("\n")
-            )
+            return self._text(data[begin:end]).removesuffix("\n").split("\n")
         starts, first, last = [], begin, end
         for _ in range(count):
             starts.append(first)
@@ -124,14 +130,22 @@ class Text:
             last = data.rfind(b"\n", 0, max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (count - i) + last * i) // count for i in range(count))
-        # each is read as soon as its place is known: what lies behind that is then at hand
-        every = chain(starts, (data.find(b"\n", at) + 1 for at in between))
-        spans = ((at, data.find(b"\n", at)) for at in every if begin <= at < end)
-        lines = [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
+        # Each line is read as soon as its address is known, while that part of the file is in memory.
+        addresses = chain(
+            starts, (data.find(b"\n", position) + 1 for position in between)
+        )
+        lines = []
+        for address in addresses:
+            if begin <= address < end:
+                line_end = data.find(b"\n", address)
+                lines.append(
+                    self._text(data[address : line_end if line_end >= 0 else end])
+                )
         data.check()
         return lines
 
     def _check_lines(self) -> None:
+        """Raise FormatError with the number of a line that is too long."""
         at = long_line(self._data)
         if at >= 0:
             raise FormatError(
@@ -143,14 +157,14 @@ class Text:
 
 
 def _plain(source: Source, piece: int) -> tuple[Content, str]:
-    """Text with line feeds alone and no mark before it, and its encoding."""
+    """Return the text with line feeds only and without a byte order mark, and its encoding."""
     data = source.data
     if not isinstance(data, bytes):
-        pieces = (data[at : at + piece] for at in range(0, len(data), piece))
-        if all(
-            one.isascii() and b"\r" not in one and b"\0" not in one for one in pieces
-        ):
-            return data, "latin-1"  # of which ASCII is a part
+        pieces = (
+            data[address : address + piece] for address in range(0, len(data), piece)
+        )
+        if all(map(_is_plain, pieces)):
+            return data, "latin-1"  # contains ASCII
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
@@ -164,8 +178,13 @@ def _plain(source: Source, piece: int) -> tuple[Content, str]:
     return Content(data), _encoding(data)
 
 
+def _is_plain(data: bytes) -> bool:
+    """Return True if data is ASCII text without carriage returns and null bytes."""
+    return data.isascii() and b"\r" not in data and b"\0" not in data
+
+
 def _encoding(data: bytes) -> str:
-    """UTF-8 where it fits, as for plain ASCII; else latin-1, which takes any bytes."""
+    """Return "ascii" or "utf-8" if the data fit it, else "latin-1", which accepts any bytes."""
     if data.isascii():
         return "ascii"
     try:
@@ -175,26 +194,16 @@ def _encoding(data: bytes) -> str:
     return "utf-8"
 
 
-_PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
-
-# Digits that restore every double, and numbers that are not written with an exponent.
-_LONGEST = 17
-_PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"  # compiled where it is needed
-
-# 15 significant digits are what every double keeps; a writer that shows so many meant to lose nothing.
-_FULL = 15
-
-
 def precisions(
     time: Sequence[str], energy: Sequence[str], moments: Samples
 ) -> tuple[Precision, Precision]:
-    """How finely time and energy were written, from a sample of their fields.
+    """Return the precision with which times and energies were printed, from a sample of their fields.
 
-    One writer uses one format: the most significant digits seen in any field hold for both columns, since
-    formats like ``%g`` drop trailing zeros; 15 or more mean that nothing was lost.  A column without
-    exponents whose fields all have the same number of decimals is taken as written in fixed decimals.
-    Times on an exactly uniform grid that show more decimals than the grid needs are the multiples of a step
-    that was meant, and get the digits of the energy; with no decimal to spare they may be rounded to the grid.
+    A program writes all columns in one format: the most significant digits of any field hold for both columns, since
+    formats like ``%g`` drop trailing zeros; 15 or more mean that nothing was lost. A column without exponents whose
+    fields all have the same number of decimals is treated as printed in fixed decimals. Times on an exactly uniform
+    grid with more decimals than the grid needs are exact multiples of a time step and get the digits of the energy;
+    if no decimal is to spare, they may have been rounded to the grid.
 
     Parameters
     ----------
@@ -215,26 +224,25 @@ def precisions(
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
-    time_decimals, energy_decimals = _fixed_decimals(time), _fixed_decimals(energy)
+    time_decimals = _fixed_decimals(time)
+    energy_decimals = _fixed_decimals(energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
-    return (
-        Precision(digits=general.digits, decimals=time_decimals)
-        if time_fixed
-        else general,
-        Precision(digits=general.digits, decimals=energy_decimals)
-        if energy_decimals
-        else general,
-    )
+    time_precision = energy_precision = general
+    if time_fixed:
+        time_precision = Precision(digits=general.digits, decimals=time_decimals)
+    if energy_decimals:
+        energy_precision = Precision(digits=general.digits, decimals=energy_decimals)
+    return time_precision, energy_precision
 
 
 def is_whole(field: str, above: Sequence[str]) -> bool:
-    """Whether a field at which a file breaks off is certainly not cut, judged by the fields above it.
+    """Return True if the last field of a file that breaks off is certainly complete, judged by the fields above it.
 
-    It is when the column has a format of constant length: always the same number of decimals (two or more)
-    and of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never
-    write.  An exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt.  It also is
-    when it has the 17 digits that restore every double, as no field above has more, and no exponent can follow: that
-    stands behind a mantissa of one digit before the point.
+    It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
+    of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
+    exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt. It is also complete if
+    it has the 17 digits that restore every double, no field above has more, and no exponent can follow: an exponent
+    follows only a mantissa with one digit before the point.
 
     Examples
     --------
@@ -243,9 +251,8 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
     >>> is_whole("0.30000000000000004", ["0.1"]), is_whole("3.0000000000000004", ["0.1"])
     (True, False)
     """
-    if above and _significant(field) == _LONGEST == max(
-        _LONGEST, *map(_significant, above)
-    ):
+    longest_above = max(_LONGEST, *map(_significant, above)) if above else 0
+    if _significant(field) == _LONGEST == longest_above:
         return re.fullmatch(_PLAIN, field, re.ASCII) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
     shapes = {
@@ -255,7 +262,7 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
         return False
     decimals, width = shapes.pop()
     padded = any(part[2].endswith("0") for part in parts[1:] if part)
-    longest_start = 32  # no double has an exponent beyond 324
+    longest_start = 32  # first two digits of the largest exponent of a double, 324
     exponent = parts[0][3] if parts[0] else None
     doubtful = (
         width == 2
@@ -266,33 +273,34 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
 
 
 def _significant(field: str) -> int:
+    """Return the number of significant digits of a field, 0 if it is not a number."""
     parts = _PARTS.fullmatch(field)
     if not parts:
         return 0
     digits = parts[1] + parts[2]
-    return len(digits.lstrip("0")) or (
-        len(digits) if parts[3] else 0
-    )  # 0.00000E+00 has six
+    if not digits.lstrip("0") and parts[3]:
+        return len(digits)  # 0.00000E+00 has six
+    return len(digits.lstrip("0"))
 
 
 def _fixed_decimals(fields: Sequence[str]) -> int | None:
-    same = _decimals(fields[0]) if fields else 0
-    alike = same > 0 and all(_decimals(field) == same for field in fields)
-    return same if alike else None
+    """Return the number of decimals that all fields have in common without an exponent, None if there is none."""
+    decimals = _decimals(fields[0]) if fields else 0
+    are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
+    return decimals if are_alike else None
 
 
 def _decimals(field: str) -> int:
-    """Count the decimals of a number without an exponent; 0 for another."""
+    """Return the number of decimals of a number without an exponent; 0 for any other field."""
     parts = _PARTS.fullmatch(field)
     return len(parts[2]) if parts and parts[3] is None else 0
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Whether times are equidistant and their step could be written with fewer decimals."""
+    """Return True if the times are equidistant and their step needs fewer than these decimals."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
     coarser = float(steps[0]) * 10.0 ** (decimals - 1)
-    return bool(np.ptp(steps) <= 1e-9 * abs(steps[0])) and abs(
-        coarser - round(coarser)
-    ) <= 1e-6 * abs(coarser)
+    is_uniform = bool(np.ptp(steps) <= 1e-9 * abs(steps[0]))
+    return is_uniform and abs(coarser - round(coarser)) <= 1e-6 * abs(coarser)

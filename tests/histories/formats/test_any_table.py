@@ -1,4 +1,4 @@
-"""Tables as colleagues, spreadsheets and postprocessors write them, which pandas reads with the right options."""
+"""Tables as users, spreadsheets and postprocessors write them; pandas reads them with the right options."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -14,11 +14,13 @@ from tests.reading import history_of
 
 STATES = 40
 TIME = np.arange(STATES) * 0.25
-ENERGY = np.round(1200 * (1 - np.cos(TIME)) + 0.5, 3)  # up to 2400: thousands matter
+ENERGY = np.round(
+    1200 * (1 - np.cos(TIME)) + 0.5, 3
+)  # values up to 2400, so that there are thousands separators
 KINETIC = np.round(5000 - ENERGY, 3)
 
 
-def written(value: float, decimal: str = ".", thousands: str = "") -> str:
+def format_number(value: float, decimal: str = ".", thousands: str = "") -> str:
     return (
         f"{value:,.3f}".replace(",", "\0")
         .replace(".", decimal)
@@ -26,7 +28,7 @@ def written(value: float, decimal: str = ".", thousands: str = "") -> str:
     )
 
 
-def table(
+def write_table(
     head: str,
     separator: str = ",",
     decimal: str = ".",
@@ -38,7 +40,9 @@ def table(
     columns = [TIME, ENERGY, KINETIC] if kinetic else [TIME, ENERGY]
     rows = zip(*columns, strict=True)
     lines = [
-        separator.join(f"{quote}{written(v, decimal, thousands)}{quote}" for v in row)
+        separator.join(
+            f"{quote}{format_number(v, decimal, thousands)}{quote}" for v in row
+        )
         for row in rows
     ]
     return "\n".join([head, *lines, ""])
@@ -47,7 +51,7 @@ def table(
 def lines(head: str, form: str) -> str:
     """Rows in a form, with t, e, k and the number i of the state."""
     rows = (
-        form.format(t=written(t), e=written(e), k=written(k), i=i)
+        form.format(t=format_number(t), e=format_number(e), k=format_number(k), i=i)
         for i, (t, e, k) in enumerate(zip(TIME, ENERGY, KINETIC, strict=True))
     )
     return "\n".join([head, *rows, ""]) if head else "\n".join([*rows, ""])
@@ -81,39 +85,45 @@ TABLES: dict[str, str | bytes] = {
     "shares": lines("time,IE,share", "{t},{e},{i}%"),
     "truth": lines("time,IE,contact", "{t},{e},True"),
     "remarks in quotes": lines("time,IE,remark", '{t},{e},"a, b"'),
-    "quoted decimal commas": table(
+    "quoted decimal commas": write_table(
         "Time (ms),Internal energy (mJ)", ",", ",", quote='"', kinetic=False
     ),
-    "three quoted columns": table(
+    "three quoted columns": write_table(
         "Time (ms),Internal energy (mJ),KE (mJ)", ",", ",", quote='"'
     ),
-    "quoted points": table("time,IE,KE", quote='"'),
-    "quoted thousands": table("time,IE,KE", thousands=",", quote='"'),
-    "German thousands": table("Zeit;Innere Energie;Kinetische Energie", ";", ",", "."),
-    "French thousands": table(
+    "quoted points": write_table("time,IE,KE", quote='"'),
+    "quoted thousands": write_table("time,IE,KE", thousands=",", quote='"'),
+    "German thousands": write_table(
+        "Zeit;Innere Energie;Kinetische Energie", ";", ",", "."
+    ),
+    "French thousands": write_table(
         "temps;énergie interne;énergie cinétique", ";", ",", "\N{NARROW NO-BREAK SPACE}"
     ),
-    "no-break thousands": table(
+    "no-break thousands": write_table(
         "temps;énergie interne;énergie cinétique", ";", ",", "\N{NO-BREAK SPACE}"
     ),
-    "blanks for thousands": table(
+    "blanks for thousands": write_table(
         "Zeit;Innere Energie;Kinetische Energie", ";", ",", " "
     ),
-    "Swiss thousands": table("Zeit;Innere Energie;Kinetische Energie", ";", ".", "'"),
-    "thousands between tabs": table("time\tIE\tKE", "\t", ".", ","),
-    "two rows of heads": table(
+    "Swiss thousands": write_table(
+        "Zeit;Innere Energie;Kinetische Energie", ";", ".", "'"
+    ),
+    "thousands between tabs": write_table("time\tIE\tKE", "\t", ".", ","),
+    "two rows of heads": write_table(
         ";Lauf 12;;\n;Innere Energie;Kinetische Energie;\nt in ms;in mJ;in mJ;",
         ";",
         ",",
     ),
-    "merged heads": table("Time,Energy,\n,internal,kinetic"),
-    "levels": table("Time,Energy,Energy\n,internal,kinetic"),
-    "a level of models": table(",Model,Model\ntime,IE,KE"),
-    "units below": table("time,internal energy,kinetic energy\nms,mJ,mJ"),
-    "units above": table("ms,mJ,mJ\ntime,internal energy,kinetic energy"),
-    "words above": table("Report of run 12\nAuthor: me, date: today\n\ntime,IE,KE"),
-    "many words above": table("some text about the run\n" * 150 + "time,IE,KE"),
-    "keys and values above": table(
+    "merged heads": write_table("Time,Energy,\n,internal,kinetic"),
+    "levels": write_table("Time,Energy,Energy\n,internal,kinetic"),
+    "a level of models": write_table(",Model,Model\ntime,IE,KE"),
+    "units below": write_table("time,internal energy,kinetic energy\nms,mJ,mJ"),
+    "units above": write_table("ms,mJ,mJ\ntime,internal energy,kinetic energy"),
+    "words above": write_table(
+        "Report of run 12\nAuthor: me, date: today\n\ntime,IE,KE"
+    ),
+    "many words above": write_table("some text about the run\n" * 150 + "time,IE,KE"),
+    "keys and values above": write_table(
         "Key;value 7\n" * 12 + "Zeit [ms];Innere Energie [mJ]", ";", ",", kinetic=False
     ),
     "numbers of rows": lines(",time,IE", "{i},{t},{e}"),
@@ -123,25 +133,26 @@ TABLES: dict[str, str | bytes] = {
     "words before X": lines("run,X,ALLIE", "job-1,{t},{e}"),
     "words without a head": lines("", "job,{t},{e}"),
     "a word and blanks": lines("", "step {t} {e}"),
-    "a total below": table("time,IE,KE") + "Total,123.0,456.0\n",
-    "words below": table("time,IE,KE") + "\nExported by a tool, version 3.2\nEnd\n",
+    "a total below": write_table("time,IE,KE") + "Total,123.0,456.0\n",
+    "words below": write_table("time,IE,KE")
+    + "\nExported by a tool, version 3.2\nEnd\n",
     "a report of Abaqus": REPORT,
     "a report with its extremes": REPORT + EXTREMES,
     "a report twice": (REPORT + EXTREMES) * 2,
     "a report three times": REPORT * 3,
-    "names in a comment": table("# time IE KE", " "),
+    "names in a comment": write_table("# time IE KE", " "),
     "Markdown": lines("| time | internal energy |\n|------|------|", "| {t} | {e} |"),
     "psql": lines(" time | internal energy \n------+-----------------", " {t} | {e} "),
     "a box": lines(f"{RULE}\n| time | IE |\n{RULE}", "| {t} | {e} |") + f"{RULE}\n",
     "rules of blanks": lines("====== ======\ntime   IE\n====== ======", "{t} {e}")
     + "====== ======\n",
     "fixed width": lines(f"{'time':>10}{'internal energy':>20}", "{t:>10}{e:>20}"),
-    "UTF-16": table("time\tIE\tKE", "\t").encode("utf-16"),
-    "cp1252": table(
+    "UTF-16": write_table("time\tIE\tKE", "\t").encode("utf-16"),
+    "cp1252": write_table(
         "Zeit [ms];Innere Energie Türe [mJ]", ";", ",", kinetic=False
     ).encode("cp1252"),
-    "old line ends": table("time,IE,KE").replace("\n", "\r"),
-    "blank lines between": table("time,IE,KE").replace("\n", "\r\n\r\n"),
+    "old line ends": write_table("time,IE,KE").replace("\n", "\r"),
+    "blank lines between": write_table("time,IE,KE").replace("\n", "\r\n\r\n"),
     "exponents of Fortran": lines("time IE", "{t}D+00 {e}D+00"),
     "plus signs": lines("time,IE", "+{t},+{e}"),
     "a minus of typesetters": lines("time,IE,z", "{t},{e},\N{MINUS SIGN}1.5"),
@@ -149,53 +160,56 @@ TABLES: dict[str, str | bytes] = {
     "a separator at the end of rows": lines("time;IE", "{t};{e};"),
     "a separator at the end of names": lines("time;IE;", "{t};{e}"),
     "holes in another column": lines("time,IE,KE", "{t},{e},{k}").replace(
-        f",{written(KINETIC[7])}", ","
+        f",{format_number(KINETIC[7])}", ","
     ),
 }
 
 
-def read(text: str | bytes, *energy: str) -> History:
+def read_table(text: str | bytes, *energy: str) -> History:
     data = text if isinstance(text, bytes) else text.encode()
     return history_of(csv_table, data, selection=Selection(energy=energy), name="table")
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_it_is_read(name: str) -> None:
-    history = read(TABLES[name])
+    history = read_table(TABLES[name])
     np.testing.assert_allclose(history.time, TIME, atol=1e-9)
     np.testing.assert_allclose(history.energy, ENERGY, atol=1e-9)
 
 
-def notes(text: str) -> str:
-    return " ".join(read(text).notes)
+def read_notes(text: str) -> str:
+    return " ".join(read_table(text).notes)
 
 
 def test_columns_without_numbers_are_left_out_with_a_note() -> None:
     text = lines("time,IE,ratio,", "{t},{e},#DIV/0!,")
-    assert "column 3 'ratio' holds no numbers ('#DIV/0!') and was left out" in notes(
-        text
+    assert (
+        "column 3 'ratio' holds no numbers ('#DIV/0!') and was left out"
+        in read_notes(text)
     )
-    assert "holds no numbers" not in notes(
+    assert "holds no numbers" not in read_notes(
         lines("time,,IE", "{t},,{e}")
-    )  # nothing stands there
+    )  # an empty cell
 
 
 @pytest.mark.parametrize("hole", ["#NV", "", "n/a", "-"])
 def test_a_quantity_with_a_hole_is_left_out_with_its_line(hole: str) -> None:
-    text = lines("time,IE,KE", "{t},{e},{k}").replace(written(KINETIC[20]), hole)
-    history = read(text)
+    text = lines("time,IE,KE", "{t},{e},{k}").replace(format_number(KINETIC[20]), hole)
+    history = read_table(text)
     np.testing.assert_array_equal(history.energy, ENERGY)
     assert history.balance is None or history.balance.kinetic is None
     assert f"'KE' was left out: line 22: 'KE' is {hole!r}" in " ".join(history.notes)
     with pytest.raises(FormatError, match="table:22: 'KE' is"):
-        read(text, "KE")
+        read_table(text, "KE")
 
 
 def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
     with pytest.raises(
         FormatError, match="table:22: 'IE' is '#NV', a number was expected"
     ):
-        read(lines("time,IE,KE", "{t},{e},{k}").replace(written(ENERGY[20]), "#NV"))
+        read_table(
+            lines("time,IE,KE", "{t},{e},{k}").replace(format_number(ENERGY[20]), "#NV")
+        )
 
 
 @pytest.mark.parametrize(
@@ -204,7 +218,7 @@ def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
         (
             "time;IE\n0,001;1.234\n0,002;1.235\n0,003;1.236\n",
             "1.234",
-        ),  # thousands, or another decimal sign?
+        ),  # a thousands separator or a decimal sign: this cannot be known
         ("time;IE\n1.001;12,5\n1.002;12,6\n1.003;12,7\n", "1.001|12,5"),
         (
             "time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n",
@@ -215,16 +229,16 @@ def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
 )
 def test_what_cannot_be_told_for_sure_is_refused(text: str, reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
-        read(text)
+        read_table(text)
 
 
 def test_another_table_below_is_refused_with_both_lines() -> None:
-    other = REPORT.replace(written(ENERGY[20]), "7")
+    other_report = REPORT.replace(format_number(ENERGY[20]), "7")
     with pytest.raises(
         FormatError,
-        match=r"table:72: another table begins here, behind line 45 \('Minimum",
+        match=r"table:72: another table begins here, after line 45 \('Minimum",
     ):
-        read(REPORT + EXTREMES + "\n" + other.lstrip("\n"))
+        read_table(REPORT + EXTREMES + "\n" + other_report.lstrip("\n"))
 
 
 def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
@@ -232,15 +246,16 @@ def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
     with pytest.raises(
         FormatError, match=r"table:22: 'time' is 'x\.000', a number was expected"
     ):
-        read(text)
+        read_table(text)
 
 
 def test_what_stands_below_is_named() -> None:
-    assert "line 42 ('Total,1.0,2.0') and what follows are below the table" in notes(
-        table("time,IE,KE") + "Total,1.0,2.0\n"
+    assert (
+        "line 42 ('Total,1.0,2.0') and the lines after it are below the table"
+        in read_notes(write_table("time,IE,KE") + "Total,1.0,2.0\n")
     )
-    again = " ".join(read((REPORT + EXTREMES) * 2).notes)
-    assert "with the same table again from line 52 on; they were left out" in again
+    again = " ".join(read_table((REPORT + EXTREMES) * 2).notes)
+    assert "the same table is repeated from line 52 on; they were left out" in again
 
 
 GLOBALS = (
@@ -277,26 +292,30 @@ def th_to_csv(names: Sequence[str], columns: int) -> str:
 def test_the_globals_of_th_to_csv_are_sure_below_a_name_too_many_or_too_few(
     columns: int,
 ) -> None:
-    history = read(th_to_csv([*GLOBALS, *BEHIND], columns))
+    history = read_table(th_to_csv([*GLOBALS, *BEHIND], columns))
     assert (history.energy[0], history.channel) == (1.0, "INTERNAL ENERGY")
     assert history.balance is not None
     assert history.balance.kinetic is not None
-    assert history.balance.kinetic[0] == 2.0 + 8.0  # with rotation
-    assert [one.values[0, 0].tolist() for one in history.momenta] == [[3.0, 4.0, 5.0]]
+    assert (
+        history.balance.kinetic[0] == 2.0 + 8.0
+    )  # kinetic energy with the rotation energy
+    assert [momenta.values[0, 0].tolist() for momenta in history.momenta] == [
+        [3.0, 4.0, 5.0]
+    ]
     assert f"16 names for {columns} values" in " ".join(history.notes)
     assert "only the first 13 columns are sure" in " ".join(history.notes)
     with pytest.raises(FormatError, match="the name of column 15 is not sure"):
-        read(th_to_csv([*GLOBALS, *BEHIND], columns), "15")
+        read_table(th_to_csv([*GLOBALS, *BEHIND], columns), "15")
 
 
 def test_too_few_names_of_another_program_are_refused() -> None:
     with pytest.raises(FormatError, match="3 values below a header of 2 names"):
-        read(lines("time,IE", "{t},{e},{k}"))
+        read_table(lines("time,IE", "{t},{e},{k}"))
 
 
 def test_a_large_table_in_quotes_is_read_in_one_piece_as_line_by_line() -> None:
     rows = [f'"{i / 8}","{i % 7},5"'.replace(".", ",") for i in range(20_000)]
-    history = read("\n".join(['"time","IE"', *rows, ""]))
+    history = read_table("\n".join(['"time","IE"', *rows, ""]))
     assert history.time.tolist() == [i / 8 for i in range(20_000)]
     assert history.energy.tolist() == [i % 7 + 0.5 for i in range(20_000)]
 
@@ -304,5 +323,7 @@ def test_a_large_table_in_quotes_is_read_in_one_piece_as_line_by_line() -> None:
 def test_pandas_agrees_where_it_needs_no_options() -> None:
     import pandas as pd
 
-    frame = pd.read_csv(io.StringIO(table("time,IE,KE")))
-    np.testing.assert_array_equal(frame["IE"], read(table("time,IE,KE")).energy)
+    frame = pd.read_csv(io.StringIO(write_table("time,IE,KE")))
+    np.testing.assert_array_equal(
+        frame["IE"], read_table(write_table("time,IE,KE")).energy
+    )

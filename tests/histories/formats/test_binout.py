@@ -1,4 +1,4 @@
-"""binout: made files of every style."""
+"""binout: made-up files in every form of the format."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -15,7 +15,7 @@ from tests.made_binout import GLSTAT, LsdaWriter, Style, binout as made_binout, 
 from tests.reading import run_of
 
 
-def opened(*files: LsdaWriter | bytes) -> Binout:
+def open_binout(*files: LsdaWriter | bytes) -> Binout:
     contents = [
         bytes(file.data) if isinstance(file, LsdaWriter) else file for file in files
     ]
@@ -44,7 +44,7 @@ def test_any_style_gives_the_numbers_that_were_written(
 ) -> None:
     states = range(1, 13)
     # 2-byte lengths cannot hold a symbol table of both branches.
-    run = opened(
+    run = open_binout(
         made_binout(
             states,
             style=style,
@@ -69,14 +69,14 @@ def test_any_style_gives_the_numbers_that_were_written(
 
 
 def test_a_branch_that_is_written_seldom_keeps_its_states() -> None:
-    """Between two of its states those of the other branch repeat."""
-    run = opened(made_binout(range(1, 301), matsum_every=100))
+    """Between two states of one branch, states of the other branch repeat."""
+    run = open_binout(made_binout(range(1, 301), matsum_every=100))
     assert run.time.tolist() == expected("time", range(1, 301))
     assert run.part_time.tolist() == expected("time", (100, 200, 300))
 
 
 def test_metadata() -> None:
-    run = opened(
+    run = open_binout(
         made_binout([1], parts=(7, 3), titles={3: "box", 9: "unused", 7: "step"})
     )
     assert [(part.id, part.title) for part in run.parts] == [(7, "step"), (3, "box")]
@@ -85,16 +85,16 @@ def test_metadata() -> None:
 
 def test_numbers_of_more_digits_go_on_after_999_999() -> None:
     states = range(999_990, 1_000_010)
-    made = LsdaWriter()
+    writer = LsdaWriter()
     for state in states:
-        made.cd(f"/glstat/d{state:0{6 if state < 1_000_000 else 8}d}")
-        made.put("time", [state / 4], "f8")
-    assert opened(made).time.tolist() == [state / 4 for state in states]
+        writer.cd(f"/glstat/d{state:0{6 if state < 1_000_000 else 8}d}")
+        writer.put("time", [state / 4], "f8")
+    assert open_binout(writer).time.tolist() == [state / 4 for state in states]
 
 
 def test_a_number_left_out_inside_a_file_says_that_records_are_lost() -> None:
-    """What then seems to be one state may be made of two."""
-    run = opened(made_binout([1, 2, 3, 5, 6]))
+    """What seems to be one state may then be made of two."""
+    run = open_binout(made_binout([1, 2, 3, 5, 6]))
     assert not run.complete
     with pytest.raises(
         FormatError,
@@ -107,7 +107,7 @@ def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
     run = run_of(binout, bytes(made_binout([1, 2, 3, 4, 5, 3, 4]).data))
     assert run.databases[0].time.tolist() == expected("time", [1, 2, 3, 4])
     assert (
-        "time steps back once (restart); where legs overlap the newer one counts"
+        "time steps back once (restart); if legs overlap the newer one is used"
         in run.notes[0]
     )
     assert run.history(Selection()).energy.tolist() == expected(
@@ -117,7 +117,7 @@ def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
 
 @pytest.mark.parametrize("again", [4, 3])
 def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> None:
-    """Its first state is the one after, or the same as, the last one of the leg before."""
+    """The first state of a leg is the last state of the leg before, or the one after it."""
     first, second = made_binout([1, 2, 3]), made_binout([1, 2, 3], shift=again - 1)
     (leg,) = binout.open_legs(
         [
@@ -138,20 +138,20 @@ def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> N
 
 def test_a_family_is_one_run() -> None:
     first, second = made_binout(range(1, 21)), made_binout(range(21, 31))
-    run = opened(second, first)
+    run = open_binout(second, first)
     assert run.complete
     assert run.time.tolist() == expected("time", range(1, 31))
     assert run.part_channel("x_momentum", [3])[25, 0] == values("x_momentum", 26, 3)
 
 
 def test_a_missing_member_of_a_family_is_noted() -> None:
-    run = opened(made_binout(range(1, 11)), made_binout(range(21, 31)))
+    run = open_binout(made_binout(range(1, 11)), made_binout(range(21, 31)))
     assert not run.complete
     assert any("lacks the states 11 to 20" in note for note in run.notes)
 
 
 def test_parts_that_change_are_read_by_id_or_refused() -> None:
-    run = opened(
+    run = open_binout(
         made_binout(
             range(1, 13), parts_of=lambda state: (7, 3) if state < 5 else (3, 9, 7)
         )
@@ -173,7 +173,7 @@ def test_parts_that_change_are_read_by_id_or_refused() -> None:
 
 
 def test_another_order_of_parts_of_the_same_count_is_followed() -> None:
-    run = opened(
+    run = open_binout(
         made_binout(
             range(1, 41), parts_of=lambda state: (7, 3) if state % 3 else (3, 7)
         )
@@ -184,45 +184,45 @@ def test_another_order_of_parts_of_the_same_count_is_followed() -> None:
 
 
 def test_a_new_list_of_ids_in_the_metadata_holds_for_the_states_after_it() -> None:
-    made = LsdaWriter()
+    writer = LsdaWriter()
     for begin, ids in ((1, (7, 3)), (4, (3, 7, 9))):
-        made.cd("/matsum/metadata")
-        made.put("ids", ids, "i8")
+        writer.cd("/matsum/metadata")
+        writer.put("ids", ids, "i8")
         for state in range(begin, begin + 3):
-            made.cd(f"/matsum/d{state:06d}")
-            made.put("time", [state], "f8")
-            made.put("internal_energy", [100 * state + id_ for id_ in ids], "f8")
-    run = opened(made)
+            writer.cd(f"/matsum/d{state:06d}")
+            writer.put("time", [state], "f8")
+            writer.put("internal_energy", [100 * state + id_ for id_ in ids], "f8")
+    run = open_binout(writer)
     assert run.part_channel("internal_energy", [7])[:, 0].tolist() == [
         100 * s + 7 for s in range(1, 7)
     ]
 
 
 def test_values_that_do_not_fit_the_ids_are_refused() -> None:
-    made = LsdaWriter()
-    made.cd("/matsum/metadata")
-    made.put("ids", [1, 2], "i4")
+    writer = LsdaWriter()
+    writer.cd("/matsum/metadata")
+    writer.put("ids", [1, 2], "i4")
     for state, count in ((1, 2), (2, 3)):
-        made.cd(f"/matsum/d{state:06d}")
-        made.put("time", [state], "f4")
-        made.put("internal_energy", range(count), "f4")
-    made.table()
+        writer.cd(f"/matsum/d{state:06d}")
+        writer.put("time", [state], "f4")
+        writer.put("internal_energy", range(count), "f4")
+    writer.table()
     with pytest.raises(
         FormatError, match="state 2: 3 values of internal_energy where 1, 2 would fit"
     ):
-        opened(made).part_channel("internal_energy", [1])
+        open_binout(writer).part_channel("internal_energy", [1])
 
 
 def test_a_variable_that_appears_late_is_no_channel() -> None:
-    made = LsdaWriter()
+    writer = LsdaWriter()
     for state in range(1, 6):
-        made.cd(f"/glstat/d{state:06d}")
-        made.put("time", [state], "f4")
-        made.put("internal_energy", [state * 2], "f4")
+        writer.cd(f"/glstat/d{state:06d}")
+        writer.put("time", [state], "f4")
+        writer.put("internal_energy", [state * 2], "f4")
         if state > 3:
-            made.put("added_mass", [state], "f4")
-    made.table()
-    run = opened(made)
+            writer.put("added_mass", [state], "f4")
+    writer.table()
+    run = open_binout(writer)
     assert run.channels == ("internal_energy",)
     assert run.channel("internal_energy").tolist() == [2, 4, 6, 8, 10]
     assert any("added_mass in some states only" in note for note in run.notes)
@@ -237,15 +237,15 @@ def test_times_of_another_type_are_refused(code: int) -> None:
     data = bytes(made_binout(range(1, 4)).data)
     whole = b"\x09\x04time"  # type, length of the name, name
     assert whole in data
-    run = opened(data.replace(whole, bytes([code]) + whole[1:]))
+    run = open_binout(data.replace(whole, bytes([code]) + whole[1:]))
     with pytest.raises(FormatError, match=r"time is stored as u?int"):
         run.branch("glstat").channel("time")
 
 
 def test_no_states_is_a_legal_file() -> None:
-    run = opened(made_binout([]))
+    run = open_binout(made_binout([]))
     assert run.time.size == run.part_time.size == 0
-    assert any("holds no state yet" in note for note in run.notes)
+    assert any("has no state yet" in note for note in run.notes)
 
 
 @pytest.mark.parametrize(
@@ -254,4 +254,4 @@ def test_no_states_is_a_legal_file() -> None:
 def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     assert not recognises(head)
     with pytest.raises(FormatError, match="the header of a binout was expected"):
-        opened(head)
+        open_binout(head)

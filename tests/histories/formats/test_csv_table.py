@@ -19,12 +19,12 @@ TIMES = [0.0, 0.25, 0.625]
 ENERGIES = [1.5, 2.75, -3.125]
 
 
-def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
+def read_table(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
     return history_of(csv_table, data, selection=Selection(time, energy), name="table")
 
 
-def table(
+def write_rows(
     separator: str = ",", decimal: str = ".", end: str = "\n", tail: str = ""
 ) -> str:
     rows = [
@@ -36,90 +36,98 @@ def table(
 
 # name: (text, channel, unit of the time); all hold TIMES and ENERGIES
 SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
-    "plain": ("time,internal_energy\n" + table(), "internal_energy", ""),
-    "blank behind the comma": ("x, y\n" + table(", "), "y", ""),
-    "semicolons": ("Time;IE\n" + table(";"), "IE", ""),
+    "plain": ("time,internal_energy\n" + write_rows(), "internal_energy", ""),
+    "blank behind the comma": ("x, y\n" + write_rows(", "), "y", ""),
+    "semicolons": ("Time;IE\n" + write_rows(";"), "IE", ""),
     "semicolons and decimal commas": (
-        "Zeit;Innere Energie\n" + table(";", ","),
+        "Zeit;Innere Energie\n" + write_rows(";", ","),
         "Innere Energie",
         "",
     ),
-    "tabs and decimal commas": ("t\tE_int\n" + table("\t", ","), "E_int", ""),
-    "bars": ("time|IE\n" + table("|"), "IE", ""),
+    "tabs and decimal commas": ("t\tE_int\n" + write_rows("\t", ","), "E_int", ""),
+    "bars": ("time|IE\n" + write_rows("|"), "IE", ""),
     "bars and decimal commas": (
-        "Zeit | Innere Energie\n" + table(" | ", ","),
+        "Zeit | Innere Energie\n" + write_rows(" | ", ","),
         "Innere Energie",
         "",
     ),
-    "blanks": ("time ALLIE\n" + table("   "), "ALLIE", ""),
+    "blanks": ("time ALLIE\n" + write_rows("   "), "ALLIE", ""),
     "blanks and names with blanks": (
-        "Time [ms]   Internal Energy\n" + table("   "),
+        "Time [ms]   Internal Energy\n" + write_rows("   "),
         "Internal Energy",
         "ms",
     ),
-    "blanks and decimal commas": ("time IE\n" + table(" ", ","), "IE", ""),
-    "no header": (table(), "column 2", ""),
-    "no header, blanks": (table("  "), "column 2", ""),
+    "blanks and decimal commas": ("time IE\n" + write_rows(" ", ","), "IE", ""),
+    "no header": (write_rows(), "column 2", ""),
+    "no header, blanks": (write_rows("  "), "column 2", ""),
     "UTF-8 with its mark": (
-        b"\xef\xbb\xbf" + ("time,IE\n" + table()).encode(),
+        b"\xef\xbb\xbf" + ("time,IE\n" + write_rows()).encode(),
         "IE",
         "",
     ),
     "UTF-16 from a spreadsheet": (
-        ("time\tIE\r\n" + table("\t", end="\r\n")).encode("utf-16"),
+        ("time\tIE\r\n" + write_rows("\t", end="\r\n")).encode("utf-16"),
         "IE",
         "",
     ),
     "UTF-16, the other order": (
-        b"\xfe\xff" + ("time;IE\n" + table(";")).encode("utf-16-be"),
+        b"\xfe\xff" + ("time;IE\n" + write_rows(";")).encode("utf-16-be"),
         "IE",
         "",
     ),
-    "latin-1": (("time,Gehäuse IE\n" + table()).encode("latin-1"), "Gehäuse IE", ""),
-    "other line ends": ("time,IE\r\n" + table(end="\r\n"), "IE", ""),
-    "old line ends": ("time,IE\r" + table(end="\r"), "IE", ""),
-    "separator told": ("sep=;\nTime (ms);IE (J)\n" + table(";", ","), "IE (J)", "ms"),
-    "any separator told": ("sep=:\ntime:IE\n" + table(":", ","), "IE", ""),
-    "no separator told": ("sep=5\ntime,IE\n" + table(), "IE", ""),
+    "latin-1": (
+        ("time,Gehäuse IE\n" + write_rows()).encode("latin-1"),
+        "Gehäuse IE",
+        "",
+    ),
+    "other line ends": ("time,IE\r\n" + write_rows(end="\r\n"), "IE", ""),
+    "old line ends": ("time,IE\r" + write_rows(end="\r"), "IE", ""),
+    "separator told": (
+        "sep=;\nTime (ms);IE (J)\n" + write_rows(";", ","),
+        "IE (J)",
+        "ms",
+    ),
+    "any separator told": ("sep=:\ntime:IE\n" + write_rows(":", ","), "IE", ""),
+    "no separator told": ("sep=5\ntime,IE\n" + write_rows(), "IE", ""),
     "units in brackets": (
-        "Time [s],Internal Energy [J]\n" + table(),
+        "Time [s],Internal Energy [J]\n" + write_rows(),
         "Internal Energy [J]",
         "s",
     ),
-    "units behind a slash": ("t/ms,E_int/mJ\n" + table(), "E_int/mJ", "ms"),
-    "units behind a line": ("time_s,IE_J\n" + table(), "IE_J", "s"),
+    "units behind a slash": ("t/ms,E_int/mJ\n" + write_rows(), "E_int/mJ", "ms"),
+    "units behind a line": ("time_s,IE_J\n" + write_rows(), "IE_J", "s"),
     "units in a row": (
-        "time,internal energy\nms,J\n" + table(),
+        "time,internal energy\nms,J\n" + write_rows(),
         "internal energy",
         "ms",
     ),
     "units in a row, in brackets": (
-        "time,internal energy\n[ms],[kN mm]\n" + table(),
+        "time,internal energy\n[ms],[kN mm]\n" + write_rows(),
         "internal energy",
         "ms",
     ),
     "LS-PrePost, unnamed curve": (
-        "Global Data,Internal Energy\nTime,\n" + table(tail=","),
+        "Global Data,Internal Energy\nTime,\n" + write_rows(tail=","),
         "Internal Energy",
         "",
     ),
     "LS-PrePost, named curve": (
-        "Material Data,Internal Energy\nTime,A12,\n" + table(tail=","),
+        "Material Data,Internal Energy\nTime,A12,\n" + write_rows(tail=","),
         "A12: Internal Energy",
         "",
     ),
     "3DEXPERIENCE": (
-        "Time(s),Energy(J),ALLIE_Global/ALLIE\n" + table(tail=","),
+        "Time(s),Energy(J),ALLIE_Global/ALLIE\n" + write_rows(tail=","),
         "Energy(J): ALLIE_Global/ALLIE",
         "s",
     ),
     "comments": (
-        "# a run\n$ more\n% more\n// more\ntime,IE\n" + table() + "# the end\n",
+        "# a run\n$ more\n% more\n// more\ntime,IE\n" + write_rows() + "# the end\n",
         "IE",
         "",
     ),
     "comments between": (
-        "time,IE\n" + table().replace("\n0.625", "\n# switched\n\n0.625"),
+        "time,IE\n" + write_rows().replace("\n0.625", "\n# switched\n\n0.625"),
         "IE",
         "",
     ),
@@ -129,19 +137,19 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
         "",
     ),
     "names in a comment": (
-        "# run 7\n# time internal_energy\n" + table(" "),
+        "# run 7\n# time internal_energy\n" + write_rows(" "),
         "internal_energy",
         "",
     ),
-    "a comment that is no names": ("# box, drop\n" + table(), "column 2", ""),
-    "a title": ("Run seven\n" + table(), "column 2: Run seven", ""),
+    "a comment that is no names": ("# box, drop\n" + write_rows(), "column 2", ""),
+    "a title": ("Run seven\n" + write_rows(), "column 2: Run seven", ""),
     "quotes": (
-        '"time","part 1, IE"\n' + table().replace("2.75", '"2.75"'),
+        '"time","part 1, IE"\n' + write_rows().replace("2.75", '"2.75"'),
         "part 1, IE",
         "",
     ),
-    "a line end inside a name": ('"time","part\nIE"\n' + table(), "part IE", ""),
-    "blank lines at the end": ("time,IE\n" + table() + "\n\n", "IE", ""),
+    "a line end inside a name": ('"time","part\nIE"\n' + write_rows(), "part IE", ""),
+    "blank lines at the end": ("time,IE\n" + write_rows() + "\n\n", "IE", ""),
     "no line end, digits told": (
         "time,IE\n0.00,1.500\n0.25,2.750\n0.625,-3.125",
         "IE",
@@ -206,7 +214,7 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario(name: str) -> None:
     text, channel, unit = SCENARIOS[name]
-    history = read(text)
+    history = read_table(text)
     assert history.time.tolist() == TIMES
     assert history.energy.tolist() == ENERGIES
     assert (history.channel, history.time_unit, history.format) == (
@@ -238,14 +246,14 @@ FOUR = "time_s,boxIE_J,stepIE_J,KE\n0,1,10,5\n1,2,20,6\n2,4,40,7\n"
 def test_columns_by_name_and_number(
     text: str, asked: list[str], channel: str, energy: list[float]
 ) -> None:
-    history = read(text, *asked)
+    history = read_table(text, *asked)
     assert history.channel == channel
     assert history.energy.tolist() == energy
 
 
 def test_the_time_by_name_and_number() -> None:
-    assert read("a,b,IE\n5,0,1\n4,1,2\n", time="b").time.tolist() == [0, 1]
-    assert read(
+    assert read_table("a,b,IE\n5,0,1\n4,1,2\n", time="b").time.tolist() == [0, 1]
+    assert read_table(
         "Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", "Y2", time="3"
     ).time.tolist() == [5, 6]
 
@@ -257,23 +265,27 @@ SIDE_BY_SIDE = (
 
 def test_curves_side_by_side_have_times_of_their_own() -> None:
     """T/HIS writes them like this; a shorter curve ends in empty cells."""
-    assert states_of(read(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
-    assert states_of(read(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
-    assert read(SIDE_BY_SIDE, "KE").time_precision == Precision(digits=1)
-    assert states_of(read(SIDE_BY_SIDE, "IE", "HE")) == [
+    assert states_of(read_table(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
+    assert states_of(read_table(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
+    assert read_table(SIDE_BY_SIDE, "KE").time_precision == Precision(digits=1)
+    assert states_of(read_table(SIDE_BY_SIDE, "IE", "HE")) == [
         (0, 8),
         (1, 11),
         (2, 13),
         (3, 16),
     ]
     without_names = SIDE_BY_SIDE.partition("\n")[2]
-    assert states_of(read(without_names, "4", time="3")) == [(0, 5), (0.5, 6)]
+    assert states_of(read_table(without_names, "4", time="3")) == [(0, 5), (0.5, 6)]
 
 
 @pytest.mark.parametrize(
     ("text", "asked", "reason"),
     [
-        (SIDE_BY_SIDE, ["IE", "KE"], "'KE' has other times than the first curve"),
+        (
+            SIDE_BY_SIDE,
+            ["IE", "KE"],
+            "the times of 'KE' differ from those of the first requested curve",
+        ),
         (
             SIDE_BY_SIDE.replace("3,6,,,", "3,6,3,7,"),
             ["KE"],
@@ -346,7 +358,7 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
 )
 def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
-        read(text, *asked)
+        read_table(text, *asked)
 
 
 @pytest.mark.parametrize(
@@ -411,7 +423,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
 )
 def test_refused(text: str, reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
-        read(text)
+        read_table(text)
 
 
 @pytest.mark.parametrize(
@@ -420,7 +432,7 @@ def test_refused(text: str, reason: str) -> None:
         (
             "x,y\n0,1\n1,2\n",
             [],
-            "no column has the name of a time; 'x', the first, was taken as the time",
+            "no column has the name of a time; 'x', the first, was used as the time",
         ),
         ("time,IE\n0,5\n0,1\n1,2\n", [], "same printed time"),
         ("time,IE\n0,1\n1,2\n2,3", [], "the last line has no line end and may be cut"),
@@ -432,7 +444,7 @@ def test_refused(text: str, reason: str) -> None:
     ],
 )
 def test_notes_say_what_was_assumed(text: str, asked: list[str], note: str) -> None:
-    history = read(text, *asked)
+    history = read_table(text, *asked)
     assert history.energy.tolist() == [1, 2]
     assert note in history.notes[0]
 
@@ -456,7 +468,7 @@ ROWS = [
     '{},"1.5"',
     "{}",
 ]
-# With a comma and a point as they stand, whatever the table takes them for.
+# With comma and point as in the file, whatever they mean in the table.
 CELLS = [
     "1_0",
     "0x10",
@@ -485,7 +497,7 @@ LINES = [
 
 
 def in_pieces(data: bytes | OnDisk, size: int) -> object:
-    """States of a table that is read in pieces of so many bytes, or what is wrong with it."""
+    """Return the states of a table read in pieces of this size, or its error."""
     try:
         sized = type("Sized", (Text,), {"piece": size, "large": size})
         table = csv_table.Table(sized(Source("table", data)), Selection())
@@ -517,9 +529,9 @@ def in_pieces(data: bytes | OnDisk, size: int) -> object:
 def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     file: Path, lines: list[str], form: tuple[str, str], tail: str, encoding: str
 ) -> None:
-    good = (
-        ["{0},{0}.5"] * 3
-    )  # before and behind: times that step back would hide what is wrong with a cell
+    good = [
+        "{0},{0}.5"
+    ] * 3  # on both sides, since times that step back would hide the error of a cell
     numbered = [
         line.format(number) for number, line in enumerate([*good, *lines, *good])
     ]
@@ -532,14 +544,14 @@ def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     ).encode(encoding)
     one_by_one = data + '# "\n'.encode(encoding).removeprefix(
         b"\xff\xfe"
-    )  # a quote may hold a separator
-    found = [
-        in_pieces(*asked)
-        for asked in ((data, 8), (data, 1 << 17), (one_by_one, 1 << 17))
+    )  # a quoted cell may contain a separator
+    tables = [
+        in_pieces(*arguments)
+        for arguments in ((data, 8), (data, 1 << 17), (one_by_one, 1 << 17))
     ]
-    assert found[0] == found[1] == found[2]
+    assert tables[0] == tables[1] == tables[2]
     file.write_bytes(data)
-    assert [in_pieces(on_disk(file), size) for size in (8, 1 << 17)] == found[:2]
+    assert [in_pieces(on_disk(file), size) for size in (8, 1 << 17)] == tables[:2]
 
 
 HARD = st.floats(allow_nan=False, allow_infinity=False).map(repr) | st.from_regex(
@@ -566,7 +578,7 @@ def test_words_without_numbers_are_refused_by_the_first_lines() -> None:
         FormatError,
         match="'no table at all' and no rows of at least two numbers in the first",
     ):
-        read("no table at all\n" * 20_000)
+        read_table("no table at all\n" * 20_000)
 
 
 @pytest.mark.parametrize(
@@ -580,7 +592,7 @@ def test_words_without_numbers_are_refused_by_the_first_lines() -> None:
 )
 def test_endless_digits_and_endless_rows_take_no_endless_time(text: str) -> None:
     with pytest.raises(FormatError) as error:
-        read(text)
+        read_table(text)
     assert len(str(error.value)) < 600
 
 
@@ -588,13 +600,13 @@ def test_thousands_of_columns_are_read() -> None:
     columns = 5000
     rows = [",".join([str(i), *(str(i + c) for c in range(columns))]) for i in range(3)]
     head = ",".join(["time", "IE", *(f"c{c}" for c in range(columns - 1))])
-    assert read("\n".join([head, *rows, ""])).energy.tolist() == [0, 1, 2]
+    assert read_table("\n".join([head, *rows, ""])).energy.tolist() == [0, 1, 2]
 
 
 @pytest.mark.parametrize("energy", [1e150, 1e-307, -1e150])
 def test_extreme_energies_are_read_without_a_warning(energy: float) -> None:
     text = "".join(f"{i / 10},{energy * (1 + i % 3 / 10)!r}\n" for i in range(20))
-    assert read("time,IE\n" + text).energy[0] == energy
+    assert read_table("time,IE\n" + text).energy[0] == energy
 
 
 @pytest.mark.parametrize(
@@ -627,13 +639,13 @@ def test_extreme_energies_are_read_without_a_warning(energy: float) -> None:
 def test_precision_is_read_off_the_text(
     rows: str, time: Precision, energy: Precision
 ) -> None:
-    history = read(rows)
+    history = read_table(rows)
     assert (history.time_precision, history.energy_precision) == (time, energy)
 
 
 finite = st.floats(
     -1e149, 1e149, allow_subnormal=False
-)  # a history holds no energies beyond 1e150
+)  # a history may not contain energies above 1e150
 FORMS = [
     (",", "."),
     (";", "."),
@@ -664,7 +676,7 @@ def test_what_is_written_is_read_back_bit_for_bit(
     rows = [(float(i), style % a, style % b) for i, (a, b) in enumerate(values)]
     lines = [separator.join(["time", "A", "B"])]
     lines += [separator.join([repr(t), a, b]).replace(".", decimal) for t, a, b in rows]
-    history = read((end.join(lines) + end).encode(encoding), "B")
+    history = read_table((end.join(lines) + end).encode(encoding), "B")
     assert history.time.tolist() == [t for t, _, _ in rows]
     assert history.energy.tolist() == [float(b) for _, _, b in rows]
 
@@ -684,11 +696,13 @@ def test_a_table_cut_anywhere_never_yields_a_wrong_number(
     expected = [(t, float(energy)) for t, energy in rows]
     for cut in range(len(whole)):
         try:
-            history = read(whole[:cut])
+            history = read_table(whole[:cut])
         except FormatError:
             continue
-        found = list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
-        assert found == expected[: len(found)]
+        states_read = list(
+            zip(history.time.tolist(), history.energy.tolist(), strict=True)
+        )
+        assert states_read == expected[: len(states_read)]
 
 
 @pytest.mark.parametrize(
@@ -708,26 +722,26 @@ def test_a_table_cut_inside_its_first_row_has_that_row_or_none(
 ) -> None:
     for cut in range(len(row) + 1):
         with contextlib.suppress(FormatError):
-            found = read(head + row[:cut])
-            assert (found.time.tolist(), found.energy.tolist()) in (
+            history = read_table(head + row[:cut])
+            assert (history.time.tolist(), history.energy.tolist()) in (
                 ([0.5], [12.25]),
                 ([], []),
             )
-            assert found.complete or (
-                found.time.size == 0 and any("cut" in note for note in found.notes)
+            assert history.complete or (
+                history.time.size == 0 and any("cut" in note for note in history.notes)
             )
-    assert read(f"{head}{row}\n").energy.tolist() == [12.25]
+    assert read_table(f"{head}{row}\n").energy.tolist() == [12.25]
 
 
 @pytest.mark.parametrize(
     ("rows", "states"),
     [
-        ("0,1.00\n1,2.50\n2,3.75", 3),  # two decimals, as always
+        ("0,1.00\n1,2.50\n2,3.75", 3),  # always two decimals, so the number is whole
         ("0,1.00\n1,2.50\n2,3.7", 2),
-        ("0,1.25\n1,2.75\n2,3.75", 2),  # may be %g, and the value 3.751
+        ("0,1.25\n1,2.75\n2,3.75", 2),  # the format may be %g, and the value 3.751
         ("0,1.00e+00\n1,2.50e+00\n2,3.75e-01", 3),
         ("0,1.00e+00\n1,2.50e+00\n2,3.75e-1", 2),
-        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-10", 2),  # may be e-100
+        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-10", 2),  # may be cut from e-100
         ("0,1\n1,2\n2,3", 2),
         ("0,1,\n1,2,\n2,3,", 3),
         ("time,IE,KE\n0,1,9\n1,2,9\n2,3,", 3),
@@ -737,7 +751,7 @@ def test_a_table_cut_inside_its_first_row_has_that_row_or_none(
 def test_a_last_line_without_end_counts_when_it_is_whole_for_sure(
     rows: str, states: int
 ) -> None:
-    history = read(rows)
+    history = read_table(rows)
     assert history.time.size == states
     assert history.complete is (states == 3)
 
@@ -747,4 +761,4 @@ def test_a_last_line_without_end_counts_when_it_is_whole_for_sure(
 @example("\t0\n")  # nothing in the only column that is read
 def test_no_text_raises_anything_else(text: str) -> None:
     with contextlib.suppress(FormatError):
-        read(text)
+        read_table(text)

@@ -57,7 +57,7 @@ CHANNELS = {
 }
 
 
-def read(text: str, *energy: str, time: str | None = None) -> History:
+def read_curves(text: str, *energy: str, time: str | None = None) -> History:
     return history_of(csv_table, text, selection=Selection(time, energy), name="curves")
 
 
@@ -69,20 +69,26 @@ def test_each_curve_has_its_own_times(form: str, end: str) -> None:
     assert run_of(csv_table, text, selection=Selection(energy=("2",))).databases[
         0
     ].channels == (first, second)
-    history = read(text, "1")
+    history = read_curves(text, "1")
     assert (history.channel, states_of(history), history.complete) == (
         first,
         FIRST,
         True,
     )
-    assert states_of(read(text, second.upper())) == states_of(read(text, "2")) == SECOND
-    with pytest.raises(FormatError, match="has other times than the first curve"):
-        read(text, "1", "2")
+    assert (
+        states_of(read_curves(text, second.upper()))
+        == states_of(read_curves(text, "2"))
+        == SECOND
+    )
+    with pytest.raises(
+        FormatError, match="differ from those of the first requested curve"
+    ):
+        read_curves(text, "1", "2")
 
 
 @pytest.mark.parametrize("form", ["T/HIS", "DYNAFORM"])
 def test_the_internal_energy_is_taken_by_default(form: str) -> None:
-    assert states_of(read(TEXTS[form])) == FIRST
+    assert states_of(read_curves(TEXTS[form])) == FIRST
 
 
 @pytest.mark.parametrize("form", TEXTS)
@@ -92,32 +98,32 @@ def test_a_single_curve_needs_no_name(form: str) -> None:
         "T/HIS": "CONTINUE",
         "DYNAFORM": "2 'Kin",
     }
-    history = read(
+    history = read_curves(
         TEXTS[form].partition(ends[form])[0].replace("Internal Energy", "Heat")
     )
     assert states_of(history) == FIRST
 
 
 def test_what_the_labels_say() -> None:
-    history = read(CURVEPLOT, "1")
+    history = read_curves(CURVEPLOT, "1")
     assert history.time_unit == "ms"
     assert (history.time_precision, history.energy_precision) == (
         Precision(digits=11),
         Precision(digits=11),
     )
     assert (
-        "'Displacement'; it was taken for the time"
-        in read(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
+        "'Displacement'; it was used as the time"
+        in read_curves(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
     )
-    assert "not an internal energy by its name" in read(CURVEPLOT, "2").notes[0]
+    assert "not an internal energy by its name" in read_curves(CURVEPLOT, "2").notes[0]
 
 
 def test_a_curve_has_its_own_times_and_no_others() -> None:
-    assert states_of(read(CURVEPLOT, "1", time="Time")) == FIRST
+    assert states_of(read_curves(CURVEPLOT, "1", time="Time")) == FIRST
     with pytest.raises(
         FormatError, match="each curve has its own times; leave `time` '2' out"
     ):
-        read(CURVEPLOT, "1", time="2")
+        read_curves(CURVEPLOT, "1", time="2")
 
 
 @pytest.mark.parametrize("form", TEXTS)
@@ -127,10 +133,10 @@ def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
         text = TEXTS[form][:cut]
         for number, true in (("1", FIRST), ("2", SECOND)):
             with contextlib.suppress(FormatError):
-                history = read(text, number)
-                found = states_of(history)
-                assert found == true[: len(found)]
-                counts.add((number, len(found)))
+                history = read_curves(text, number)
+                states_read = states_of(history)
+                assert states_read == true[: len(states_read)]
+                counts.add((number, len(states_read)))
                 assert history.complete or history.notes
     assert counts >= {("1", 1), ("1", 2), ("1", 3), ("2", 1)}
 
@@ -141,7 +147,7 @@ def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
 )
 def test_no_text_raises_anything_else(text: str, form: str) -> None:
     with contextlib.suppress(FormatError):
-        read(TEXTS[form][:90] + text + TEXTS[form][90:])
+        read_curves(TEXTS[form][:90] + text + TEXTS[form][90:])
 
 
 COUNTED = "3\n0.0, 1.5\n 0.25 2.75\n0.625, -3.125\n"
@@ -149,14 +155,17 @@ PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
 
 
 def test_pairs_below_their_count_are_a_curve() -> None:
-    history = read(COUNTED)
+    history = read_curves(COUNTED)
     assert (states_of(history), history.channel, history.complete) == (
         PAIRS,
         "curve 1",
         True,
     )
-    assert states_of(read(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (0.0, 7.0)
-    history = read(COUNTED.replace("3\n", "4\n"))
+    assert states_of(read_curves(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (
+        0.0,
+        7.0,
+    )
+    history = read_curves(COUNTED.replace("3\n", "4\n"))
     assert (states_of(history), history.complete) == (PAIRS, False)
     assert history.notes == ("the file ends within the curve 1",)
 
@@ -228,7 +237,7 @@ def test_pairs_below_their_count_are_a_curve() -> None:
 )
 def test_refused(text: str, energy: list[str], reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
-        read(text, *energy)
+        read_curves(text, *energy)
 
 
 OASYS = """\
@@ -253,7 +262,7 @@ Whole model
 
 @pytest.mark.parametrize("title", ["Drop of a case\n", "\n"])
 def test_labels_of_the_oasys_programs_have_types_and_factors(title: str) -> None:
-    history = read(OASYS.replace("Drop of a case\n", title))
+    history = read_curves(OASYS.replace("Drop of a case\n", title))
     assert (history.channel, history.time_unit) == (
         "Whole model: Internal energy",
         "ms",
@@ -265,4 +274,4 @@ def test_labels_of_the_oasys_programs_have_types_and_factors(title: str) -> None
 
 
 def test_a_type_without_factor_says_no_unit() -> None:
-    assert read(OASYS.replace("/0.001", "")).time_unit == ""
+    assert read_curves(OASYS.replace("/0.001", "")).time_unit == ""

@@ -1,4 +1,4 @@
-"""d3plot and d3thdt, as the writer of the tests writes them."""
+"""d3plot and d3thdt files made by the writer of the tests."""
 
 from __future__ import annotations
 
@@ -32,12 +32,14 @@ def put(folder: Path, files: Mapping[str, bytes]) -> Path:
     return folder / next(iter(files))
 
 
-def opened(folder: Path, files: Mapping[str, bytes]) -> Run:
+def open_family(folder: Path, files: Mapping[str, bytes]) -> Run:
     return open_run([str(put(folder, files))])
 
 
-def holds(run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)) -> None:
-    """All that the states tell, in the precision of the file."""
+def assert_holds(
+    run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)
+) -> None:
+    """Assert that a run has these states, in the precision of the file."""
     (database,) = run.databases
     rounded = np.float32 if database.precisions(())[0].digits == 7 else np.float64
 
@@ -72,8 +74,8 @@ def holds(run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)) -> Non
 def test_every_state_of_a_family_is_read(
     width: int, order: str, per_file: int, tmp_path: Path
 ) -> None:
-    run = opened(tmp_path, D3plotWriter(width, order).written(STATES, per_file))
-    holds(run, STATES)
+    run = open_family(tmp_path, D3plotWriter(width, order).written(STATES, per_file))
+    assert_holds(run, STATES)
     assert run.databases[0].complete
     assert not run.notes
     assert [part.title for part in run.parts] == ["roof", "door"]
@@ -88,7 +90,7 @@ def test_states_may_follow_the_titles_in_the_first_file(
 ) -> None:
     writer = D3plotWriter(width)
     files = {"d3plot": writer.together(STATES[:2]), "d3plot01": writer.file(STATES[2:])}
-    holds(opened(tmp_path, files), STATES)
+    assert_holds(open_family(tmp_path, files), STATES)
 
 
 def test_files_are_ordered_by_number_and_left_out_numbers_are_told(
@@ -98,12 +100,15 @@ def test_files_are_ordered_by_number_and_left_out_numbers_are_told(
     names = ["d3plot01", "d3plot02", "d3plot10", "d3plot11", "d3plot100"]
     files = {
         "d3plot": writer.head(),
-        **{name: writer.file([one]) for name, one in zip(names, STATES, strict=True)},
+        **{
+            name: writer.file([state])
+            for name, state in zip(names, STATES, strict=True)
+        },
     }
-    run = opened(tmp_path, files)
-    holds(run, STATES)
+    run = open_family(tmp_path, files)
+    assert_holds(run, STATES)
     assert not run.databases[0].complete
-    assert "of the files behind it 03 to 09, 12 to 99 are not there" in run.notes[0]
+    assert "of the files after it 03 to 09, 12 to 99 are not there" in run.notes[0]
 
 
 @pytest.mark.parametrize("width", [4, 8])
@@ -137,8 +142,8 @@ def test_a_first_file_cut_at_every_byte_is_refused_or_has_no_state() -> None:
 def test_a_state_cut_in_a_file_that_others_follow_is_left_out(tmp_path: Path) -> None:
     files = D3plotWriter().written(STATES, 2)
     files["d3plot01"] = files["d3plot01"][: len(D3plotWriter().state(STATES[0])) + 40]
-    run = opened(tmp_path, files)
-    holds(run, [STATES[0], *STATES[2:]])
+    run = open_family(tmp_path, files)
+    assert_holds(run, [STATES[0], *STATES[2:]])
     assert run.notes == (
         f"{tmp_path / 'd3plot01'}: the file ends within state 2, which was left out; is the run still writing?",
     )
@@ -156,7 +161,7 @@ def test_a_run_that_still_writes_gives_more_each_time(tmp_path: Path) -> None:
     for count in range(1, len(STATES) + 1):
         last.write_bytes(writer.file(STATES[:count], ended=False).rstrip(b"\0"))
         run = open_run([str(first)])
-        holds(run, STATES[:count])
+        assert_holds(run, STATES[:count])
         assert not run.databases[0].complete
     last.write_bytes(writer.file(STATES))
     assert open_run([str(first)]).databases[0].complete
@@ -169,25 +174,25 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
         "d3plot01": writer.file(STATES[:3]),
         "d3plot02": writer.file(later),
     }
-    run = opened(tmp_path, files)
+    run = open_family(tmp_path, files)
     assert run.databases[0].time.tolist() == [0.0, 0.5, 0.75, 2.0, 3.0]
     assert any("newer" in note for note in run.notes)
 
 
 @pytest.mark.parametrize("name", ["R712", " R12"])
 def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
-    """Of all releases that are named so the number says 960, and their walls have places all the same."""
-    run = opened(
+    """All releases with such a name have the number 960, yet the states contain positions of rigid walls."""
+    run = open_family(
         tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2)
     )
-    holds(run, STATES)
+    assert_holds(run, STATES)
     for wall in (1, 2):
-        found = run.databases[0].channel(f"rigid_wall_{wall}_force")
-        assert found.tolist() == [7.0 * number + wall - 1 for number in range(1, 6)]
+        forces = run.databases[0].channel(f"rigid_wall_{wall}_force")
+        assert forces.tolist() == [7.0 * number + wall - 1 for number in range(1, 6)]
 
 
 def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
-    """A deleted part has neither mass nor energy, whatever velocity is left of it."""
+    """A deleted part has neither mass nor energy, even if the file still has a velocity of it."""
     gone = State(
         2.5,
         [4.0, 0.0],
@@ -197,12 +202,12 @@ def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
         [0.0, 0.0],
         [0, 0, 0],
     )
-    run = opened(tmp_path, D3plotWriter().written([*STATES, gone], 3))
-    holds(run, [*STATES, gone])
+    run = open_family(tmp_path, D3plotWriter().written([*STATES, gone], 3))
+    assert_holds(run, [*STATES, gone])
     assert run.databases[0].part_channel("x_momentum", [3])[-1, 0] == 0
 
 
-# What the geometry and the states may have besides: control words, sections, and more words of a state.
+# Optional contents of a d3plot: control words, sections of the geometry, and further words of a state.
 LAYOUTS = {
     "rigid shells": ({"ndim": 5, "maxint": 3}, {"control": [1, 2, 24, 20]}, -9),
     "fluid materials": ({"ialemat": 2}, {"control": [1, 2]}, 0),
@@ -246,15 +251,17 @@ LAYOUTS = {
 
 @pytest.mark.parametrize("kind", LAYOUTS)
 def test_what_a_model_has_besides_is_passed_over(kind: str, tmp_path: Path) -> None:
-    control, sections, more = LAYOUTS[kind]
-    writer = D3plotWriter(control=control, sections=sections, more_of_state=more)
-    holds(opened(tmp_path, writer.written(STATES, 2)), STATES)
+    control, sections, words_after_state = LAYOUTS[kind]
+    writer = D3plotWriter(
+        control=control, sections=sections, more_of_state=words_after_state
+    )
+    assert_holds(open_family(tmp_path, writer.written(STATES, 2)), STATES)
 
 
 def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
     often = states([0.1 * number for number in range(30)])
-    run = opened(tmp_path, D3plotWriter(family=3).written(often, 4, "d3thdt"))
-    holds(run, often)
+    run = open_family(tmp_path, D3plotWriter(family=3).written(often, 4, "d3thdt"))
+    assert_holds(run, often)
     assert run.databases[0].format == "d3thdt"
     put(tmp_path, D3plotWriter().written(STATES))
     assert open_run([str(tmp_path)]).databases[0].time.size == len(often)
@@ -262,31 +269,34 @@ def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("release", [960.0, 971.0])
 def test_older_files_have_fewer_values(release: float, tmp_path: Path) -> None:
-    """Before 971 a rigid wall has its force alone; still older files have no hourglass energy of parts."""
-    made = [
+    """Before release 971 a rigid wall has only its force; even older files have no hourglass energy of parts."""
+    old_states = [
         State(
             **{
-                **vars(one),
+                **vars(state),
                 "walls": [3.0, 4.0] if release < 971 else [3.0, 4.0, *[0.0] * 6],
             }
         )
-        for one in STATES
+        for state in STATES
     ]
-    run = opened(
-        tmp_path, D3plotWriter(walls=2, name="    ", release=release).written(made)
+    run = open_family(
+        tmp_path,
+        D3plotWriter(walls=2, name="    ", release=release).written(old_states),
     )
     assert run.databases[0].channel("rigid_wall_2_force").tolist() == [4.0] * 5
-    made = [State(**{**vars(one), "hourglass": []}) for one in STATES]
-    run = opened(tmp_path / "older", D3plotWriter(values_of_part=6).written(made))
+    old_states = [State(**{**vars(state), "hourglass": []}) for state in STATES]
+    run = open_family(
+        tmp_path / "older", D3plotWriter(values_of_part=6).written(old_states)
+    )
     assert run.databases[0].part_channel("mass", [3])[:, 0].tolist() == [5.0] * 5
     with pytest.raises(FormatError, match="no hourglass_energy of parts"):
         run.databases[0].part_channel("hourglass_energy", [3])
 
 
 def test_parts_without_a_list_of_ids_have_those_of_their_titles(tmp_path: Path) -> None:
-    run = opened(tmp_path, D3plotWriter(numbered=False).written(STATES))
-    holds(run, STATES)
-    run = opened(
+    run = open_family(tmp_path, D3plotWriter(numbered=False).written(STATES))
+    assert_holds(run, STATES)
+    run = open_family(
         tmp_path / "untitled", D3plotWriter(numbered=False, titles=()).written(STATES)
     )
     assert [part.id for part in run.parts] == [1, 2]
@@ -295,7 +305,7 @@ def test_parts_without_a_list_of_ids_have_those_of_their_titles(tmp_path: Path) 
 def test_values_that_fit_no_number_of_parts_are_not_given_to_parts(
     tmp_path: Path,
 ) -> None:
-    run = opened(
+    run = open_family(
         tmp_path, D3plotWriter(control={"nglbv": 19}, more_of_state=-1).written(STATES)
     )
     assert run.databases[0].channel("kinetic_energy").size == 5
@@ -311,19 +321,19 @@ def test_states_of_another_length_than_the_head_says_are_refused(
     files = D3plotWriter(more_of_state=5).written(STATES, 5)
     reason = r"d3plot01: its states are \d+ bytes together, one of \d+ bytes each by the head; that layout is not known"
     with pytest.raises(FormatError, match=reason):
-        opened(tmp_path, files)
+        open_family(tmp_path, files)
 
 
 def test_times_that_are_none_are_refused(tmp_path: Path) -> None:
     files = D3plotWriter(more_of_state=5).written(STATES, 5)
     files["d3plot01"] = files["d3plot01"].rstrip(b"\0")[
         :-4
-    ]  # without the mark, which would tell
+    ]  # without the end mark, by which the wrong length of the states would be found first
     with pytest.raises(
         FormatError,
-        match=r"d3plot01: a state was expected at byte \d+, with a time above that of the one",
+        match=r"d3plot01: a state was expected at byte \d+, with a time above that of the state",
     ):
-        opened(tmp_path, files)
+        open_family(tmp_path, files)
 
 
 def test_a_geometry_that_does_not_end_where_the_head_says_is_refused(
@@ -333,7 +343,7 @@ def test_a_geometry_that_does_not_end_where_the_head_says_is_refused(
         FormatError,
         match=r"it has no end of the geometry at byte \d+, where its head says",
     ):
-        opened(tmp_path, D3plotWriter(sections={"ids": [0, 0, 0]}).written(STATES))
+        open_family(tmp_path, D3plotWriter(sections={"ids": [0, 0, 0]}).written(STATES))
 
 
 def test_ids_that_do_not_fit_their_section_are_refused(tmp_path: Path) -> None:
@@ -341,12 +351,14 @@ def test_ids_that_do_not_fit_their_section_are_refused(tmp_path: Path) -> None:
         FormatError,
         match=r"it has a section of ids of \d+ words, not of \d+; the file is damaged",
     ):
-        opened(tmp_path, D3plotWriter(control={"narbs": 40}).written(STATES))
+        open_family(tmp_path, D3plotWriter(control={"narbs": 40}).written(STATES))
 
 
 def test_packed_families_are_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="packed by femzip; unpack it"):
-        opened(tmp_path, D3plotWriter(control={"nmmat": 76_893_465}).written(STATES))
+        open_family(
+            tmp_path, D3plotWriter(control={"nmmat": 76_893_465}).written(STATES)
+        )
 
 
 def test_a_file_behind_the_first_is_not_read_alone(tmp_path: Path) -> None:
@@ -367,12 +379,15 @@ def test_a_family_is_the_same_however_it_is_named(
     put(tmp_path, D3plotWriter().written(STATES))
     monkeypatch.chdir(tmp_path)
     run = open_run(names)
-    holds(run, STATES)
+    assert_holds(run, STATES)
     assert len(run.files) == 6
 
 
 def test_a_job_has_its_name_before_that_of_the_family(tmp_path: Path) -> None:
-    holds(opened(tmp_path, D3plotWriter().written(STATES, name="run7.d3plot")), STATES)
+    assert_holds(
+        open_family(tmp_path, D3plotWriter().written(STATES, name="run7.d3plot")),
+        STATES,
+    )
 
 
 def test_two_families_of_one_run_are_its_legs(tmp_path: Path) -> None:
@@ -448,22 +463,22 @@ def test_a_level_that_too_few_states_show_is_told(
 ) -> None:
     time = np.arange(60.0)
     energy = 2 + np.cos(2 * np.pi * time / per_period + 0.3)
-    made = [
+    states = [
         State(t, [1.0], [e], [[1.0, 0, 0]], [2.0], [0.0], [0, 0, 0])
         for t, e in zip(time, energy, strict=True)
     ]
-    first = put(tmp_path, D3plotWriter(ids=(1,), titles=()).written(made, 10))
+    first = put(tmp_path, D3plotWriter(ids=(1,), titles=()).written(states, 10))
     suggestion = suggest(read(str(first)), td=40.5, after=3.0)
-    told = [
+    messages = [
         caution.message
         for caution in suggestion.cautions
         if caution.code == "few-states"
     ]
-    assert bool(told) == is_told
-    if told:
-        assert told[0].startswith(
+    assert bool(messages) == is_told
+    if messages:
+        assert messages[0].startswith(
             "38 states of the d3plot up to td = 40.5 do not show how the energy swings"
         )
-        assert told[0].endswith(
+        assert messages[0].endswith(
             "name what was written more often: d3thdt, glstat, matsum, binout"
         )

@@ -1,4 +1,4 @@
-"""Damaged binouts and time histories: an error of ours or true numbers, never shifted ones, never a crash.
+"""Damaged binouts and time histories: an error of d2rpick or true numbers, never shifted ones, never a crash.
 
 Structure is damaged at every byte and by hypothesis.  Damage of the numbers themselves cannot be found by anyone and is
 not tried.
@@ -26,21 +26,21 @@ from tests.made_binout import Style, binout
 
 @pytest.mark.parametrize("tables", [True, False])
 def test_a_binout_cut_at_any_byte_keeps_its_whole_states(tables: bool) -> None:
-    made = binout(range(1, STATES + 1), PARTS, tables=tables)
-    data = bytes(made.data)
+    writer = binout(range(1, STATES + 1), PARTS, tables=tables)
+    data = bytes(writer.data)
     states = [
         mark
-        for mark in made.marks
+        for mark in writer.marks
         if data[mark + 8] == 2 and b"/glstat/d" in data[mark : mark + 25]
     ]
     assert true_binout(data) == [(STATES, True)] * 5
     for cut in some(range(len(data))):
         whole = sum(
             state < cut for state in states[1:]
-        )  # the state before one that began is whole
-        found = true_binout(data[:cut])
-        assert all(count >= whole for count, _ in found)
-        assert len(found) == 5 or whole < 2
+        )  # a state is whole once the next one has begun
+        states_read = true_binout(data[:cut])
+        assert all(count >= whole for count, _ in states_read)
+        assert len(states_read) == 5 or whole < 2
 
 
 @pytest.mark.parametrize(("name", "least"), [("T01", 0), ("T01 as text", 1)])
@@ -53,10 +53,12 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states(
     for cut in sorted(
         {*some(range(len(file.data)), 23), *file.made.marks, len(file.data)}
     ):
-        whole, rest = divmod(cut - begin, stride)
-        found = file.true(file.data[:cut])
-        # a text that is a head alone, behind which a record begins, may be refused
-        assert found == [(whole, rest == 0)] * 6 or (found == [] and whole < least)
+        whole, bytes_left = divmod(cut - begin, stride)
+        states_read = file.true(file.data[:cut])
+        # a text may be refused if it is a head only, after which a record begins
+        assert states_read == [(whole, bytes_left == 0)] * 6 or (
+            states_read == [] and whole < least
+        )
 
 
 @pytest.mark.parametrize("flip", [0x01, 0x02, 0x04, 0x08, 0x10, 0x20, 0x40, 0x80, 0xFF])
@@ -66,10 +68,10 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states(
 def test_any_byte_of_structure_may_be_wrong(name: str, flip: int) -> None:
     file = FILES[name]
     data = bytearray(file.data)
-    for place in some(file.structure[flip % 7 :], 37):
-        data[place] ^= flip
+    for address in some(file.structure[flip % 7 :], 37):
+        data[address] ^= flip
         file.true(bytes(data))
-        data[place] ^= flip
+        data[address] ^= flip
 
 
 @pytest.mark.parametrize("states", [1, 3])
@@ -77,10 +79,10 @@ def test_any_byte_of_structure_may_be_wrong(name: str, flip: int) -> None:
 def test_bytes_inserted_into_a_value_or_lost_from_it_shift_no_number(
     states: int, change: int
 ) -> None:
-    """The record before the place where the records break is the one that is damaged."""
-    made = binout(range(1, states + 1), PARTS, tables=False)
-    data = bytes(made.data)
-    for begin, end in pairwise([*made.marks, len(data)]):
+    """The damaged record is the one before the address at which the records cannot be followed any more."""
+    writer = binout(range(1, states + 1), PARTS, tables=False)
+    data = bytes(writer.data)
+    for begin, end in pairwise([*writer.marks, len(data)]):
         if data[begin + 8] == 3 and end < len(data):
             middle = end - 4
             true_binout(

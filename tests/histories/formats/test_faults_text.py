@@ -1,4 +1,4 @@
-"""Damaged glstat and matsum: an error of ours, or the numbers that a plain reader finds in the lines."""
+"""Damaged glstat and matsum: an error of d2rpick, or the numbers that a plain reader finds in the lines."""
 
 import re
 
@@ -34,12 +34,12 @@ def borders(text: bytes, start: bytes) -> list[int]:
 
 
 def legs(text: bytes) -> int:
-    """How many states may be left out: the last one before each head, and of the file."""
+    """Return how many states may be left out: the last one before each head, and the last one of the file."""
     return 1 + text.count(b"ls-dyna") - (b"ls-dyna" in b"".join(text.split(b"\n")[1:2]))
 
 
 def check_glstat(faults: list[Fault]) -> bool:
-    """Whether the damaged file could be read."""
+    """Return True if the damaged file could be read."""
     text = damage(GLSTAT, faults, borders(GLSTAT, b" dt of cycle"))
     states = glstat_states(text)
     try:
@@ -47,9 +47,9 @@ def check_glstat(faults: list[Fault]) -> bool:
         energy = run.channel("internal energy").tolist()
     except FormatError:
         return False
-    found = list(zip(run.time.tolist(), energy, strict=True))
-    assert is_within(found, states), (found, states)
-    assert len(found) >= len(states) - legs(text), (found, states)
+    states_read = list(zip(run.time.tolist(), energy, strict=True))
+    assert is_within(states_read, states), (states_read, states)
+    assert len(states_read) >= len(states) - legs(text), (states_read, states)
     assert run.complete or run.notes
     return True
 
@@ -68,18 +68,18 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
             continue
         readable += 1
         for column, id_ in enumerate(ids):
-            found = [
+            states_read = [
                 (time, row[column])
                 for time, row in zip(run.part_time.tolist(), energies, strict=True)
             ]
             states = matsum_states(text, id_)
-            # Of a part read alone the lines are compared, not those of other parts that may bear its number.
-            assert is_within(found, states, most=1 if ids == IDS else 2), (
+            # If one part is read, only its lines are compared, not those of other parts that may have its number.
+            assert is_within(states_read, states, most=1 if ids == IDS else 2), (
                 id_,
-                found,
+                states_read,
                 states,
             )
-            assert len(found) >= len(states) - legs(text), (found, states)
+            assert len(states_read) >= len(states) - legs(text), (states_read, states)
         assert run.complete or run.notes
     return readable > 0
 
@@ -98,7 +98,7 @@ def test_matsum(lines: int, faults: list[Fault]) -> None:
 
 
 def test_a_first_line_longer_than_any_is_no_fault() -> None:
-    """As a disk leaves it that lost a block of its bytes."""
+    """A file of which the disk lost a block of bytes."""
     text = MATSUM[3]
     second = borders(text, b" time =")[1]
     blank = text[: second + 10] + bytes(1400) + text[second + 1410 :]
@@ -113,7 +113,7 @@ def test_a_first_line_longer_than_any_is_no_fault() -> None:
 def test_states_of_glstat_that_were_blanked_from_line_to_like_line_are_not_lost_silently(
     byte: bytes, line: bytes
 ) -> None:
-    """What is left between two of the same lines is a state with all lines, one of them very long."""
+    """If bytes between two equal lines are lost, the rest is a state with all lines, one of them very long."""
     first, last = (borders(GLSTAT, line)[state] for state in (2, 5))
     for inside in (0, 20):
         blank = (
@@ -143,7 +143,7 @@ def test_states_of_matsum_that_were_blanked_from_line_to_like_line_are_not_lost_
 
 
 def test_a_fragment_of_another_state_is_refused() -> None:
-    """Lines of one state that end up in another leave a name twice, or a line that has lost some of its columns."""
+    """If lines of one state get into another, a name occurs twice, or a line lacks some of its columns."""
     states = GLSTAT.split(b" dt of cycle")
     energy = states[4].index(b" internal energy")
     torn = states[4][: energy + 27] + states[2][states[2].index(b" hourglass") :]

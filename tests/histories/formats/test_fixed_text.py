@@ -1,4 +1,4 @@
-"""Numbers taken while blocks are compared are those that are fetched by themselves, in damaged files too."""
+"""Numbers copied while blocks are compared are those that are read alone, in damaged files too."""
 
 import re
 from collections.abc import Callable
@@ -15,12 +15,12 @@ from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import HEAD, glstat_blocks, glstat_text, matsum_text
 
 IDS = [1, 20, 300]
-Sizes = dict[str, int]  # how many blocks and numbers are looked at together
+Sizes = dict[str, int]  # numbers of blocks and fields that are read together
 
 
 @st.composite
 def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
-    """States of which some numbers never change, with a few bytes replaced, lost or put in; maybe cut."""
+    """States of which some numbers never change, with a few bytes replaced, lost or inserted, and perhaps cut."""
     states = draw(st.integers(1, 12))
     energies = np.random.default_rng(draw(st.integers(0, 99))).normal(
         size=(states, len(IDS))
@@ -33,13 +33,15 @@ def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
         matsum_text(time, IDS, energies) if parts else glstat_text(time, energies[:, 0])
     )
     numbers = [
-        one.end() - 6
-        for one in re.finditer(rb"(inten=|internal energy|time[. ]).*?E[+-]\d\d", text)
+        match.end() - 6
+        for match in re.finditer(
+            rb"(inten=|internal energy|time[. ]).*?E[+-]\d\d", text
+        )
     ]
     anywhere = st.integers(len(text) // 3, len(text))
-    for place in draw(st.lists(st.sampled_from(numbers) | anywhere, max_size=3)):
+    for position in draw(st.lists(st.sampled_from(numbers) | anywhere, max_size=3)):
         new = draw(st.sampled_from([b"*", b"7", b"", b"\n", b" 1 "]))
-        text[place : place + len(new) + draw(st.sampled_from([0, 0, 0, 1]))] = new
+        text[position : position + len(new) + draw(st.sampled_from([0, 0, 0, 1]))] = new
     return bytes(
         text[: draw(st.integers(len(text) // 2, len(text)))]
         if draw(st.booleans())
@@ -58,23 +60,23 @@ def energies_of_model(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
 
 def energies_of_parts(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
     run = type("Sized", (Matsum,), sizes)(data, "matsum")
-    asked = ([20], IDS, IDS[::-1])
+    id_lists = ([20], IDS, IDS[::-1])
     return run.part_time.tobytes(), *(
-        run.part_channel("internal_energy", ids).tobytes() for ids in asked
+        run.part_channel("internal_energy", ids).tobytes() for ids in id_lists
     )
 
 
 def answer(
     read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes
 ) -> object:
-    """What is read; None where it is refused, for whichever of several damages."""
+    """Return what is read; None if it is refused, for any of the damages."""
     try:
         return read(data, sizes)
     except FormatError:
         return None
 
 
-# Where these blocks are many, numbers are taken ahead.
+# Numbers are copied in advance only from runs of many blocks.
 SIZES = st.fixed_dictionaries({"many": st.integers(1, 4), "batch": st.integers(1, 12)})
 
 
@@ -89,7 +91,7 @@ def test_numbers_of_a_matsum(data: bytes, sizes: Sizes) -> None:
 
 
 class Noted(Content):
-    """Bytes that remember how many fields were taken out of them."""
+    """A content that counts how many fields are read from it."""
 
     taken = 0
 
@@ -105,7 +107,7 @@ def test_what_is_taken_ahead_is_not_fetched() -> None:
     assert run.channel("internal energy").tolist() == (states**2).tolist()
     assert (
         data.taken == 4
-    )  # of the springs, which never change, and of the last state, behind which no other begins
+    )  # numbers of the springs, which never change, and of the last state, which no other follows
 
 
 def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> (
@@ -122,16 +124,16 @@ def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alo
     run = Glstat(sound, "glstat", ["internal energy"])
     run.channel("external work")
     once = sound.taken
-    found = {name: run.channel(name).tolist() for name in run.channels}
+    columns = {name: run.channel(name).tolist() for name in run.channels}
     assert sound.taken == once
     hurt = Glstat(damaged, "glstat", ["internal energy"])
     with pytest.raises(
         FormatError, match=r"'external work' is '\*\.00000E\+00', a number"
     ):
         hurt.channel("external work")
-    others = [name for name in hurt.channels if name != "external work"]
-    assert {name: hurt.channel(name).tolist() for name in others} == {
-        name: found[name] for name in others
+    sound_names = [name for name in hurt.channels if name != "external work"]
+    assert {name: hurt.channel(name).tolist() for name in sound_names} == {
+        name: columns[name] for name in sound_names
     }
 
 
@@ -180,8 +182,8 @@ def test_numbers_are_those_of_float_bit_for_bit(
     )
 )
 def test_odd_fields_are_float_or_nan(texts: list[str]) -> None:
-    found = decode(np.array([text.encode() for text in texts]), 5)
-    for text, value in zip(texts, found.tolist(), strict=True):
+    numbers = decode(np.array([text.encode() for text in texts]), 5)
+    for text, value in zip(texts, numbers.tolist(), strict=True):
         plain = text.lower().replace("d", "e")
         try:
             expected = float(plain)

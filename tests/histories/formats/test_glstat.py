@@ -64,7 +64,7 @@ WHOLE = HEAD + "".join(
 )
 
 
-def read(text: str | bytes, *energy: str) -> History:
+def read_glstat(text: str | bytes, *energy: str) -> History:
     return history_of(glstat, text, selection=Selection(energy=energy), name="glstat")
 
 
@@ -146,7 +146,7 @@ SCENARIOS = {
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario(name: str) -> None:
     text, expected = SCENARIOS[name]
-    history = read(text)
+    history = read_glstat(text)
     assert states_of(history) == [tuple(map(float, state)) for state in expected]
     assert history.channel == "internal energy"
     assert history.format == "glstat"
@@ -155,16 +155,17 @@ def test_scenario(name: str) -> None:
 
 
 def test_notes_say_what_was_left_out() -> None:
-    assert read(WHOLE).notes == ()
-    assert "no head" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
+    assert read_glstat(WHOLE).notes == ()
+    assert "no head" in read_glstat(WHOLE[WHOLE.index(" time step") :]).notes[0]
     assert (
-        "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
+        "same printed time"
+        in read_glstat(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
     )
     assert (
         "a leg of the run ends within the state of line 29"
-        in read(SCENARIOS[KILLED][0]).notes[0]
+        in read_glstat(SCENARIOS[KILLED][0]).notes[0]
     )
-    assert "kinetic" in read(WHOLE, "kinetic energy").notes[0]
+    assert "kinetic" in read_glstat(WHOLE, "kinetic energy").notes[0]
 
 
 def test_a_head_alone_is_a_legal_file_without_states() -> None:
@@ -193,7 +194,7 @@ def test_a_head_alone_is_a_legal_file_without_states() -> None:
     ],
 )
 def test_other_labels(asked: list[str], channel: str, expected: float) -> None:
-    history = read(WHOLE, *asked)
+    history = read_glstat(WHOLE, *asked)
     assert history.channel == channel
     assert history.energy.tolist() == [expected] * 3
 
@@ -251,7 +252,7 @@ REFUSED = {
 def test_refused(name: str) -> None:
     text, reason = REFUSED[name]
     with pytest.raises(FormatError, match=reason):
-        read(text)
+        read_glstat(text)
 
 
 @pytest.mark.parametrize(
@@ -271,12 +272,12 @@ def test_refused(name: str) -> None:
 )
 def test_labels_that_cannot_be_taken(asked: list[str], reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
-        read(WHOLE, *asked)
+        read_glstat(WHOLE, *asked)
 
 
 def test_other_lines_of_a_damaged_state_are_still_good() -> None:
     assert (
-        read(
+        read_glstat(
             WHOLE.replace("   1.36945E-05", "           NaN"), "kinetic energy"
         ).time.size
         == 3
@@ -286,18 +287,18 @@ def test_other_lines_of_a_damaged_state_are_still_good() -> None:
 @pytest.mark.parametrize("energy", ["internal energy", "added mass"])
 def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
     whole = WHOLE.encode()
-    expected = states_of(read(whole, energy))
+    expected = states_of(read_glstat(whole, energy))
     outcomes: set[str | int] = set()
     for cut in cuts(whole):
         try:
-            history = read(whole[:cut], energy)
+            history = read_glstat(whole[:cut], energy)
         except FormatError:
             outcomes.add("error")
             continue
-        found = states_of(history)
-        assert found == expected[: len(found)]
-        outcomes.add(len(found))
-        # All that lies between two whole lines is told from a whole file by nothing but the missing lines.
+        states_read = states_of(history)
+        assert states_read == expected[: len(states_read)]
+        outcomes.add(len(states_read))
+        # A file cut between two lines differs from a whole file only by the missing lines.
         assert not history.complete or whole[:cut].rstrip(b" ").endswith(b"\n")
         assert history.complete or history.notes
     assert outcomes == {"error", 1, 2, 3}
@@ -305,18 +306,18 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
 
 def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     cut = WHOLE[: WHOLE.rindex(" hourglass") + 40]
-    assert states_of(read(cut)) == list(STATES)
+    assert states_of(read_glstat(cut)) == list(STATES)
     assert (
-        read(cut).notes[-1]
+        read_glstat(cut).notes[-1]
         == "the file ends within its last state, after the lines that were needed"
     )
-    assert read(cut, "stonewall energy wall# 2").time.size == 3
-    assert read(cut, "hourglass energy").time.size == 2
-    assert not read(cut).complete
+    assert read_glstat(cut, "stonewall energy wall# 2").time.size == 3
+    assert read_glstat(cut, "hourglass energy").time.size == 2
+    assert not read_glstat(cut).complete
     energy = line("internal energy", -8.05e2)
     at_its_end = WHOLE[: WHOLE.rindex(energy) + len(energy)]
-    assert read(at_its_end).time.size == 2  # no line follows
-    assert read(at_its_end + " ").time.size == 3
+    assert read_glstat(at_its_end).time.size == 2  # no line follows
+    assert read_glstat(at_its_end + " ").time.size == 3
     assert (
         run_of(glstat, cut, selection=Selection(energy=("no such line",)))
         .databases[0]
@@ -328,20 +329,20 @@ def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
 @pytest.mark.parametrize("damage", ["", " ", "0", "_", "*", "\n", "time"])
 def test_a_byte_lost_or_put_between_the_columns_is_seen(damage: str) -> None:
     start = WHOLE.index(" internal energy", len(HEAD) + 1000)
-    for place in range(start, start + 34):
-        removed = WHOLE[:place] + damage + WHOLE[place + 1 :]
+    for position in range(start, start + 34):
+        removed = WHOLE[:position] + damage + WHOLE[position + 1 :]
         try:
-            found = states_of(read(removed))
+            states_read = states_of(read_glstat(removed))
         except FormatError:
             continue
-        assert found == list(STATES)
+        assert states_read == list(STATES)
 
 
 @given(st.binary(max_size=400))
 def test_no_bytes_raise_anything_else(data: bytes) -> None:
     glstat.recognises(data)
     try:
-        read(HEAD.encode() + data + block(0.0, 1.0).encode() + data)
+        read_glstat(HEAD.encode() + data + block(0.0, 1.0).encode() + data)
     except FormatError:
         return
 
@@ -362,7 +363,7 @@ def test_recognised_by_content(head: str, expected: bool) -> None:
 
 
 def assert_numbers_of_float(data: bytes, name: str) -> None:
-    """All numbers of a glstat are those that ``float`` reads in its columns."""
+    """Return all numbers of a glstat as ``float`` reads them from its columns."""
     run = glstat.Glstat(data, name)
     written: dict[str, list[float]] = {}
     for text in data.decode("latin-1").split("\n"):

@@ -33,20 +33,20 @@ from tests.hdf5_files import (
 from tests.reading import history_of
 
 
-def read(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
+def read_hdf5(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
     return history_of(
         hdf5_file, file.getvalue(), selection=Selection(time, energy), name="run.h5"
     )
 
 
-def saved(file: io.BytesIO) -> SavedBinout:
+def open_saved_binout(file: io.BytesIO) -> SavedBinout:
     (leg,) = hdf5_file.open_legs([Source("run.h5", file.getvalue())], Selection())
     assert isinstance(leg, SavedBinout)
     return leg
 
 
-def of(columns: Mapping[str, object]) -> io.BytesIO:
-    """A file of these columns by their paths."""
+def make_file(columns: Mapping[str, object]) -> io.BytesIO:
+    """Return an HDF5 file with these columns by their paths."""
 
     def write(file: h5py.File) -> None:
         for name, values in columns.items():
@@ -59,7 +59,7 @@ def of(columns: Mapping[str, object]) -> io.BytesIO:
 def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
     file = written(LAYOUTS[layout])
     assert hdf5_file.recognises(file.getvalue()[:520])
-    history = read(file)
+    history = read_hdf5(file)
     expected = ENERGY.astype("f4") if layout == "columns_upright" else ENERGY
     assert history.time.tolist() == TIME.tolist()
     assert history.energy.tolist() == expected.tolist()
@@ -75,7 +75,7 @@ def test_columns_that_make_most_of_a_file_are_read_where_they_lie(
     with h5py.File(content, "w", userblock_size=user_block) as file:
         file.create_dataset("time", data=time, chunks=chunks)
         file.create_dataset("internal_energy", data=energy, chunks=chunks)
-    history = read(content)
+    history = read_hdf5(content)
     assert history.time.tolist() == time.tolist()
     assert history.energy.tolist() == energy.ravel().tolist()
     assert (history.time.flags.writeable, history.energy.flags.writeable) == (
@@ -85,7 +85,7 @@ def test_columns_that_make_most_of_a_file_are_read_where_they_lie(
 
 
 def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
-    run = saved(written(lasso))
+    run = open_saved_binout(written(lasso))
     assert (run.title, run.version) == ("Sphere", "smp s 365")
     assert run.channels == ("internal_energy", "kinetic_energy")
     assert run.channel("kinetic_energy").tolist() == KINETIC.tolist()
@@ -106,8 +106,8 @@ def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
 
 
 def test_a_single_part_or_state_may_lack_its_axis() -> None:
-    run = saved(
-        of(
+    run = open_saved_binout(
+        make_file(
             {
                 "matsum/time": TIME,
                 "matsum/internal_energy": ENERGY,
@@ -127,11 +127,11 @@ def test_matrix_of_another_shape_is_refused() -> None:
         file["matsum/internal_energy"] = PARTS.T
 
     with pytest.raises(FormatError, match=r"has shape \(2, 4\), \(4, 2\) was expected"):
-        saved(written(turned)).part_channel("internal_energy", [1])
+        open_saved_binout(written(turned)).part_channel("internal_energy", [1])
 
 
 def test_several_candidates_are_listed() -> None:
-    two = of(
+    two = make_file(
         {
             "a/time": TIME,
             "a/internal_energy": ENERGY,
@@ -143,31 +143,35 @@ def test_several_candidates_are_listed() -> None:
         FormatError,
         match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)",
     ):
-        read(two)
-    assert read(two, "/b/internal_energy").time.tolist() == TIME[:3].tolist()
+        read_hdf5(two)
+    assert read_hdf5(two, "/b/internal_energy").time.tolist() == TIME[:3].tolist()
 
 
 def test_explicit_paths_win() -> None:
-    history = read(written(plain), "kinetic_energy", "internal_energy", time="/time")
+    history = read_hdf5(
+        written(plain), "kinetic_energy", "internal_energy", time="/time"
+    )
     assert history.energy.tolist() == (KINETIC + ENERGY).tolist()
     assert (
-        read(written(lasso), "glstat/kinetic_energy").energy.tolist()
+        read_hdf5(written(lasso), "glstat/kinetic_energy").energy.tolist()
         == KINETIC.tolist()
     )
     with pytest.raises(
         FormatError,
         match=r"no column for 'kinetic'.*give its path: .*kinetic_energy \(4\)",
     ):
-        read(written(plain), "kinetic")
+        read_hdf5(written(plain), "kinetic")
 
 
 def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
-    unnamed = of({"data": np.column_stack([TIME, ENERGY])})
+    unnamed = make_file({"data": np.column_stack([TIME, ENERGY])})
     with pytest.raises(
         FormatError, match=r"no column .* data\[0\] \(4\), data\[1\] \(4\)"
     ):
-        read(unnamed)
-    assert read(unnamed, "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
+        read_hdf5(unnamed)
+    assert (
+        read_hdf5(unnamed, "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
+    )
 
 
 @pytest.mark.parametrize(
@@ -179,7 +183,7 @@ def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
 )
 def test_what_makes_no_history_is_refused(energy: object, message: str) -> None:
     with pytest.raises(FormatError, match=message):
-        read(of({"time": TIME, "internal_energy": energy}))
+        read_hdf5(make_file({"time": TIME, "internal_energy": energy}))
 
 
 @pytest.mark.parametrize(
@@ -196,13 +200,13 @@ def test_times_that_step_back_are_those_of_one_restart(
         if refused
         else nullcontext()
     ):
-        read(of({"time": np.array(time, float), "internal_energy": ENERGY}))
+        read_hdf5(make_file({"time": np.array(time, float), "internal_energy": ENERGY}))
 
 
 def test_links_into_other_files_are_not_followed() -> None:
     with pytest.raises(FormatError, match="no column for the internal energy"):
-        read(
-            of(
+        read_hdf5(
+            make_file(
                 {
                     "time": TIME,
                     "internal_energy": h5py.ExternalLink(
@@ -220,7 +224,7 @@ def test_shape_far_too_large_for_the_file_is_refused() -> None:
         file.create_dataset("t", (10**12,), "f8", chunks=(1000,))
 
     with pytest.raises(FormatError, match="is the file damaged"):
-        read(written(write), "internal_energy", time="t")
+        read_hdf5(written(write), "internal_energy", time="t")
 
 
 SMALL = {
@@ -230,7 +234,7 @@ SMALL = {
 
 
 def check(layout: str, faults: list[Fault]) -> None:
-    """What can be read of a damaged file must be the numbers that h5py finds at the path."""
+    """Assert that all numbers read from a damaged file are those that h5py finds at their paths."""
     data = damage(SMALL[layout], faults, [])
     group = {"plain": "/", "compound": "/", "lasso": "glstat"}[layout]
     try:
@@ -239,10 +243,10 @@ def check(layout: str, faults: list[Fault]) -> None:
             values = leg.channel(name)
             with h5py.File(io.BytesIO(data)) as file:
                 path, _, field = name.rpartition("/")
-                found = (
+                stored = (
                     file[path][field] if layout == "compound" else file[group][name][()]
                 )
-            assert values.tolist() == np.ravel(found).astype(float).tolist()
+            assert values.tolist() == np.ravel(stored).astype(float).tolist()
         if leg.parts:
             leg.part_channel("internal_energy", [part.id for part in leg.parts])
     except FormatError:
@@ -287,22 +291,24 @@ def test_chunks_that_were_never_written_are_no_zeros() -> None:
         grown[:20] = np.arange(20.0)
         file.create_dataset("never", (40,), dtype="f8")
 
-    assert read(written(unfinished)).energy.tolist() == (np.arange(40.0) % 7).tolist()
+    assert (
+        read_hdf5(written(unfinished)).energy.tolist() == (np.arange(40.0) % 7).tolist()
+    )
     with pytest.raises(FormatError, match="/later has 3 of 5 chunks of its data"):
-        read(written(unfinished), "later")
+        read_hdf5(written(unfinished), "later")
     with pytest.raises(FormatError, match="/never was never written"):
-        read(written(unfinished), "never")
+        read_hdf5(written(unfinished), "never")
 
 
 def odd_float() -> h5py.h5t.TypeFloatID:
-    """A double whose exponents count from elsewhere: all its numbers are four times as large."""
+    """A double with another exponent bias: all its numbers are four times as large."""
     kind = h5py.h5t.IEEE_F64LE.copy()
     kind.set_ebias(1021)
     return kind
 
 
 def odd_integer() -> h5py.h5t.TypeIntegerID:
-    """An integer of which only 24 bits count."""
+    """A damaged integer type with only 24 significant bits."""
     kind = h5py.h5t.STD_I32LE.copy()
     kind.set_precision(24)
     return kind
@@ -337,7 +343,7 @@ def test_numbers_of_no_standard_type_are_refused(
             FormatError,
             match=r"numbers of [48] bytes that are no standard type of HDF5",
         ):
-            read(written(damaged))
+            read_hdf5(written(damaged))
 
 
 @pytest.mark.parametrize(
@@ -345,8 +351,8 @@ def test_numbers_of_no_standard_type_are_refused(
     [">f8", "<f4", ">f4", "<f2", "i1", ">i2", "<i4", ">i8", "u1", "<u2", ">u4", "<u8"],
 )
 def test_numbers_of_every_standard_type_are_read(kind: str) -> None:
-    history = read(
-        of(
+    history = read_hdf5(
+        make_file(
             {
                 "time": np.arange(9).astype(kind),
                 "internal_energy": (np.arange(9) % 5).astype(kind),
@@ -364,11 +370,11 @@ def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
     with h5py.File(io.BytesIO(content)) as file:
         content[file["internal_energy"].id.get_chunk_info(2).byte_offset + 5] ^= 1
     with pytest.raises(FormatError, match="HDF5 cannot be read"):
-        read(io.BytesIO(bytes(content)))
+        read_hdf5(io.BytesIO(bytes(content)))
 
 
 class Fatal(io.BytesIO):
-    """A file on which the library crashes when it reads it."""
+    """A damaged file on which the library crashes."""
 
     def readinto(self, _: object) -> int:
         os.kill(os.getpid(), signal.SIGSEGV)
@@ -376,7 +382,7 @@ class Fatal(io.BytesIO):
 
 
 class Endless(io.BytesIO):
-    """A file that the library reads without end."""
+    """A damaged file whose reading by the library never ends."""
 
     def readinto(self, _: object) -> int:
         while True:
@@ -402,21 +408,21 @@ def test_a_library_that_comes_to_no_end_is_ended() -> None:
 @pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])
 def test_damaged_files_that_were_found_are_refused(name: str) -> None:
     with pytest.raises(FormatError, match="damaged"):
-        read(io.BytesIO(unpacked(stored(f"faults/hdf5_{name}.h5.gz"))))
+        read_hdf5(io.BytesIO(unpacked(stored(f"faults/hdf5_{name}.h5.gz"))))
 
 
 def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
     with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
-        read(
+        read_hdf5(
             io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))), "energy"
         )
 
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
-    other = of({"time": TIME, "kinetic_energy": KINETIC})
+    kinetic_file = make_file({"time": TIME, "kinetic_energy": KINETIC})
     with pytest.raises(FormatError, match="by its name not an internal energy"):
-        read(other)
-    assert read(other, "kinetic_energy").energy.tolist() == KINETIC.tolist()
+        read_hdf5(kinetic_file)
+    assert read_hdf5(kinetic_file, "kinetic_energy").energy.tolist() == KINETIC.tolist()
 
 
 def test_without_its_library_a_file_is_refused_with_what_to_do(
@@ -427,4 +433,4 @@ def test_without_its_library_a_file_is_refused_with_what_to_do(
     with pytest.raises(
         FormatError, match=r"run\.h5: HDF5 files need h5py; pip install h5py"
     ):
-        read(content)
+        read_hdf5(content)

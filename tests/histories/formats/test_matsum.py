@@ -21,11 +21,11 @@ LUMPED = matsum_part(0, 0.0, lines=3)
 STATES = [
     matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)
 ]
-LONG = 150  # states, enough to remember what differs between them
+LONG = 150  # states; from so many on, the reader remembers which bytes differ between blocks
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
 
 
-def read(text: bytes) -> matsum.Matsum:
+def read_matsum(text: bytes) -> matsum.Matsum:
     return matsum.Matsum(text, "matsum")
 
 
@@ -65,7 +65,7 @@ SAME = {
 
 @pytest.mark.parametrize("text", SAME.values(), ids=SAME.keys())
 def test_every_form_gives_the_same_numbers(text: bytes) -> None:
-    run = read(text)
+    run = read_matsum(text)
     assert_as_written(run)
     assert (run.complete, run.notes) == (True, ())
     assert [part.id for part in run.parts] == IDS
@@ -75,15 +75,18 @@ def test_every_form_gives_the_same_numbers(text: bytes) -> None:
 def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(
     order: tuple[int, ...],
 ) -> None:
-    """States look alike from their time lines, and at both ends; only when a part is read does the difference show."""
-    ids, places = [11, 12, 13, *range(20, 30)], [*order, *range(3, 13)]
+    """States have the same time lines and are alike at both ends; the difference shows only when a part is read."""
+    ids, indices = [11, 12, 13, *range(20, 30)], [*order, *range(3, 13)]
     energies = np.arange(8 * 13.0).reshape(8, 13)
     states = [matsum_state(time, ids, row) for time, row in enumerate(energies)]
-    states[4] = matsum_state(4, [ids[place] for place in places], energies[4][places])
-    for asked in ([12], [11, 12], ids):
-        run = read(matsum_head(ids) + b"".join(states))
-        expected = energies[:, [ids.index(id_) for id_ in asked]]
-        assert run.part_channel("internal_energy", asked).tolist() == expected.tolist()
+    states[4] = matsum_state(4, [ids[index] for index in indices], energies[4][indices])
+    for wanted_ids in ([12], [11, 12], ids):
+        run = read_matsum(matsum_head(ids) + b"".join(states))
+        expected = energies[:, [ids.index(id_) for id_ in wanted_ids]]
+        assert (
+            run.part_channel("internal_energy", wanted_ids).tolist()
+            == expected.tolist()
+        )
 
 
 def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
@@ -94,7 +97,7 @@ def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
             for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True)
         ),
     ]
-    run = read(matsum_head(IDS) + b"".join(states))
+    run = read_matsum(matsum_head(IDS) + b"".join(states))
     assert run.notes == ("only some states have part 10",)
     assert (
         run.part_channel("internal_energy", [1])[:, 0].tolist()
@@ -108,7 +111,7 @@ def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
 
 def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
     states = [STATES[0].replace(b"=   10", b"=   20"), *STATES[1:]]
-    run = read(matsum_head([*IDS, 20]) + b"".join(states))
+    run = read_matsum(matsum_head([*IDS, 20]) + b"".join(states))
     with pytest.raises(FormatError, match=r"inten of part .* is missing"):
         run.part_channel("internal_energy", [10])
     assert (
@@ -118,7 +121,7 @@ def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
 
 
 def test_part_of_the_legend_that_is_in_no_state() -> None:
-    run = read(TEXT.replace(matsum_head(IDS), matsum_head([*IDS, 7])))
+    run = read_matsum(TEXT.replace(matsum_head(IDS), matsum_head([*IDS, 7])))
     assert_as_written(run)
     assert run.notes == ("no state has part 7 of the legend",)
     with pytest.raises(
@@ -131,7 +134,7 @@ def test_id_that_overflows_is_the_one_of_the_legend() -> None:
     text = TEXT.replace(b"=  123456", b"=********").replace(
         b"   123456 ", b"123456789 "
     )
-    run = read(text)
+    run = read_matsum(text)
     assert (
         run.part_channel("internal_energy", [123456789])[:, 0].tolist()
         == ENERGIES[:, 2].tolist()
@@ -149,7 +152,7 @@ def test_two_ids_that_overflow_are_left_out() -> None:
     text = text.replace(b"   123456 ", b"123456789 ").replace(
         b"   223456 ", b"223456789 "
     )
-    run = read(text)
+    run = read_matsum(text)
     assert [part.id for part in run.parts] == [10]
     assert (
         "parts whose number is damaged or too wide for its columns were left out"
@@ -162,7 +165,7 @@ def test_two_ids_that_overflow_are_left_out() -> None:
 
 
 def test_id_that_pushes_its_line() -> None:
-    run = read(TEXT.replace(b"=  123456", b"=1234567890"))
+    run = read_matsum(TEXT.replace(b"=  123456", b"=1234567890"))
     assert (
         run.part_channel("internal_energy", [1234567890])[:, 0].tolist()
         == ENERGIES[:, 2].tolist()
@@ -174,11 +177,11 @@ def test_id_that_pushes_its_line() -> None:
     [b"=    1             i", b"=   10            i", b"=   1 0             i"],
 )
 def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
-    """A digit or a blank lost, or one put in: the columns no longer fit."""
+    """If a digit or a blank is lost or inserted, the columns do not fit any more."""
     damaged = STATES[2].replace(
         b"=   10             i", id_text.replace(b"    1 ", b"   1 ")
     )
-    run = read(matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]]))
+    run = read_matsum(matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]]))
     with pytest.raises(FormatError, match="inten of part 10 is missing"):
         run.part_channel("internal_energy", [10])
     assert (
@@ -192,7 +195,7 @@ def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
 def test_numbers_that_are_the_same_in_most_states(
     changed: int | None, swapped: bool
 ) -> None:
-    """Whether a number changes in no state, in one or in all, each state has its own."""
+    """Each state has its own number, whether the number changes in no state, in one or in all."""
     times, ids = np.arange(LONG) / 8, [11, 12, 13, 14]
     energies = np.tile([0.0, -0.0, 2.5, 0.0], (LONG, 1))
     energies[:, 3] = np.arange(LONG)
@@ -203,14 +206,14 @@ def test_numbers_that_are_the_same_in_most_states(
     ]
     if swapped:
         states[100] = matsum_state(times[100], ids[::-1], energies[100, ::-1])
-    run = read(matsum_head(ids) + b"".join(states))
+    run = read_matsum(matsum_head(ids) + b"".join(states))
     for _ in range(
         2
-    ):  # the whole file is compared when it is asked for the second time, if not before
+    ):  # at the second request at the latest, the whole file is compared
         for chosen in ([11], [12, 13], ids, ids[:3]):
-            found = run.part_channel("internal_energy", chosen)
+            energies_of_chosen = run.part_channel("internal_energy", chosen)
             assert (
-                found.tobytes()
+                energies_of_chosen.tobytes()
                 == energies[:, [ids.index(id_) for id_ in chosen]].tobytes()
             )
         assert not run.part_channel("y_momentum", ids).any()
@@ -221,7 +224,7 @@ def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first()
 ):
     text = matsum_text(np.arange(LONG), [11, 12], np.zeros((LONG, 2)))
     text = text.replace(b"y-mom=   0.0000E+00", b"y-mom=" + b"*" * 13)
-    run = read(text)
+    run = read_matsum(text)
     assert run.part_channel("internal_energy", [11, 12]).shape == (LONG, 2)
     line = 1 + text[: text.index(b"y-mom=*")].count(b"\n")
     with pytest.raises(
@@ -235,7 +238,7 @@ def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first()
     "field", [b"*************", b"          NaN", b"             ", b"   6.0000E+0 "]
 )
 def test_what_is_no_number_is_refused_with_its_line(field: bytes) -> None:
-    run = read(TEXT.replace(b"   6.0000E+00", field))
+    run = read_matsum(TEXT.replace(b"   6.0000E+00", field))
     with pytest.raises(FormatError, match=r"^matsum:52: inten of part 10 is '"):
         run.part_channel("internal_energy", [1, 10])
     assert (
@@ -245,7 +248,7 @@ def test_what_is_no_number_is_refused_with_its_line(field: bytes) -> None:
 
 
 def test_quantity_that_was_not_written_is_refused() -> None:
-    run = read(matsum_text(TIMES, IDS, ENERGIES, lines=3))
+    run = read_matsum(matsum_text(TIMES, IDS, ENERGIES, lines=3))
     with pytest.raises(FormatError, match="hgeng of part 1 is missing"):
         run.part_channel("hourglass_energy", [1])
     with pytest.raises(
@@ -262,7 +265,7 @@ def test_quantity_that_was_not_written_is_refused() -> None:
 def test_something_else_is_no_matsum(text: bytes) -> None:
     assert not matsum.recognises(text)
     with pytest.raises(FormatError, match="this is not a matsum"):
-        read(text)
+        read_matsum(text)
 
 
 @pytest.mark.slow
@@ -274,8 +277,8 @@ def test_cut_anywhere_gives_whole_states_only(lines: int, legend: bool) -> None:
         text = HEAD + b"\n\n" + text[first:]
         first = text.index(b" time =")
     starts = [at for at in range(len(text)) if text.startswith(b" time =", at)]
-    for end in (place for place in cuts(text) if place >= len(HEAD)):
-        run = read(text[:end])
+    for end in (cut for cut in cuts(text) if cut >= len(HEAD)):
+        run = read_matsum(text[:end])
         n = run.part_time.size
         assert run.part_time.tolist() == TIMES[:n]
         if n:

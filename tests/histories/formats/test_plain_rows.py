@@ -1,4 +1,4 @@
-"""An exact reader of many numbers at once is trusted only as far as one that rounds agrees with it."""
+"""Numbers of the exact reader are used only if a reader that rounds agrees with them."""
 
 import numpy as np
 import pytest
@@ -15,18 +15,18 @@ HARD = st.floats(-1e300, 1e300).map(repr) | st.from_regex(
 
 
 def rounded(texts: list[list[str]]) -> Samples:
-    """What a reader that rounds makes of numbers."""
+    """Return numbers as a reader that rounds would."""
     return np.array([[float(text) * (1 + 1e-12) for text in row] for row in texts])
 
 
 @given(st.lists(st.tuples(HARD, HARD), min_size=1, max_size=40))
 def test_numbers_are_those_of_python(rows: list[tuple[str, str]]) -> None:
     cells = [[*row] for row in rows]
-    found = exact_numbers(
+    numbers = exact_numbers(
         "".join(",".join(row) + "\n" for row in rows).encode(), ",", rounded(cells)
     )
-    assert found is not None
-    assert found.tolist() == [[float(text) for text in row] for row in rows]
+    assert numbers is not None
+    assert numbers.tolist() == [[float(text) for text in row] for row in rows]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Radioss T01, binary and as text: computed runs against other readings, made files of every age, damaged texts."""
+"""Radioss T01, binary and text: computed runs compared with other readers, made-up files of every age, damaged text."""
 
 from collections.abc import Callable
 
@@ -24,9 +24,9 @@ FORMS: dict[str, Callable[[], T01Writer]] = {
 }
 
 
-def opened(made: T01Writer | bytes) -> TimeHistory:
+def open_history(source: T01Writer | bytes) -> TimeHistory:
     return TimeHistory(
-        bytes(made.data) if isinstance(made, T01Writer) else made, "runT01"
+        bytes(source.data) if isinstance(source, T01Writer) else source, "runT01"
     )
 
 
@@ -43,10 +43,10 @@ def test_any_age_and_form_of_the_format(
         MadePart(12, "step"),
         MadePart(3, "half a box", is_group=True),
     ]
-    made = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
-    written = printed if isinstance(made, T01TextWriter) else float
-    assert recognises(bytes(made.data)[:300])
-    run = opened(made)
+    writer = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
+    written = printed if isinstance(writer, T01TextWriter) else float
+    assert recognises(bytes(writer.data)[:300])
+    run = open_history(writer)
     assert (run.complete, run.notes) == (True, ())
     assert run.time.tolist() == [state / 8 for state in range(5)]
     assert (run.title, run.version) == (
@@ -72,17 +72,17 @@ def test_any_age_and_form_of_the_format(
 
 @pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
 def test_control_bytes_in_titles_are_blanks(into: Callable[[], T01Writer]) -> None:
-    made = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(
+    data = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(
         b"part 7", b"p\nrt\x007"
     )
-    assert opened(made).parts[0].title == "p rt 7"
+    assert open_history(data).parts[0].title == "p rt 7"
 
 
 @pytest.mark.parametrize(
     "path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")]
 )
 def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
-    run = opened(unpacked(path))
+    run = open_history(unpacked(path))
     total = run.part_channel("internal_energy", [part.id for part in run.parts]).sum(
         axis=1
     )
@@ -93,7 +93,7 @@ def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
 
 def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
     """rollover_ref.csv was made apart from these files: seven digits of energies, parts box and step."""
-    run = opened(unpacked(BOX))
+    run = open_history(unpacked(BOX))
     table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     at = np.searchsorted(run.time, table["time_s"] - 1e-7)
     box = run.part_channel("internal_energy", [1])[at, 0]
@@ -105,13 +105,15 @@ def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
 
 
 def test_legs_follow_one_another() -> None:
-    legs = [opened(unpacked(stored(f"rollover_r100_T0{leg}.gz"))) for leg in (1, 2, 3)]
+    legs = [
+        open_history(unpacked(stored(f"rollover_r100_T0{leg}.gz"))) for leg in (1, 2, 3)
+    ]
     assert [leg.time.size for leg in legs] == [201, 541, 161]
     assert (np.diff(np.concatenate([leg.time for leg in legs])) > 0).all()
 
 
 def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> None:
-    run = opened(
+    run = open_history(
         t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)])
     )
     assert [(part.id, part.title) for part in run.parts] == [(1, "box")]
@@ -121,7 +123,7 @@ def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> No
 
 
 def test_a_part_without_variables_is_noted_and_refused() -> None:
-    run = opened(t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
+    run = open_history(t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
     assert [part.id for part in run.parts] == [1]
     assert any("no variables of part 2 in the file" in note for note in run.notes)
     with pytest.raises(
@@ -131,7 +133,7 @@ def test_a_part_without_variables_is_noted_and_refused() -> None:
 
 
 def test_a_variable_that_was_not_asked_for_is_refused() -> None:
-    run = opened(t01(2, [MadePart(1, "box", codes=(1, 2))]))
+    run = open_history(t01(2, [MadePart(1, "box", codes=(1, 2))]))
     with pytest.raises(
         FormatError,
         match="no x_momentum of part 1, only internal_energy, kinetic_energy;",
@@ -142,7 +144,7 @@ def test_a_variable_that_was_not_asked_for_is_refused() -> None:
 
 
 def test_no_states_is_a_legal_file() -> None:
-    run = opened(t01(0))
+    run = open_history(t01(0))
     assert run.time.shape == (0,)
     assert run.complete
 
@@ -153,15 +155,15 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     with pytest.raises(
         FormatError, match="was expected in the head of the time history"
     ):
-        opened(head)
+        open_history(head)
 
 
-# As text.
+# Return the same time history as text.
 
 
 def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
     parts = [MadePart(id_, "piece", tuple(range(1, 501))) for id_ in range(1, 202)]
-    run = opened(t01(1, parts, made=T01TextWriter()))
+    run = open_history(t01(1, parts, made=T01TextWriter()))
     assert run.part_channel("internal_energy", [201]).tolist() == [
         [printed(value(0, 201, 1))]
     ]
@@ -169,21 +171,21 @@ def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
 
 @pytest.mark.parametrize("number", [-1.5e-120, 2.25e117, 0.0, -0.125])
 def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) -> None:
-    made = t01(2, made=T01TextWriter())
-    made.state(0.5, [number] * 22, [0.0] * 16)
-    assert opened(made).channel("mass").tolist()[-1] == number
+    writer = t01(2, made=T01TextWriter())
+    writer.state(0.5, [number] * 22, [0.0] * 16)
+    assert open_history(writer).channel("mass").tolist()[-1] == number
 
 
 @pytest.mark.parametrize(("single", "digits"), [(True, 7), (False, 9)])
 def test_numbers_have_the_digits_in_which_the_solver_computed(
     single: bool, digits: int
 ) -> None:
-    made = t01(0, made=T01TextWriter())
+    writer = t01(0, made=T01TextWriter())
     for time in np.arange(4) / 7:
-        made.state(
+        writer.state(
             float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16
         )
-    run = opened(made)
+    run = open_history(writer)
     assert [precision.digits for precision in run.precisions(["mass"])] == [
         digits,
         digits,
@@ -194,7 +196,7 @@ def test_legs_may_be_text_and_binary() -> None:
     text, binary = t01(4, start=2, made=T01TextWriter()), t01(4)
     run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
-    assert "where legs overlap the newer one counts" in run.notes[0]
+    assert "if legs overlap the newer one is used" in run.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -214,7 +216,7 @@ def test_a_head_that_does_not_hold_what_it_says_is_refused(
     with pytest.raises(
         FormatError, match="was expected in the head of the time history near byte"
     ):
-        opened(SMALL.data.replace(line, damaged))
+        open_history(SMALL.data.replace(line, damaged))
 
 
 CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
@@ -229,7 +231,7 @@ def test_other_forms_of_text_are_refused_with_what_to_do(text: str) -> None:
         FormatError,
         match=r"runT01: .* as text, but not as /TFILE/3 writes it .*; let the run",
     ):
-        opened(text.encode())
+        open_history(text.encode())
 
 
 def test_as_a_table_it_is_refused() -> None:
@@ -249,19 +251,19 @@ def test_as_a_table_it_is_refused() -> None:
     ],
 )
 def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
-    made = t01(2, made=T01TextWriter())
-    made.state(0.25, [7.0] * 22, [0.0] * 16)
-    data = bytes(made.data).decode()
-    place = data.rindex(number * 2) + len(number)
-    run = opened((data[:place] + damaged + data[place + len(number) :]).encode())
+    writer = t01(2, made=T01TextWriter())
+    writer.state(0.25, [7.0] * 22, [0.0] * 16)
+    data = bytes(writer.data).decode()
+    end = data.rindex(number * 2) + len(number)
+    run = open_history((data[:end] + damaged + data[end + len(number) :]).encode())
     assert sum(bool(np.isnan(run.channel(name)).any()) for name in run.channels) == 1
 
 
 def test_a_number_that_is_none_is_refused() -> None:
-    made = t01(2, made=T01TextWriter())
-    made.state(0.25, [float("nan")] * 22, [0.0] * 16)
+    writer = t01(2, made=T01TextWriter())
+    writer.state(0.25, [float("nan")] * 22, [0.0] * 16)
     with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
-        run_of(radioss_th, bytes(made.data)).history(Selection())
+        run_of(radioss_th, bytes(writer.data)).history(Selection())
 
 
 def test_an_additional_history_without_global_values_is_no_leg() -> None:

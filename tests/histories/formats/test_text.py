@@ -1,4 +1,4 @@
-"""The lines of a text, of a big one that stays on its disk as of one in memory."""
+"""The lines of a text are the same for a large file on disk and for bytes in memory."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,28 +20,28 @@ CONTENTS = st.lists(
 
 
 class Small(Text):
-    """A text of which little is looked at together."""
+    """A text that is read in very small pieces."""
 
     top, piece, short, some = 5, 16, 32, 3
 
 
 class Narrow(InPieces):
-    """Bytes of which hardly any are read together."""
+    """A file on disk that is read in very small blocks."""
 
     gap, window = 8, 16
 
 
 def on_a_disk(file: Path) -> Text:
-    """A text that stays on its disk and is taken apart in small pieces."""
+    """A text on disk that is read in small pieces."""
     return Small(Source("text", on_disk(file, Narrow)))
 
 
 def lines_of(data: bytes) -> list[str]:
     try:
-        found = data.decode("utf-8")
+        text = data.decode("utf-8")
     except UnicodeDecodeError:
-        found = data.decode("latin-1")
-    return found.replace("\r\n", "\n").split("\n")
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").split("\n")
 
 
 @given(CONTENTS, st.integers(0, 12), st.booleans())
@@ -55,31 +55,31 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     skipped = min(skipped, len(ended))
     lines = [*ended, last][skipped:] if rest and last else ended[skipped:]
     samples = []
-    for found in (Small(Source("text", data)), on_a_disk(file)):
-        assert (found.unended, found.head, found.is_short) == (
+    for text in (Small(Source("text", data)), on_a_disk(file)):
+        assert (text.unended, text.head, text.is_short) == (
             last,
             ended[:5],
             len(ended) <= 5,
         )
-        begin = found.place(skipped)
+        begin = text.place(skipped)
         if rest:
-            found.take_rest()
-        assert [*found.lines(begin)] == lines
-        samples.append(found.sample(begin))
+            text.take_rest()
+        assert [*text.lines(begin)] == lines
+        samples.append(text.sample(begin))
     assert samples[0] == samples[1]
     assert {*lines[:3], *lines[-3:]} <= {*samples[0]} <= {*lines}
 
 
 def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
     class TooBig(OnDisk):
-        """A file that the memory does not hold."""
+        """A file on disk that must not be read into memory as a whole."""
 
         def __bytes__(self) -> bytes:
             raise MemoryError
 
     file = put(tmp_path / "text", b"time,IE\n" + b"0.125,17\n" * 50)
-    found = Small(Source("text", on_disk(file, TooBig)))
-    assert [*found.lines(found.place(1))] == ["0.125,17"] * 50
+    text = Small(Source("text", on_disk(file, TooBig)))
+    assert [*text.lines(text.place(1))] == ["0.125,17"] * 50
 
 
 @pytest.mark.usefixtures("new_files")
@@ -90,7 +90,7 @@ def test_a_text_written_anew_since_it_was_opened_is_an_error(
     read: Callable[[Text], object], tmp_path: Path
 ) -> None:
     file = put(tmp_path / "text", b"0.125,17\n" * 50)
-    found = on_a_disk(file)
+    text = on_a_disk(file)
     file.write_bytes(b"0.125,18\n" * 50)
     with pytest.raises(ChangedError, match="rewritten"):
-        read(found)
+        read(text)
