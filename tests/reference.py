@@ -123,7 +123,8 @@ def rules_page() -> str:
         lines += ["", f"## {rule.id}", ""]
         lines += [f"**{rule.severity}**, {solvers}: {rule.summary}.", ""]
         paragraphs = re.split(r"\n\s*\n", rule.explanation.strip())
-        lines += ["\n\n".join(" ".join(text.split()) for text in paragraphs)]
+        lines += ["\n\n".join(" ".join(text.split()) for text in paragraphs), ""]
+        lines += [f"**Fix.** {' '.join(rule.fix.split())}"]
     return "\n".join(lines) + "\n"
 
 
