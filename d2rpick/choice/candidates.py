@@ -15,10 +15,10 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
 from d2rpick.choice.warnings import Objection, objections
-from d2rpick.histories.digits import not_before
+from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
-from d2rpick.vibration.model import NEAR_TD, measured_of, moments_of
+from d2rpick.vibration.model import NEAR_TD, find_moments, measure_all
 from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ class Judged:
         if len(each) == 1:  # of a noisy record, which memory is to hold once
             moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
         tr = moments.tr
-        energy, known = measured_of([one.vibration for one in situations], tr, ends)
+        energy, known = measure_all([one.vibration for one in situations], tr, ends)
         still = np.array([one.at_rest for one in situations])[place]
         level_error = measures.level_error(
             energy, np.array([one.energy_td for one in situations])[place]
@@ -378,7 +378,7 @@ def judged_of(
             one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf
             for one in asked
         ]
-        found = moments_of(
+        found = find_moments(
             [one.vibration for one in asked], asked[0].settings.tolerance, starts
         )
         kept = [
@@ -402,7 +402,7 @@ def _at_start(situation: Situation) -> Moments | None:
     if start is None or not situation.at_rest:
         return None
     first = max(start, float(situation.history.time[0]))
-    read = not_before(first)
+    read = round_up_as_read(first)
     return Moments.of("start", [read if read < situation.td else first])
 
 
@@ -449,10 +449,10 @@ def _remarks(
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
     if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         from d2rpick.vibration.part_signs import (
-            main_contributors,
+            name_main_contributors,
         )  # not above: a table has no parts
 
-        yield f"mismatch of {main_contributors(parts)}"
+        yield f"mismatch of {name_main_contributors(parts)}"
     if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
         yield f"residual up to {known['residual_high']:.2g} if the record hides a further mode"
     if known and reach > known["timing_tolerance"]:

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
+from d2rpick.base.errors import (
+    Caution,
+    FormatError,
+    RangeError,
+    give_if_written,
+    list_names,
+)
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.health import (
@@ -20,13 +26,13 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
-from d2rpick.flight.momentum import with_parts_by_number
+from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.balance import balance_of
-from d2rpick.histories.database import doubts
-from d2rpick.histories.history import History, rows_of
+from d2rpick.histories.balance import read_balance
+from d2rpick.histories.database import note_doubts
+from d2rpick.histories.history import History, select_states
 from d2rpick.histories.names import Part, Selection, select_parts
-from d2rpick.histories.samples import median
+from d2rpick.histories.samples import compute_median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -111,7 +117,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         *run.left_out,
         *(note for database in run.databases for note in _notes(database)),
     ]
-    notes += doubts(run.databases)
+    notes += note_doubts(run.databases)
     notes += run.unused_energies(selection)
     states, time = None, np.empty(0)
     try:
@@ -123,7 +129,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     ) as error:  # several columns may be the time: there is still a list of them
         if (
             first.format == "csv"
-            and if_written(lambda: first.energy_channel) is not None
+            and give_if_written(lambda: first.energy_channel) is not None
         ):
             raise  # by its one energy it is known which column is the time: the table cannot be read
         notes.append(str(error))
@@ -140,7 +146,9 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max()))
+        sampling=Sampling(
+            float(steps.min()), float(compute_median(steps)), float(steps.max())
+        )
         if steps.size
         else None,
         complete=all(database.complete for database in run.databases),
@@ -205,7 +213,7 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
     energies = (
-        if_written(lambda: run.part_energies(run.parts))
+        give_if_written(lambda: run.part_energies(run.parts))
         if run.parts
         else np.empty((0, 0))
     )
@@ -218,7 +226,7 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
 
 
 def _highest(run: Run, part: Part) -> float | None:
-    return if_written(lambda: _most(run.part_energies([part])))
+    return give_if_written(lambda: _most(run.part_energies([part])))
 
 
 def _most(energies: Samples) -> float | None:
@@ -227,7 +235,7 @@ def _most(energies: Samples) -> float | None:
 
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     if rigid:
-        when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
         told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
 
@@ -238,7 +246,7 @@ def _health(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    balance = balance_of(
+    balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
     if balance is None or not balance.time.size:
@@ -254,7 +262,7 @@ def _health(
                 until=float(balance.time[-1]),
             )
         return assess(
-            replace(rows_of(balance, states), hourglass_of_parts=()),
+            replace(select_states(balance, states), hourglass_of_parts=()),
             until=float(balance.time[-1]),
         )
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
@@ -268,11 +276,11 @@ def _health(
 def _history(run: Run, selection: Selection) -> History | None:
     """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
     if selection.parts:
-        selection = with_parts_by_number(run, selection)
+        selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    return if_written(lambda: run.history(selection))
+    return give_if_written(lambda: run.history(selection))
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:

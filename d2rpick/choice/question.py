@@ -34,10 +34,10 @@ class Reference(NamedTuple):
         """Read what is selected of a run that is open; FormatError when it is not there."""
         if selection.parts:
             from d2rpick.flight.momentum import (
-                with_parts_by_number,
+                replace_words_by_part_ids,
             )  # not above: a table has no parts
 
-            selection = with_parts_by_number(run, selection)
+            selection = replace_words_by_part_ids(run, selection)
         return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:

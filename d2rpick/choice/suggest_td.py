@@ -21,8 +21,8 @@ from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.digits import not_after, sum_as_read
-from d2rpick.histories.samples import union
+from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
+from d2rpick.histories.samples import merge_times
 from d2rpick.vibration.measures import kinetic_share, vertices
 from d2rpick.vibration.span import Fits
 
@@ -196,7 +196,7 @@ def offered_times(
         order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
-    times = union(grid, peaks)
+    times = merge_times(grid, peaks)
     return times[times < situation.history.time[-1]], set(
         peaks.tolist()
     )  # a run that ends at td is no use
@@ -296,22 +296,24 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
     low, high = window
     margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
-    latest = sum_as_read(end, -margin)
+    latest = sum_times_as_read(end, -margin)
     latest = latest if latest > low else situation.latest_td
-    return min(high, max(low, latest if np.isinf(latest) else not_after(latest)))
+    return min(
+        high, max(low, latest if np.isinf(latest) else round_down_as_read(latest))
+    )
 
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
     history, flight = situation.history, situation.flight
     last = min(
-        window[1], not_after(float(history.time[-2]))
+        window[1], round_down_as_read(float(history.time[-2]))
     )  # a run that ends at td is no use
     spread = situation.expected_margin.spread
     return (
         last
         if flight.end is None or not spread
-        else min(last, not_after(flight.end - _HIDDEN * spread))
+        else min(last, round_down_as_read(flight.end - _HIDDEN * spread))
     )
 
 

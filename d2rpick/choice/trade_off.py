@@ -24,7 +24,7 @@ from d2rpick.choice.suggest_td import (
     within_flight,
 )
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.digits import round_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
         ]
         least, longest = np.inf, np.inf
         read = {
-            one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error))
+            one.td: (-round_as_read(one.rigid_time or 0.0), as_printed(one.error))
             for one in group
         }
         for one in sorted(group, key=lambda one: read[one.td]):
