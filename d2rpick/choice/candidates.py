@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.choice.warnings import Objection, objections
+from d2rpick.choice.warnings import POOR_RESIDUAL, Objection, objections
 from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
@@ -46,7 +46,8 @@ class Candidate(Measured, Record):
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
     without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
     parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
-    ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
+    ``level_ratio``: E(tr)/E(td).  ``admissible``: in the flight, same sign, error within tolerance; else ``notes`` say
+    why not.  ``acceptable``: with a residual of at most a half as well.  ``run_time_share``:
     expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
     that hardly anything is saved.  ``residual_high``: how large the residual may be if what the model leaves over
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
@@ -60,13 +61,14 @@ class Candidate(Measured, Record):
     tr: float
     kind: str
     energy: float
-    energy_ratio: float | None
+    level_ratio: float | None
     level_error: float | None
     rising: bool | None
     rigid_time: float
     rigid_fraction: float
     tr_low: float | None
     tr_high: float | None
+    admissible: bool
     acceptable: bool
     recommended: bool
     notes: tuple[str, ...]
@@ -336,11 +338,13 @@ class Candidates(Sequence[Candidate]):
             chain.from_iterable(one.told(i) for one in found.objections if one.holds[i])
         )
         remarks = _remarks(situation, reach, values if known else {}, parts)
+        residual = values["residual"]
+        kept = residual is None or residual <= POOR_RESIDUAL
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy_ratio=energy / situation.energy_td
+            level_ratio=energy / situation.energy_td
             if situation.energy_td > 0 and not situation.at_rest
             else None,
             rising=rising,
@@ -348,7 +352,8 @@ class Candidates(Sequence[Candidate]):
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            acceptable=not against,
+            admissible=not against,
+            acceptable=not against and kept,
             recommended=rank == self.recommended,
             notes=(*against, *_SAME_SWING * values["same_swing"], *remarks),
             run_time_share=situation.settings.run_time_share(rigid_fraction),

@@ -57,7 +57,7 @@ class Comparison(NamedTuple):
     source: tuple[str, ...]
     energy_frozen: float
     energy_td: float
-    energy_ratio: float | None
+    level_ratio: float | None
     end: float
     mean_after: float
     mean_after_reference: float
@@ -182,7 +182,7 @@ def compare_runs(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=wanted,
-        energy_ratio=frozen / wanted if wanted > 0 else None,
+        level_ratio=frozen / wanted if wanted > 0 else None,
         end=end,
         mean_after=mean,
         mean_after_reference=mean_reference,
