@@ -197,13 +197,11 @@ class RunAnswer(Paged):
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(one for one in found if one)
-        return (
-            Explorer(
+        if trade_offs:
+            return Explorer(
                 trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)
             )
-            if trade_offs
-            else None
-        )
+        return None
 
 
 def written(path: arguments.Path, page: str) -> Path:

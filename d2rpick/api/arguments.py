@@ -110,11 +110,9 @@ def is_whole_number(value: object) -> bool:
 def _shown(value: object) -> str:
     """Write a wrong value in one line, cut where it is long."""
     text = " ".join(repr(value).split())
-    return (
-        text
-        if len(text) <= _LONGEST_SHOWN
-        else f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
-    )
+    if len(text) <= _LONGEST_SHOWN:
+        return text
+    return f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
 
 
 def flag(name: str, value: object, default: bool) -> bool:
@@ -178,11 +176,9 @@ def without_unit(value: object) -> str:
     from d2rpick.histories.names import parse_seconds
 
     seconds = parse_seconds(str(value))
-    return (
-        ""
-        if seconds is None
-        else f": give a number in the unit of the history, {seconds:g} where it is s"
-    )
+    if seconds is None:
+        return ""
+    return f": give a number in the unit of the history, {seconds:g} where it is s"
 
 
 def optional(name: str, value: object, limits: Number = TIME) -> float | None:
@@ -231,9 +227,10 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     single = isinstance(value, str | int | Part) or is_whole_number(
         value
     )  # a Part holds its number and its title
-    listed = (
-        [value] if single else list(_each(name, value, "a number, a title or several"))
-    )
+    if single:
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "a number, a title or several"))
     for one in listed:
         if not (isinstance(one, str) or is_whole_number(one)):
             raise TypeError(
@@ -254,9 +251,10 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = (
-        [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
-    )
+    if isinstance(value, str):
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "ids of rules"))
     for one in listed:
         if not isinstance(one, str):
             raise TypeError(f"{name} holds {one!r}; ids of rules were expected")
@@ -285,11 +283,10 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
     (('run/',), ('glstat', 'matsum'))
     """
-    listed = (
-        [value]
-        if isinstance(value, str | os.PathLike)
-        else list(_each(name, value, "a path or several"))
-    )
+    if isinstance(value, str | os.PathLike):
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "a path or several"))
     for one in listed:
         if not isinstance(one, str | os.PathLike):
             raise TypeError(f"{name} holds {_shown(one)}; paths were expected")
@@ -311,11 +308,10 @@ def check_run(name: str, run: object) -> None:
     if not (
         hasattr(run, "files") and hasattr(run, "overview")
     ):  # its class imports this module
-        found = (
-            repr(run)
-            if isinstance(run, str | os.PathLike)
-            else f"of type {type(run).__name__}"
-        )
+        if isinstance(run, str | os.PathLike):
+            found = repr(run)
+        else:
+            found = f"of type {type(run).__name__}"
         made = "from_frame(...)" if is_table(run) else "read(...)"
         raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
 

@@ -134,7 +134,9 @@ def ask(
     ArgumentError
         If the recommended set is asked for beside other parts, or without a deck.
     """
-    settings, model, files = request.settings, model_of(request), run.files
+    settings = request.settings
+    model = model_of(request)
+    files = run.files
     selection = request.selection(parts=False)._replace(parts=request.part)
     if request.part:
         _check_recommended(request, files)
@@ -241,7 +243,8 @@ def _merged(asked: Asked, merge: int) -> Asked:
     parts = asked.reference.history.parts
     if not parts:
         return asked
-    cautions, bodies = asked.cautions, asked.settings.bodies or ()
+    cautions = asked.cautions
+    bodies = asked.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
         found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"

@@ -200,11 +200,10 @@ class Cards:
         for name in self.given:
             if name not in places[solver]:
                 owner = next(one for one, takes in places.items() if name in takes)
-                hint = (
-                    ""
-                    if self.solver
-                    else f"; without `solver` the card is one for {SOLVERS[solver].title}"
-                )
+                if self.solver:
+                    hint = ""
+                else:
+                    hint = f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
@@ -218,10 +217,8 @@ class Cards:
         DeckError
             If the deck cannot be read, or rigid bodies of it cannot switch the parts.
         """
-        deck, parts = (
-            asked.deck,
-            [part.id for part in asked.reference.history.parts or ()],
-        )
+        deck = asked.deck
+        parts = [part.id for part in asked.reference.history.parts or ()]
         if deck is None:
             return self, ()
         from d2rpick.deck.suiting import find_suiting
@@ -282,13 +279,15 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         found = re.fullmatch(_RANGE, piece, re.ASCII)
         if not found:
-            hint = (
-                "; titles need a --history that has parts" if name == "--part" else ""
-            )
+            if name == "--part":
+                hint = "; titles need a --history that has parts"
+            else:
+                hint = ""
             raise ArgumentError(
                 f"{name}: {piece!r} is not a number (7) or range (10-19){hint}"
             )
-        low, high = int(found[1]), int(found[2] or found[1])
+        low = int(found[1])
+        high = int(found[2] or found[1])
         if not low <= high < low + _MOST_IDS:
             raise ArgumentError(
                 f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
@@ -345,7 +344,8 @@ def judged(
     from d2rpick.deck.printing import SOLVERS
 
     cards, notes = cards.by_deck(asked)
-    reference, request = asked.reference, cards.request(asked).by(asked.settings)
+    reference = asked.reference
+    request = cards.request(asked).by(asked.settings)
     judge = judge or partial(verify_of, reference, settings=asked.settings)
     found = judged_card(windows, reference.history, judge, request, done)
     solver, printing = request.of(reference.history)
@@ -353,11 +353,10 @@ def judged(
         raise ArgumentError(needed(SOLVERS[solver]))
     card, verdicts = found
     card = replace(card, notes=(*notes, *card.notes))
-    apart = (
-        0
-        if printing.merge or SOLVERS[solver].switches != "part"
-        else len(printing.part)
-    )
+    if printing.merge or SOLVERS[solver].switches != "part":
+        apart = 0
+    else:
+        apart = len(printing.part)
     return JudgedCard(card, verdicts, tuple(collect_objections(card, asked, apart)))
 
 

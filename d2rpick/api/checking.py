@@ -229,11 +229,10 @@ def _each(
             )
             if real not in seen and not any(deck in legs for legs in restarts.values()):
                 found = _found(deck, configured, judge, folder, restarts.get(deck, ()))
-                others = (
-                    []
-                    if isinstance(found, Checked) and found.solver == LS_DYNA
-                    else list_run_files(deck)
-                )
+                if isinstance(found, Checked) and found.solver == LS_DYNA:
+                    others = []
+                else:
+                    others = list_run_files(deck)
                 seen.update([real, *map(os.path.realpath, others)])
                 yield found
 

@@ -125,7 +125,8 @@ def parts(
 def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
     """Say which parts may be switched, by sets that are compared from tr to td, or up to td."""
     times = check_times(tr, td)
-    model, beside = model_of(request), [request.deck] if request.deck else []
+    model = model_of(request)
+    beside = [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
     found = sets_of_parts.parts_of(
         run.files, request.settings, model, given=ids, times=times, beside=beside

@@ -116,7 +116,8 @@ class Driving:
         with alone(folder):
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
-            begun, computed = journal.all("begun"), journal.all("ended")
+            begun = journal.all("begun")
+            computed = journal.all("ended")
             if computed and not resume:
                 raise D2RPickError(
                     f"{folder}: this run has begun; --resume goes on with it, or choose another folder"

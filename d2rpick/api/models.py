@@ -33,6 +33,22 @@ HISTORIES = (
     "matsum",
 )  # of d2rpick.report.history_files, which --help does without
 
+MOST_STATES = 1_000_000
+PARAMETERS = (
+    "speed",
+    "stiffness",
+    "yield_strain",
+    "damping",
+    "mesh",
+    "drop",
+    "tilt",
+    "ground_stiffness",
+)
+TD = 0.37  # of the published study, 10 ms before the ground comes
+TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
+T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
+BALANCED = 0.01  # so well the energy of a run must be balanced [-]
+
 
 def _same(name: str, **changes: Any) -> Any:
     """Take an option of a request."""
@@ -123,29 +139,14 @@ class Motion:
         """Give the motion, and how it is switched where it is."""
         from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
-        start, oscillator, switched = self.start, self.oscillator, None
+        start = self.start
+        oscillator = self.oscillator
+        switched = None
         if self.tr is not None and self.td is not None:
             switched = Replay(oscillator, start, 0.0, self.tr, self.td)
         return compute_trajectory(
             oscillator, start, self.t_end, self.dt, switched
         ), switched
-
-
-MOST_STATES = 1_000_000
-PARAMETERS = (
-    "speed",
-    "stiffness",
-    "yield_strain",
-    "damping",
-    "mesh",
-    "drop",
-    "tilt",
-    "ground_stiffness",
-)
-TD = 0.37  # of the published study, 10 ms before the ground comes
-TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
-T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
-BALANCED = 0.01  # so well the energy of a run must be balanced [-]
 
 
 @dataclass(frozen=True)
@@ -302,11 +303,10 @@ class Scanning:
         times = scan_times(self.reference.released or self.td / 3, self.td)
         self.answer = suggest(make_history(self.reference), self.td, Settings())
         self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
-        self.times = (
-            sorted({*times, self.answer.recommended.tr})
-            if self.answer.recommended
-            else times
-        )
+        if self.answer.recommended:
+            self.times = sorted({*times, self.answer.recommended.tr})
+        else:
+            self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
         """Compute the runs; ``told`` is called with the number of those that are there."""

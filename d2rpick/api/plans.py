@@ -126,10 +126,8 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    wanted, window = (
-        arguments.optional("td", td),
-        arguments.window("td_window", td_window),
-    )
+    wanted = arguments.optional("td", td)
+    window = arguments.window("td_window", td_window)
     count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return explored(asked, wanted, window, count)
@@ -185,7 +183,8 @@ class Plan(RunAnswer, planning.Plan):
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
-        new, asked = self.all_windows if every else self.windows, self.question
+        new = self.all_windows if every else self.windows
+        asked = self.question
         asked = asked._replace(reference=asked.reference._replace(history=self.history))
         return judged(asked, cards, new, done=self.done) if new else None
 
@@ -216,11 +215,9 @@ class Plan(RunAnswer, planning.Plan):
             suited, _ = cards.by_deck(self.question)
         except DeckError:
             return None
-        return (
-            self.printed(cards)
-            if suited.request(self.question).whom(self.history)
-            else None
-        )
+        if suited.request(self.question).whom(self.history):
+            return self.printed(cards)
+        return None
 
 
 def plan(
@@ -323,7 +320,8 @@ def written(
     from d2rpick.deck.writing import write_deck
     from d2rpick.rules.judgement import HistoryJudge
 
-    asked, done = plan.question, card.card.windows[: len(plan.done)]  # as printed
+    asked = plan.question
+    done = card.card.windows[: len(plan.done)]  # as printed
     names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
     judge = HistoryJudge(
         asked.reference.run, asked.request.selection(parts=False), plan.settings, done

@@ -24,6 +24,40 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
 
+MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
+UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
+# Groups of options: how to read a history, how to judge by it, and how to judge a tr.
+READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
+JUDGING: Final = (
+    "input_format",
+    "time",
+    "energy",
+    "flying",
+    "channel",
+    "after",
+    "landing",
+    "margin",
+    "tolerance",
+    "min_quality",
+)
+OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
+LIMITS: Final = (
+    *(
+        "after",
+        "landing",
+        "margin",
+        "tolerance",
+        "max_kinetic_share",
+        "max_residual",
+        *OSCILLATOR,
+    ),
+    *("fit_window", "no_verify", "strict", "keep_vibration"),
+)
+CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
+_NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
+# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
+_IN_MEMORY: Final = "<weights in memory>"
+
 
 class Number(NamedTuple):
     """A finite number from ``low`` (or above it, when ``above``) to ``high``."""
@@ -45,11 +79,9 @@ TIME, POSITIVE, NOT_NEGATIVE, FRACTION = (
     Number(0.0),
     Number(0.0, 1.0),
 )
-MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
 AT_LEAST_ONE: Final = Number(
     1.0
 )  # elements that are rigid no longer limit the step: it cannot become smaller
-UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
 
 
 class Option(NamedTuple):
@@ -95,39 +127,6 @@ def options_of(table: Any) -> dict[str, Option]:
         for one in fields(table)
         if "option" in one.metadata
     }
-
-
-# Groups of options: how to read a history, how to judge by it, and how to judge a tr.
-READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
-JUDGING: Final = (
-    "input_format",
-    "time",
-    "energy",
-    "flying",
-    "channel",
-    "after",
-    "landing",
-    "margin",
-    "tolerance",
-    "min_quality",
-)
-OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
-LIMITS: Final = (
-    *(
-        "after",
-        "landing",
-        "margin",
-        "tolerance",
-        "max_kinetic_share",
-        "max_residual",
-        *OSCILLATOR,
-    ),
-    *("fit_window", "no_verify", "strict", "keep_vibration"),
-)
-CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
-_NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
-_IN_MEMORY: Final = "<weights in memory>"
 
 
 # Nobody changes it, nor other tables of options: frozen ones take every command a fiftieth of its start.
@@ -336,7 +335,8 @@ class Request:
         """How to choose and judge."""
         from d2rpick.choice.question import Settings
 
-        mode, oscillator = None, self.oscillator
+        mode = None
+        oscillator = self.oscillator
         if oscillator is not None and self.v0 is not None:
             from d2rpick.vibration.oscillator import (
                 to_mode,
@@ -373,11 +373,9 @@ class Request:
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
         """Give the options that were given, or those of ``names``, as they are typed behind a td."""
-        chosen = (
-            self._given()
-            if names is None
-            else [name for name in self._given() if name in names]
-        )
+        chosen = list(self._given())
+        if names is not None:
+            chosen = [name for name in chosen if name in names]
         return tuple(
             text
             for name in chosen
@@ -402,11 +400,10 @@ class Request:
 
     def _given(self) -> Iterator[str]:
         for one in fields(self):
-            given = (
-                getattr(self, one.name) != one.default
-                if self.given is None
-                else one.name in self.given
-            )
+            if self.given is None:
+                given = getattr(self, one.name) != one.default
+            else:
+                given = one.name in self.given
             if given and one.name not in _NOT_TYPED:
                 yield one.name
 

@@ -84,10 +84,8 @@ def first(
         arguments.optional("wait", wait, NOT_NEGATIVE),
         arguments.optional("after", after, NOT_NEGATIVE),
     )
-    main, folder = (
-        arguments.one_path("deck", deck),
-        arguments.one_path("output_dir", output_dir),
-    )
+    main = arguments.one_path("deck", deck)
+    folder = arguments.one_path("output_dir", output_dir)
     found = first_card(main, numbers("parts", names), *times)
     files = write_deck(
         main,
@@ -145,10 +143,8 @@ def follow(
         from d2rpick.deck import read_inventory  # not above: few name a deck
 
         inventory = read_inventory(arguments.one_path("deck", deck))
-    time, seconds = (
-        arguments.optional("wait", wait),
-        arguments.optional("lasting", lasting),
-    )
+    time = arguments.optional("wait", wait)
+    seconds = arguments.optional("lasting", lasting)
     return watch.follow(
         [arguments.one_path("run", run)], selection, time, inventory, lasting=seconds
     )

@@ -220,7 +220,8 @@ def read(
     names = arguments.paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen, kind = selection_of(time, energy, channels), known_format(input_format)
+    chosen = selection_of(time, energy, channels)
+    kind = known_format(input_format)
     return Run(open_run(names, chosen, kind), chosen, kind, folder_of(names))
 
 
@@ -277,7 +278,8 @@ def from_frame(
 
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}, a text was expected")
-    table, chosen = frame_of_table(frame), selection_of(time, energy, channels)
+    table = frame_of_table(frame)
+    chosen = selection_of(time, energy, channels)
     is_named = not is_plain_array(frame)
     if is_named:
         table = _timed(table, chosen.time)

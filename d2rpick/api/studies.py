@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
 
+_FIRST: Final = b'{"source": '
+_LAST: Final = b'{"schema": '  # of the summary behind the rows
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Study(Paged, core.Study):
@@ -195,18 +198,18 @@ def rows_of(
     """
     known = dict(ledger.known) if ledger else {}
     new = [number for number in range(len(sources)) if number not in known]
-    done, following = len(known), 0
+    done = len(known)
+    following = 0
     names = [sources[number] for number in new]
     if absolute:
         names = [abspath(name) for name in names]  # noqa: PTH100
     for answer in chain((None,), farm.answers(partial(core.ask, question), names)):
         if answer:
             number = new[answer.number]
-            row = (
-                core.failed(sources[number], answer.error)
-                if answer.error
-                else answer.result
-            )
+            if answer.error:
+                row = core.failed(sources[number], answer.error)
+            else:
+                row = answer.result
             known[number] = replace(row, source=sources[number])
             done += 1
             if ledger:
@@ -216,10 +219,6 @@ def rows_of(
         while following in known:
             yield known.pop(following)
             following += 1
-
-
-_FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # of the summary behind the rows
 
 
 def fingerprint(question: Question) -> str:
@@ -330,16 +329,16 @@ class Ledger:
 
     def told(self, runs: int) -> str:
         """Say how many of so many runs were taken, and why others that the file holds were not."""
-        outdated = (
-            f"; {self.outdated} have changed, or were computed with other options"
-            if self.outdated
-            else ""
-        )
-        damaged = (
-            f"; lines skipped, damaged or without a checksum: {self.damaged}"
-            if self.damaged
-            else ""
-        )
+        if self.outdated:
+            outdated = (
+                f"; {self.outdated} have changed, or were computed with other options"
+            )
+        else:
+            outdated = ""
+        if self.damaged:
+            damaged = f"; lines skipped, damaged or without a checksum: {self.damaged}"
+        else:
+            damaged = ""
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:

@@ -56,7 +56,8 @@ class Suggestion(RunAnswer, answers.Suggestion):
         """
         from d2rpick.report.suggestion import CANDIDATE
 
-        source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
+        source = list(self.situation.history.source)
+        rows = self.to_dict()["candidates"]
         return frame_of(
             rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source
         )
@@ -67,7 +68,8 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
-        pair, asked = self.recommended, self.question
+        pair = self.recommended
+        asked = self.question
         judge = partial(
             answers.verify_of,
             asked.reference,
@@ -224,13 +226,10 @@ def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestio
         and _read(found.better_pair) == _read(found.recommended)
     ):
         found = replace(found, better_pair=None)
-    times = (
-        ("--td-window", *map(repr, td))
-        if isinstance(td, tuple)
-        else ()
-        if td is None
-        else ("--td", repr(td))
-    )
+    if isinstance(td, tuple):
+        times = ("--td-window", *map(repr, td))
+    else:
+        times = () if td is None else ("--td", repr(td))
     return Suggestion.about(asked, found, *times)
 
 
@@ -318,13 +317,12 @@ def judged(
         from d2rpick.choice.comparison import times_of
 
         read = times_of(other.history, asked.reference.history)
-        tr, td = read[0] if tr is None else tr, read[1] if td is None else td
+        tr = read[0] if tr is None else tr
+        td = read[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found, times = (
-        answers.verify_of(asked.reference, tr, td, asked.settings),
-        ["--tr", repr(tr), "--td", repr(td)],
-    )
+    found = answers.verify_of(asked.reference, tr, td, asked.settings)
+    times = ["--tr", repr(tr), "--td", repr(td)]
     if switched is not None and other:
         found = answers.compare_with(found, asked.reference, other, min_mean_energy)
         times += [text for name in switched.sources for text in ("--switched", name)]

@@ -61,11 +61,10 @@ def frame_of_table(table: Any) -> pd.DataFrame:
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
     if hasattr(table, "to_dataframe"):  # xarray; only an array has a name
-        frame = (
-            table.to_dataframe(name=_SERIES_NAME)
-            if hasattr(table, "name")
-            else table.to_dataframe()
-        )
+        if hasattr(table, "name"):
+            frame = table.to_dataframe(name=_SERIES_NAME)
+        else:
+            frame = table.to_dataframe()
         return pd.DataFrame(frame)
     if hasattr(table, "collect"):  # a frame of polars that is not computed yet
         table = table.collect()
@@ -77,11 +76,9 @@ def frame_of_table(table: Any) -> pd.DataFrame:
         )
     if hasattr(table, "to_pandas"):  # pyarrow and others
         frame = table.to_pandas()
-        return (
-            frame.to_frame(_SERIES_NAME)
-            if isinstance(frame, pd.Series)
-            else pd.DataFrame(frame)
-        )
+        if isinstance(frame, pd.Series):
+            return frame.to_frame(_SERIES_NAME)
+        return pd.DataFrame(frame)
     if isinstance(table, Mapping):
         return pd.DataFrame({str(name): values for name, values in table.items()})
     kind = getattr(getattr(table, "dtype", None), "kind", "")

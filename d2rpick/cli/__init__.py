@@ -53,6 +53,10 @@ BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ende
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 
+_VERSIONS: Final = (
+    "Show the version, and those of the libraries it stands on, and exit."
+)
+
 
 class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe has seen enough
     """Carries BrokenPipeError past click, which would exit with 1: an objection."""
@@ -131,11 +135,10 @@ class _Group(Documented, click.Group):
             import difflib
 
             close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = (
-                f"Did you mean {close[0]!r}?"
-                if close
-                else f"The commands are {', '.join(COMMANDS)}."
-            )
+            if close:
+                hint = f"Did you mean {close[0]!r}?"
+            else:
+                hint = f"The commands are {', '.join(COMMANDS)}."
             raise click.UsageError(f"No such command {args[0]!r}. {hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -204,11 +207,6 @@ def _tell_error(message: str) -> None:
     from d2rpick.cli.output import tell
 
     tell(f"d2rpick: {message}")
-
-
-_VERSIONS: Final = (
-    "Show the version, and those of the libraries it stands on, and exit."
-)
 
 
 def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:

@@ -58,11 +58,10 @@ def _described(command: click.Command, context: click.Context) -> Iterator[str]:
     for paragraph in (command.help or "").split("\n\n"):
         yield from (".PP", _text(" ".join(paragraph.split())))
     for option in command.get_params(context):
-        record = (
-            option.get_help_record(context)
-            if isinstance(option, click.Option)
-            else None
-        )
+        if isinstance(option, click.Option):
+            record = option.get_help_record(context)
+        else:
+            record = None
         if record:
             yield from _item(*record)
     if command.epilog:

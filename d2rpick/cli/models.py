@@ -22,6 +22,17 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
+# Columns of a solver's table beside time_s, by what it is.
+SOLVER = {
+    "pairs": ("reference_m", "published_m", "better_m"),
+    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
+}
+SECTIONS = ("1", "2", "3", "4", "5")
+_ABSENT = (
+    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
+    "repository and call d2rpick from there: pip install -e ."
+)
+
 
 @options.command
 @options.takes(
@@ -97,7 +108,8 @@ def _run(box: Box, output: Output) -> None:
 
     form = box.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()
-    windows, plot = box.windows, output.plot
+    windows = box.windows
+    plot = output.plot
     record = box.simulated(*windows)
     output.notes((), unbalanced(record))
     if plot:
@@ -115,7 +127,8 @@ def _run(box: Box, output: Output) -> None:
 def _scan(box: Box, output: Output) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
     output = output.beside()
-    scanning, plot = Scanning(box), output.plot
+    scanning = Scanning(box)
+    plot = output.plot
     output.notes((), scanning.cautions)
     with counting(len(scanning.times), quiet=output.quiet) as count:
         found = scanning.run(count.tell)
@@ -127,18 +140,6 @@ def _scan(box: Box, output: Output) -> None:
         write("rollover", output.output_format or "table", found, output.shown())
     )
     output.finish(objection=found.answer.recommended is None)
-
-
-# Columns of a solver's table beside time_s, by what it is.
-SOLVER = {
-    "pairs": ("reference_m", "published_m", "better_m"),
-    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
-}
-SECTIONS = ("1", "2", "3", "4", "5")
-_ABSENT = (
-    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
-    "repository and call d2rpick from there: pip install -e ."
-)
 
 
 @options.command

@@ -138,7 +138,8 @@ def suggest(
     from d2rpick.api.asked import ask
     from d2rpick.api.suggestions import suggested
 
-    wanted, card = time_or_window(td, td_window), output.output_format == "card"
+    wanted = time_or_window(td, td_window)
+    card = output.output_format == "card"
     if card:
         check_switched("-f card", request, cards)
     output.check(cards)
@@ -159,11 +160,10 @@ def suggest(
     )
     if card:
         found = answer.printed(cards)
-        told = (
-            []
-            if found is None
-            else [one for one in all_cautions(found) if one not in answer.cautions]
-        )
+        if found is None:
+            told = []
+        else:
+            told = [one for one in all_cautions(found) if one not in answer.cautions]
         return output.finish(
             objection=not (output.card(found, told) and passed),
         )
@@ -229,7 +229,8 @@ def explore(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     output.answer(answer)
-    chosen, least = answer.recommended, asked.settings.min_quality
+    chosen = answer.recommended
+    least = asked.settings.min_quality
     passed = chosen and chosen.decision and chosen.decision.reaches(least)
     output.finish(objection=not passed)
 
@@ -434,11 +435,10 @@ def plan(
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
     found = answer.printed(cards, every=every) if form == "card" or write_deck else None
-    checked, passed = (
-        _write_and_check(found, answer, write_deck, output)
-        if found and write_deck
-        else ("", True)
-    )
+    if found and write_deck:
+        checked, passed = _write_and_check(found, answer, write_deck, output)
+    else:
+        checked, passed = ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":

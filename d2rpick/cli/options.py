@@ -306,7 +306,8 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
 
 def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that is a time, or a window of time."""
-    pair, required = more.get("pair", False), more.pop("required", False)
+    pair = more.get("pair", False)
+    required = more.pop("required", False)
     return option(
         name[2:].replace("-", "_"),
         Option(text, TIME, "LO HI" if pair else "T", **more),
@@ -321,7 +322,8 @@ def file(
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
-    required, kind = more.pop("required", False), more.pop("kind", "file")
+    required = more.pop("required", False)
+    kind = more.pop("kind", "file")
     return option(
         name[2:].replace("-", "_"),
         Option(text, kind, metavar, **more),
@@ -411,7 +413,8 @@ def _settings(ctx: click.Context) -> Iterator[str]:
 
     for one in ctx.command.get_params(ctx):
         if one.expose_value and one.name:
-            value, source = ctx.params[one.name], _source(ctx, one.name)
+            value = ctx.params[one.name]
+            source = _source(ctx, one.name)
             named = {
                 "environment": f", {_variable(ctx, one.name)}",
                 "settings": f", {ctx.meta['d2rpick.settings']}",

@@ -130,7 +130,8 @@ class Output:
         _check_report(self.report)
         claimed: dict[str, str] = {}
         for name in ("output_file", "plot", "report"):
-            file, named = getattr(self, name), f"--{dashed(name)}"
+            file = getattr(self, name)
+            named = f"--{dashed(name)}"
             if file is not None:
                 output.claim(file)
                 other = claimed.setdefault(os.path.realpath(file), named)
@@ -228,13 +229,11 @@ class Output:
             self.write(self.file, content)
             return
         text = content.decode()
-        colour = (
-            False
-            if os.environ.get("NO_COLOR")
-            else True
-            if os.environ.get("FORCE_COLOR")
-            else None
-        )
+        colour: bool | None = None
+        if os.environ.get("NO_COLOR"):
+            colour = False
+        elif os.environ.get("FORCE_COLOR"):
+            colour = True
         bold = re.sub(_ANSWER, lambda line: click.style(line[0], bold=True), text)
         click.echo(bold, nl=False, color=colour)
 
@@ -307,11 +306,10 @@ def columns_of(stream: TextIO) -> int | None:
     """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
     given = os.environ.get("COLUMNS", "")
     try:
-        columns = (
-            int(given)
-            if given.isdecimal()
-            else os.get_terminal_size(stream.fileno()).columns
-        )
+        if given.isdecimal():
+            columns = int(given)
+        else:
+            columns = os.get_terminal_size(stream.fileno()).columns
     except OSError:
         return None
     from d2rpick.report.formats import WIDEST
@@ -360,11 +358,11 @@ def with_options(message: str) -> str:
     'give it as --after where it is known'
     """
     named = "`" in message
-    return (
-        re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message)
-        if named
-        else message
-    )
+    if named:
+        return re.sub(
+            r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message
+        )
+    return message
 
 
 def option_of(argument: str) -> str:

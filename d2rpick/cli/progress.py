@@ -54,11 +54,10 @@ class Count:
     def told(self, seconds: float) -> str:
         """Say how far it is after so many seconds, and how long the rest will take at this pace."""
         computed = self.done - max(self.taken, 0)
-        left = (
-            f", {_clock(seconds / computed * (self.total - self.done))} left"
-            if computed
-            else ""
-        )
+        if computed:
+            left = f", {_clock(seconds / computed * (self.total - self.done))} left"
+        else:
+            left = ""
         return f"{self.done} of {self.total} runs{left}"
 
 
@@ -117,7 +116,8 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
         room = (
             shutil.get_terminal_size().columns - 1
         )  # a line that wraps could not be erased
-        before, line = line, say(seconds)[-room:]
+        before = line
+        line = say(seconds)[-room:]
         sys.stderr.write(f"\r{line.ljust(len(before))}")
         sys.stderr.flush()
     if line:

@@ -123,7 +123,8 @@ def drive(
 def _plan(driving: Driving) -> list[str]:
     import shlex
 
-    deck, commands = driving.deck, driving.commands
+    deck = driving.deck
+    commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
     return [
         f"copies    {', '.join(deck.files)} to {driving.folder}",
@@ -187,7 +188,8 @@ def follow(
     for one in events(
         run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
     ):
-        failed, since = failed or one.event == "failed", one.time
+        failed = failed or one.event == "failed"
+        since = one.time
         if output.output_format == "ndjson":
             text = json.dumps(one._asdict(), allow_nan=False)
         else:

@@ -107,7 +107,8 @@ def study(
     _check_ledger(resume, written)
     question = question_of(request, asked, curve=bool(output.plot or output.report))
     ledger = Ledger(resume, question) if resume is not None else None
-    mark, rows = fingerprint(question), []
+    mark = fingerprint(question)
+    rows = []
     by_line = output.output_format == "ndjson"
     streaming = by_line and output.file is None
     quiet = output.quiet or (streaming and sys.stdout.isatty())
@@ -143,11 +144,10 @@ def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
-        where = (
-            ""
-            if listed is None
-            else f"{'standard input' if listed == '-' else listed} names none; "
-        )
+        if listed is None:
+            where = ""
+        else:
+            where = f"{'standard input' if listed == '-' else listed} names none; "
         raise click.UsageError(
             f"no runs; {where}give their names, or a list with --from"
         )

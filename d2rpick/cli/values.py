@@ -25,6 +25,14 @@ if TYPE_CHECKING:
 else:
     FloatType = click.ParamType  # generic from click 8.4 on
 
+CARDS: Final = tuple(options_of(Cards))
+# What counts only beside one of other options: settings are for all commands, and not all of them are asked for it.
+_BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
+    "weights": ("deck",),
+    "step_ratio": ("cost_share", "deck"),
+    **dict.fromkeys(CARDS, ("report", "write_deck")),
+}
+
 
 class NumberType(FloatType):
     """A finite number with a point within its limits."""
@@ -242,15 +250,6 @@ def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
     return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)
 
 
-CARDS: Final = tuple(options_of(Cards))
-# What counts only beside one of other options: settings are for all commands, and not all of them are asked for it.
-_BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
-    "weights": ("deck",),
-    "step_ratio": ("cost_share", "deck"),
-    **dict.fromkeys(CARDS, ("report", "write_deck")),
-}
-
-
 def settings_of(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
@@ -327,11 +326,9 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
     from pathlib import Path  # mostly no file is among the settings
 
     folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
-    return (
-        [str(Path(folder, name)) for name in found]
-        if has_list
-        else str(Path(folder, found))
-    )
+    if has_list:
+        return [str(Path(folder, name)) for name in found]
+    return str(Path(folder, found))
 
 
 def _refuse_dangerous(option: click.Option, place: str) -> None:
@@ -366,11 +363,9 @@ def _expected_kind(option: click.Option) -> str:
         return "true or false"
     if isinstance(option.type, File):
         return "a text"
-    return (
-        "a whole number"
-        if isinstance(option.type, click.IntRange)
-        else "a number or a text"
-    )
+    if isinstance(option.type, click.IntRange):
+        return "a whole number"
+    return "a number or a text"
 
 
 def _counts(

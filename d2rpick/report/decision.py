@@ -28,23 +28,22 @@ def headed(decision: Decision, tr: float, td: float) -> Lines:
 def outlook(decision: Decision) -> str:
     """What is expected after td, and the worst case if that is another one."""
     worst = decision.worst_case
-    return (
-        decision.expected
-        if worst == "the same"
-        else f"{decision.expected}. At worst: {worst}"
-    )
+    if worst == "the same":
+        return decision.expected
+    return f"{decision.expected}. At worst: {worst}"
 
 
 def statements(decision: Decision) -> Lines:
     """What is said of motion and vibration, each by itself, with what the verdict does not say already."""
-    motion, vibration = decision.quality.motion, decision.quality.vibration
-    alone, worth = decision.quality.alone, decision.quality.worth
+    motion = decision.quality.motion
+    vibration = decision.quality.vibration
+    alone = decision.quality.alone
+    worth = decision.quality.worth
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
-    share = (
-        f"; its error holds at most {worth.share:.2%} of the energy of the next contact"
-        if worth
-        else ""
-    )
+    if worth:
+        share = f"; its error holds at most {worth.share:.2%} of the energy of the next contact"
+    else:
+        share = ""
     return [
         ("motion", f"{motion.grade}{_further(motion, decision)}"),
         ("vibration", f"{vibration.grade}{raised}{_further(alone, decision)}{share}"),
@@ -82,11 +81,10 @@ def rigid_for(best: Candidate) -> str:
 def accuracy(best: Candidate) -> str:
     """Say how exactly tr is known, and how far another one may lie from it; empty if nothing is known of either."""
     known = "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
-    room = (
-        ""
-        if best.timing_tolerance is None
-        else f"any tr within ±{best.timing_tolerance:.1g} is nearly as good (error larger by at most 0.05)"
-    )
+    if best.timing_tolerance is None:
+        room = ""
+    else:
+        room = f"any tr within ±{best.timing_tolerance:.1g} is nearly as good (error larger by at most 0.05)"
     return "; ".join(filter(None, (known, room)))
 
 

@@ -61,11 +61,10 @@ def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(one.kind for one in found.legs):
         own = [one for one in found.legs if one.kind == kind]
-        cpu = (
-            None
-            if any(one.cpu is None for one in own)
-            else f"{sum(one.cpu or 0.0 for one in own):.4g}"
-        )
+        if any(one.cpu is None for one in own):
+            cpu = None
+        else:
+            cpu = f"{sum(one.cpu or 0.0 for one in own):.4g}"
         rows.append(
             [
                 kind,
@@ -86,9 +85,10 @@ def outlook(found: Driven) -> list[tuple[str, str]]:
         strict=True,
     )
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
-    lines = (
-        [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
-    )
+    if saved:
+        lines = [("saves", f"{', '.join(saved)}, against a deformable run")]
+    else:
+        lines = []
     lines += [
         ("place", one.message) for one in found.cautions if one.code == "out-of-place"
     ]

@@ -37,6 +37,28 @@ _OVERVIEW: Final = 200
 # Between the section, the chart of the motion and what is said of a pair.
 _NEXT: Final = "<!-- next -->"
 
+# What is listed of a pair, by key, in this order.
+_VALUES: Final[Mapping[str, str]] = {
+    "verdict": "verdict",
+    "why": "why",
+    "cure": "to improve",
+    "compared": "change",
+    "residual": "residual",
+    "after": "mean energy after td",
+    "level_error": "level error",
+    "kinetic": "kinetic fraction",
+    "rigid": "rigid",
+    "run_time": "saves",
+    "level": "energy at td",
+    "tolerance": "timing tolerance",
+    "windows": "acceptable tr",
+    "reason": "no tr",
+}
+# Columns in which windows of acceptable tr are drawn, a multiple of eight.
+_COLUMNS: Final = 480
+# Digits of a difference that people read.
+_READ: Final = 3
+
 
 def styles() -> tuple[Markup, ...]:
     """Give the style sheets that the interactive part needs."""
@@ -69,11 +91,10 @@ def explorer(explored: Explorer | None) -> Markup:
     )
     section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
     values = Template(values).substitute(listed=join(listed))
-    below = (
-        (motion, values)
-        if any(flight["motion"] for flight in flights)
-        else (values, "")
-    )
+    if any(flight["motion"] for flight in flights):
+        below = (motion, values)
+    else:
+        below = (values, "")
     options = (
         tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
     )
@@ -110,7 +131,8 @@ def _data(name: str, content: Any) -> Markup:
 def _flight(found: TradeOff) -> dict[str, Any]:
     """What is drawn and said of one flight."""
     situation = found.situation
-    history, flight = situation.history, situation.flight
+    history = situation.history
+    flight = situation.flight
     first = found.asked or found.recommended or found.start or found.offers[-1]
     seen = view_of(situation, found.offers[-1].td)
     levels = [one.energy_td for one in found.offers]
@@ -169,29 +191,6 @@ def _brief(values: Samples) -> list[float]:
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
-# What is listed of a pair, by key, in this order.
-_VALUES: Final[Mapping[str, str]] = {
-    "verdict": "verdict",
-    "why": "why",
-    "cure": "to improve",
-    "compared": "change",
-    "residual": "residual",
-    "after": "mean energy after td",
-    "level_error": "level error",
-    "kinetic": "kinetic fraction",
-    "rigid": "rigid",
-    "run_time": "saves",
-    "level": "energy at td",
-    "tolerance": "timing tolerance",
-    "windows": "acceptable tr",
-    "reason": "no tr",
-}
-# Columns in which windows of acceptable tr are drawn, a multiple of eight.
-_COLUMNS: Final = 480
-# Digits of a difference that people read.
-_READ: Final = 3
-
-
 def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
     """Give a row for each td, the names of its values once: ``numbers`` for curves, ``texts`` that stand beside them.
 
@@ -226,11 +225,9 @@ def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
 
 def _saved(offer: Offer) -> float | None:
     """What a pair saves [%]: of the run time, or of the record where no cost is known."""
-    share = (
-        offer.best.rigid_fraction
-        if offer.best and offer.saving is None
-        else offer.saving
-    )
+    share = offer.saving
+    if offer.best and share is None:
+        share = offer.best.rigid_fraction
     return None if share is None else 100 * share
 
 
@@ -260,24 +257,23 @@ def _short(value: float | None) -> float | None:
 
 def _error_name(offers: Sequence[Offer]) -> str:
     """Name what offers are compared by."""
-    return (
-        "shortfall of the level at td"
-        if all(one.basis == "energy" for one in offers)
-        else "residual"
-    )
+    if all(one.basis == "energy" for one in offers):
+        return "shortfall of the level at td"
+    return "residual"
 
 
 def _saved_name(offers: Sequence[Offer]) -> str:
     """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
     known = any(one.saving is not None for one in offers)
-    return (
-        "saved, % of the processor time" if known else "rigid, % of the simulated time"
-    )
+    if known:
+        return "saved, % of the processor time"
+    return "rigid, % of the simulated time"
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
     """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
-    best, decision = offer.best, offer.decision
+    best = offer.best
+    decision = offer.decision
     return {
         "td": short(offer.td),
         "tr": short(best.tr) if best else "none",
@@ -297,7 +293,8 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     """What is said of the recommended tr."""
-    kept, windows = offer.answer.kept, offer.answer.windows
+    kept = offer.answer.kept
+    windows = offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
         "after": None if kept is None else f"{span_of(kept)} of the reference's",

@@ -69,9 +69,9 @@ class Field(NamedTuple):
         """Give the value as the thing has it."""
         if self.get:
             return self.get(thing)
-        return (
-            thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
-        )
+        if isinstance(thing, Mapping):
+            return thing[self.key]
+        return getattr(thing, self.key)
 
 
 def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
@@ -118,9 +118,9 @@ def row(
 def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
     """Give a kind by its name, within limits in the words of JSON schema: ``minimum=0``."""
     known = _KINDS[kind] if isinstance(kind, str) else kind
-    return (
-        Kind({**known.schema, **limits}, known.plain, known.name) if limits else known
-    )
+    if limits:
+        return Kind({**known.schema, **limits}, known.plain, known.name)
+    return known
 
 
 def maybe(kind: Kind | Name) -> Kind:
@@ -129,11 +129,10 @@ def maybe(kind: Kind | Name) -> Kind:
     known = kind.schema
     if None in known.get("enum", ()) or "null" in known.get("type", ()):
         return kind
-    null = (
-        {"enum": [*known["enum"], None]}
-        if "enum" in known
-        else {"type": [known["type"], "null"]}
-    )
+    if "enum" in known:
+        null = {"enum": [*known["enum"], None]}
+    else:
+        null = {"type": [known["type"], "null"]}
     return Kind(
         {**known, **null},
         lambda value: None if value is None else kind.plain(value),

@@ -46,6 +46,18 @@ STRETCHES: Final = 400
 # Of a name from a file, what fits into a legend; in full it stands in the result.
 _LONGEST_NAME = 28
 
+# Width [inch]: on a phone as wide as the screen its letters have about the size of those of the page, and a page that
+# has more room makes them no larger than its own.
+PAGE_WIDTH: Final = 4.5
+# Above the panels, for the labels of the switch times; between panels; on the right, for half a number; below, for
+# numbers and name of the time axis; for a line of the legend; and beside the name of the other axis [inch].
+_TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
+# Height of the letters of an axis' name [inch].
+_NAME: Final = 0.16
+_COLUMNS: Final = 2
+# Numbers of the time axis, at most.
+_NUMBERS: Final = 5
+
 
 class Figure(figures.Figure):
     """A figure that a notebook shows, whatever its backend is."""
@@ -95,7 +107,8 @@ def picture_format(name: str) -> str:
 
 def render(figure: figures.Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
-    content, form = io.BytesIO(), picture_format(name)
+    content = io.BytesIO()
+    form = picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with mpl.rc_context({"svg.hashsalt": "d2rpick"}), any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
@@ -236,19 +249,6 @@ def plain(name: str) -> str:
     shown = "".join(letter if letter.isprintable() else "?" for letter in name)
     shown = shown if len(shown) <= _LONGEST_NAME else f"{shown[: _LONGEST_NAME - 1]}…"
     return f"{' ' if shown.startswith('_') else ''}{shown}".replace("$", r"\$")
-
-
-# Width [inch]: on a phone as wide as the screen its letters have about the size of those of the page, and a page that
-# has more room makes them no larger than its own.
-PAGE_WIDTH: Final = 4.5
-# Above the panels, for the labels of the switch times; between panels; on the right, for half a number; below, for
-# numbers and name of the time axis; for a line of the legend; and beside the name of the other axis [inch].
-_TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
-# Height of the letters of an axis' name [inch].
-_NAME: Final = 0.16
-_COLUMNS: Final = 2
-# Numbers of the time axis, at most.
-_NUMBERS: Final = 5
 
 
 def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:

@@ -62,6 +62,52 @@ _BEYOND_FLIGHTS: Final = 0.05
 # Of the record: the times of a shorter window have no room beside each other.
 _ROOM_FOR_TIMES: Final = 0.2
 
+_COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
+_HATCHES: Final = {
+    "supported": None,
+    "re-plan": "//",
+    "done": None,
+}  # told apart without colour, too
+# Of the figure in a file, and of the axes on a page [inch].
+_PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
+# Share of the axes below the energy in which the windows are drawn; parts of which the energy is drawn.
+_STRIP: Final = 0.07
+_MOST_PARTS: Final = 6
+# Of the figure in a file, and of one of its axes on a page [inch].
+_TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
+# Room beside the first and last td, as a share of the axes: lines and marks there are seen whole.
+_AT_EDGE: Final = 0.02
+_ERRORS: Final = {True: "shortfall of the level", False: "residual"}
+# Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
+_RUN_COLOURS: Final = (
+    REFERENCE,
+    SWITCHED,
+    GOOD,
+    "#0072b2",
+    "#cc79a7",
+    "#e69f00",
+    "#56b4e9",
+)
+_PATTERNS: Final = ("-", "--")
+# Up to so many runs each has its own colour and name; beyond, all are grey and those that stand out are named.
+_NAMED: Final = 10
+_MOST_OUTLIERS: Final = 5
+_GREY: Final = "#808080"
+# Many curves over each other are together as dark as so many, and none is fainter than this.
+_DARK, _FAINTEST = 10, 0.02
+# Above so many runs lines and marks are thin.
+_MANY: Final = 40
+# Shown before the first tr and after td, as shares of the time between.
+_BEFORE, _AFTER = 0.25, 0.15
+# Height of the figure [inch].
+_HEIGHT: Final = 4.0
+# Height of a name, as a share of the axes.
+_LINE: Final = 0.055
+# A line to a name begins at the left of it.
+_ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
+# The lowest level may be so much lower than the others before it counts for the axis.
+_LOWEST: Final = 50.0
+
 
 def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
     """Energy in the flight with its level at td, candidates or acceptable windows, the choice; below it the motion.
@@ -140,17 +186,16 @@ def _draw_energy(
     candidates: Sequence[Candidate],
     bands: Sequence[tuple[float, float]],
 ) -> None:
-    history, level, flight, span = (
-        situation.history,
-        situation.energy_td,
-        situation.flight,
-        situation.evidence.span,
-    )
+    history = situation.history
+    level = situation.energy_td
+    flight = situation.flight
+    span = situation.evidence.span
     drawn = draw_outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
     if flight.start is not None:
-        known = (
-            span.end if span else situation.td
-        )  # without a contact, as far as it was seen
+        if span:
+            known = span.end
+        else:
+            known = situation.td
         end = known if flight.end is None else flight.end
         shade(axes, (flight.start, end), f"flight ({flight.source})")
     axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
@@ -194,19 +239,6 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
     axes.set_ylabel("deformation [√energy]")
 
 
-_COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
-_HATCHES: Final = {
-    "supported": None,
-    "re-plan": "//",
-    "done": None,
-}  # told apart without colour, too
-# Of the figure in a file, and of the axes on a page [inch].
-_PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn; parts of which the energy is drawn.
-_STRIP: Final = 0.07
-_MOST_PARTS: Final = 6
-
-
 def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     """Draw the energy over time, the flights behind it and the rigid windows below it."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
@@ -246,7 +278,8 @@ def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
     """Show the flights, and a little of what lies before and after them."""
     if not plan.flights:
         return
-    start, end = plan.flights[0].start, plan.flights[-1].end
+    start = plan.flights[0].start
+    end = plan.flights[-1].end
     beyond = _BEYOND_FLIGHTS * (end - start)
     first, last = plan.history.time[[0, -1]].tolist()
     axes.set_xlim(max(first, start - beyond), min(last, end + beyond))
@@ -286,7 +319,8 @@ def draw_run(
 def draw_parts(found: Parts) -> Figure:
     """Draw the energies of the parts that have most over time, and the flights; FormatError without parts."""
     run = found.files
-    energies, time = run.part_energies(run.parts), run.part_time
+    energies = run.part_energies(run.parts)
+    time = run.part_time
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     for at in energies.max(axis=0).argsort()[::-1][:_MOST_PARTS]:
         curve = draw_outline(time, energies[:, at], stretches=STRETCHES)
@@ -305,13 +339,6 @@ def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
         figures.arrange(figure, [axes], _PLAN_PANEL)
     else:
         figures.legend_below(figure, [axes])
-
-
-# Of the figure in a file, and of one of its axes on a page [inch].
-_TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Room beside the first and last td, as a share of the axes: lines and marks there are seen whole.
-_AT_EDGE: Final = 0.02
-_ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 
 def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
@@ -365,37 +392,6 @@ def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
     )
 
 
-# Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
-_RUN_COLOURS: Final = (
-    REFERENCE,
-    SWITCHED,
-    GOOD,
-    "#0072b2",
-    "#cc79a7",
-    "#e69f00",
-    "#56b4e9",
-)
-_PATTERNS: Final = ("-", "--")
-# Up to so many runs each has its own colour and name; beyond, all are grey and those that stand out are named.
-_NAMED: Final = 10
-_MOST_OUTLIERS: Final = 5
-_GREY: Final = "#808080"
-# Many curves over each other are together as dark as so many, and none is fainter than this.
-_DARK, _FAINTEST = 10, 0.02
-# Above so many runs lines and marks are thin.
-_MANY: Final = 40
-# Shown before the first tr and after td, as shares of the time between.
-_BEFORE, _AFTER = 0.25, 0.15
-# Height of the figure [inch].
-_HEIGHT: Final = 4.0
-# Height of a name, as a share of the axes.
-_LINE: Final = 0.055
-# A line to a name begins at the left of it.
-_ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The lowest level may be so much lower than the others before it counts for the axis.
-_LOWEST: Final = 50.0
-
-
 class _Named(NamedTuple):
     curve: Samples
     name: str
@@ -437,9 +433,10 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
 
 def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Named]:
     """Give the runs that have a colour and a name: all where they are few, else those that stand out."""
-    chosen = (
-        list(runs) if len(runs) <= _NAMED else list(outliers(runs))[:_MOST_OUTLIERS]
-    )
+    if len(runs) <= _NAMED:
+        chosen = list(runs)
+    else:
+        chosen = list(outliers(runs))[:_MOST_OUTLIERS]
     names = dict(
         zip(map(id, runs), short_names([row.source for row in runs]), strict=True)
     )
@@ -460,10 +457,8 @@ def _draw_others(
 ) -> None:
     """Draw the runs without a name in grey; taken together they stay as dark as ten lines."""
     told = {id(one.curve) for one in named}
-    others, many = (
-        [curve.T for curve in curves if id(curve) not in told],
-        len(curves) > _MANY,
-    )
+    others = [curve.T for curve in curves if id(curve) not in told]
+    many = len(curves) > _MANY
     lines = LineCollection(
         others, colors=_GREY if told or len(others) > 1 else REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
         alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(others)))),
@@ -490,21 +485,17 @@ def _show_runs(
     """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
     if not curves:
         return
-    first, last = (
-        min(float(one[0, 0]) for one in curves),
-        max(float(one[0, -1]) for one in curves),
-    )
+    first = min(float(one[0, 0]) for one in curves)
+    last = max(float(one[0, -1]) for one in curves)
     times = [row.tr for row in drawn if row.tr is not None]
-    td = (
-        max((row.td for row in drawn if row.td is not None), default=last)
-        if answer.td is None
-        else answer.td
-    )
-    early = (
-        min([*times, td if answer.common.tr is None else answer.common.tr])
-        if times
-        else first
-    )
+    if answer.td is None:
+        td = max((row.td for row in drawn if row.td is not None), default=last)
+    else:
+        td = answer.td
+    if times:
+        early = min([*times, td if answer.common.tr is None else answer.common.tr])
+    else:
+        early = first
     span = (
         max(first, early - _BEFORE * (td - early)),
         min(last, td + _AFTER * (td - early)),
@@ -530,7 +521,8 @@ def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[S
 
 def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
     """Write the names of runs beside the axes, in the order of their curves there, with a line to each."""
-    end, free = axes.get_xlim()[1], 0.0
+    end = axes.get_xlim()[1]
+    free = 0.0
     places = ((_height(axes, float(np.interp(end, *one.curve))), one) for one in named)
     for place, one in sorted(places, key=lambda known: known[0]):
         at = max(free, min(place, 1 - _LINE * (len(named) - 1)))

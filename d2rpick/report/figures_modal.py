@@ -28,7 +28,8 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
     """Draw the residual of each tr in the flight, and that of a release without any vibration."""
-    profile, start = situation.vibration.profile, situation.earliest_tr
+    profile = situation.vibration.profile
+    start = situation.earliest_tr
     assert profile is not None
     shown = profile.time >= (-np.inf if start is None else start)
     residuals = np.asarray(

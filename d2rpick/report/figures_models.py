@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Outlines of the rolling box, as many as can be told apart.
 _OUTLINES = 8
 
+_SLED_LENGTH: Final = 1.6
+
 
 def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     """Displacements of both masses and the energies over time; the rigid window shaded."""
@@ -64,11 +66,10 @@ def draw_rollover(
 
     ``switched`` is the same box, rigid in ``windows``; without it there is nothing to compare.
     """
-    rows = (
-        ["roll", "roll difference", "height", "height difference"]
-        if switched
-        else ["roll", "height"]
-    )
+    if switched:
+        rows = ["roll", "roll difference", "height", "height difference"]
+    else:
+        rows = ["roll", "height"]
     figure = Figure(figsize=(12, 8 if switched else 5.5), layout="constrained")
     grid = figure.subplot_mosaic(
         [["outlines", row] for row in rows], width_ratios=(1.4, 1)
@@ -137,11 +138,10 @@ def _draw_outlines(
             color=GOOD,
         )
     axes.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
-    around = (
-        "; sled at start and end, curb, ground"
-        if parameters.drop is None
-        else "; ground"
-    )
+    if parameters.drop is None:
+        around = "; sled at start and end, curb, ground"
+    else:
+        around = "; ground"
     axes.set_title(f"box at the times named [ms]{around}", fontsize="medium")
     axes.grid(visible=True, linewidth=0.3)
 
@@ -226,9 +226,6 @@ def draw_scan(
             )
         finish(axes)
     return figure
-
-
-_SLED_LENGTH: Final = 1.6
 
 
 def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:

@@ -36,23 +36,6 @@ _SARIF: Final = {
 }
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
 
-
-@dataclass(frozen=True)
-class Checks:
-    """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
-
-    ``failed`` are decks that could not be read, ``history`` are the files by which
-    the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
-    """
-
-    results: Sequence[Checked]
-    root: str = field(default_factory=os.getcwd)
-    failed: Sequence[Unreadable] = ()
-    cautions: Sequence[Caution] = ()
-    history: Sequence[str] | None = None
-    fail_on: Severity = Severity.ERROR
-
-
 _LINE: Final = kind_of("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
@@ -76,6 +59,22 @@ _WINDOW: Final = row(
     Field("line", _LINE),
     Field("deck", "text"),
 )
+
+
+@dataclass(frozen=True)
+class Checks:
+    """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
+
+    ``failed`` are decks that could not be read, ``history`` are the files by which
+    the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
+    """
+
+    results: Sequence[Checked]
+    root: str = field(default_factory=os.getcwd)
+    failed: Sequence[Unreadable] = ()
+    cautions: Sequence[Caution] = ()
+    history: Sequence[str] | None = None
+    fail_on: Severity = Severity.ERROR
 
 
 def as_table(checks: Checks, _: Shown) -> str:
@@ -243,7 +242,8 @@ def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
 def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
     for result in checks.results:
         for window in result.windows:
-            place, unit = window.place, window.unit
+            place = window.place
+            unit = window.unit
             yield {
                 "part": window.part,
                 "part_set": unit.id if unit.is_set else None,

@@ -17,22 +17,6 @@ if TYPE_CHECKING:
 # Columns of text that are read at a glance; a terminal may have fewer.
 WIDEST: Final = 100
 
-
-class Shown(NamedTuple):
-    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
-
-    ``every``: all windows of a plan, not only the supported ones.  ``verbose``: all that is known; tables and text are
-    no wider than ``width`` columns.
-    """
-
-    command: Sequence[str] = ()
-    limit: int = 10
-    every: bool = False
-    lines: Sequence[str] = ()
-    verbose: bool = False
-    width: int = WIDEST
-
-
 PLAIN: Final = ("table", "json", "csv", "markdown")
 # The first form of each is the default.
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
@@ -48,6 +32,21 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "rollover": PLAIN,
     "findings": (*PLAIN, "ndjson", "github", "junit", "sarif"),
 }
+
+
+class Shown(NamedTuple):
+    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
+
+    ``every``: all windows of a plan, not only the supported ones.  ``verbose``: all that is known; tables and text are
+    no wider than ``width`` columns.
+    """
+
+    command: Sequence[str] = ()
+    limit: int = 10
+    every: bool = False
+    lines: Sequence[str] = ()
+    verbose: bool = False
+    width: int = WIDEST
 
 
 def write(result: str, form: str, answer: Any, shown: Shown) -> str:

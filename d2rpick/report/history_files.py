@@ -64,7 +64,8 @@ def _oscillator_table(motion: Trajectory) -> Table:
 def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
     """Energies of the oscillator; its time step is the output interval."""
     step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
-    internal, kinetic = motion.internal_energy, motion.kinetic_energy
+    internal = motion.internal_energy
+    kinetic = motion.kinetic_energy
     columns = {
         "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
         "internal energy": internal, "total energy": kinetic + internal,
@@ -74,7 +75,9 @@ def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
 
 def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
     """Parts frame, suspended mass and spring with their energies and momenta."""
-    frame, suspended, state = oscillator.frame_mass, oscillator.mass, motion.state
+    frame = oscillator.frame_mass
+    suspended = oscillator.mass
+    state = motion.state
     zero = 0.0 * motion.time
     parts = (
         matsum.PartColumns(
@@ -120,10 +123,8 @@ def _box_glstat(record: Record) -> bytes:
     The walls of the model are floor, curb and ground, see `Record`; the friction on them is energy of the contacts and
     is listed once more by itself, as Radioss does, since health asks for the energy of the contacts without friction.
     """
-    internal, kinetic = (
-        record.internal_energy.sum(axis=1),
-        record.kinetic_energy.sum(axis=1),
-    )
+    internal = record.internal_energy.sum(axis=1)
+    kinetic = record.kinetic_energy.sum(axis=1)
     zero = 0 * record.time
     speed = record.momentum.sum(axis=1) / record.mass
     return glstat.write(

@@ -39,31 +39,6 @@ WINDOW: Final = row(
     Field("share", "number", "of the flight up to td"),
 )
 
-
-class Read(Protocol):
-    """A file that was read."""
-
-    @property
-    def name(self) -> str:
-        """Name that the user gave it."""
-
-    def sha256(self) -> str:
-        """SHA-256 of what was read."""
-
-
-def _once(files: Iterable[Read]) -> dict[str, Read]:
-    """Files by their names: one that is included twice once."""
-    return {file.name: file for file in files}
-
-
-FILES: Final = (
-    Field("source", "texts", get=lambda read: _once(read.files)),
-    Field(
-        "sha256",
-        "texts",
-        get=lambda read: [file.sha256() for file in _once(read.files).values()],
-    ),
-)
 WEIGHTS: Final = (
     Field("source", "text", "where they come from, in words"),
     Field("file", "text?", "the file of --weights; null where they were not read from one",
@@ -84,33 +59,6 @@ HISTORY: Final = row(
     Field("notes", "texts"),
     name="history",
 )  # fmt: skip
-
-
-def _asked(answer: Any) -> Plan | Situation:
-    """Give what knows the history of an answer, and the settings."""
-    known: Plan | Situation = (
-        answer if hasattr(answer, "settings") else answer.situation
-    )
-    return known
-
-
-def _weights(answer: Any) -> Weights | None:
-    used = _asked(answer).settings.by_deck
-    return used.weights if used else None
-
-
-# What the JSON of an answer about a history begins with.
-FRAME: Final = (
-    WARNINGS,
-    Field("history", HISTORY, get=lambda answer: _asked(answer).history),
-    Field("deck", maybe(row(*FILES, closed=True)),
-          "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
-          "nothing of it is used",
-          lambda answer: _asked(answer).settings.by_deck),
-    Field("weights", maybe(row(*WEIGHTS, closed=True)),
-          "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
-)  # fmt: skip
-
 _SOURCE: Final = one_of(
     "given",
     "momentum",
@@ -136,29 +84,6 @@ FLIGHT: Final = row(
     ),
     name="flight",
 )
-
-
-def _oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Give the oscillator that was fitted, or None if none was looked for."""
-    fit = situation.evidence.fit
-    if fit is None:
-        return None
-    numbers = ("omega", "alpha", "energy_plastic", "preload")
-    return {
-        **{name: getattr(fit.mode, name) if fit.mode else None for name in numbers},
-        "misfit": fit.misfit,
-        "source": "given" if situation.settings.oscillator else "identified",
-        "describes_record": fit.describes_record,
-        "reason": fit.reason,
-    }
-
-
-def _modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Give the modes that the choice rests on, or None if it does not rest on the lines of the energy."""
-    modal = situation.vibration.modal
-    return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
-
-
 OSCILLATOR: Final = row(
     Field("omega", "number?"), Field("alpha", "number?"), Field("energy_plastic", "number?"),
     Field("preload", "number?", "square root of energy"),
@@ -168,23 +93,6 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# What is known at td; of a situation.
-MECHANICS: Final = row(
-    Field("energy_td", "number"),
-    Field("kinetic_share", maybe(SHARE)),
-    Field("kinetic_share_estimated", "flag",
-          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
-          lambda now: now.vibration.estimated is not None),
-    Field("basis", BASIS),
-    Field("flight", FLIGHT, "window of free flight"),
-    Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
-    Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
-    Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
-          "parts whose deformation has no sign; null where energies of single parts are not known",
-          lambda now: now.evidence.parts and now.evidence.parts.unsigned),
-)  # fmt: skip
-
 # Where a rigid body will be at td, as far as single parts tell.
 _POSITION: Final = (
     Field("position_error", "size?",
@@ -274,7 +182,6 @@ LATER: Final = (
     "residual_high",
     *(field.key for field in _POSITION),
 )
-
 MATCHES: Final = Field("parts", many(row(
     Field("name", "text"),
     Field("sign_match", "flag?"),
@@ -284,8 +191,6 @@ MATCHES: Final = Field("parts", many(row(
 )))  # fmt: skip
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
-
-
 # What is said of a pair, by the decision on it.
 DECIDED: Final = row(
     Field("verdict", VERDICT, "what to do with the pair, by its grade"),
@@ -358,3 +263,94 @@ HEALTH: Final = Field("health", maybe(row(
     name="health", later=("part_hourglass_share", "part", "until"),
 )), "of the reference run up to td; shares of the peak internal energy of the model, null for what the files do not "
     "have")  # fmt: skip
+
+
+class Read(Protocol):
+    """A file that was read."""
+
+    @property
+    def name(self) -> str:
+        """Name that the user gave it."""
+
+    def sha256(self) -> str:
+        """SHA-256 of what was read."""
+
+
+def _once(files: Iterable[Read]) -> dict[str, Read]:
+    """Files by their names: one that is included twice once."""
+    return {file.name: file for file in files}
+
+
+FILES: Final = (
+    Field("source", "texts", get=lambda read: _once(read.files)),
+    Field(
+        "sha256",
+        "texts",
+        get=lambda read: [file.sha256() for file in _once(read.files).values()],
+    ),
+)
+
+
+def _asked(answer: Any) -> Plan | Situation:
+    """Give what knows the history of an answer, and the settings."""
+    known: Plan | Situation = (
+        answer if hasattr(answer, "settings") else answer.situation
+    )
+    return known
+
+
+def _weights(answer: Any) -> Weights | None:
+    used = _asked(answer).settings.by_deck
+    return used.weights if used else None
+
+
+# What the JSON of an answer about a history begins with.
+FRAME: Final = (
+    WARNINGS,
+    Field("history", HISTORY, get=lambda answer: _asked(answer).history),
+    Field("deck", maybe(row(*FILES, closed=True)),
+          "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
+          "nothing of it is used",
+          lambda answer: _asked(answer).settings.by_deck),
+    Field("weights", maybe(row(*WEIGHTS, closed=True)),
+          "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
+)  # fmt: skip
+
+
+def _oscillator(situation: Situation) -> dict[str, Any] | None:
+    """Give the oscillator that was fitted, or None if none was looked for."""
+    fit = situation.evidence.fit
+    if fit is None:
+        return None
+    numbers = ("omega", "alpha", "energy_plastic", "preload")
+    return {
+        **{name: getattr(fit.mode, name) if fit.mode else None for name in numbers},
+        "misfit": fit.misfit,
+        "source": "given" if situation.settings.oscillator else "identified",
+        "describes_record": fit.describes_record,
+        "reason": fit.reason,
+    }
+
+
+def _modes(situation: Situation) -> list[dict[str, float]] | None:
+    """Give the modes that the choice rests on, or None if it does not rest on the lines of the energy."""
+    modal = situation.vibration.modal
+    return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
+
+
+# What is known at td; of a situation.
+MECHANICS: Final = row(
+    Field("energy_td", "number"),
+    Field("kinetic_share", maybe(SHARE)),
+    Field("kinetic_share_estimated", "flag",
+          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
+          lambda now: now.vibration.estimated is not None),
+    Field("basis", BASIS),
+    Field("flight", FLIGHT, "window of free flight"),
+    Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
+    Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
+          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
+    Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
+          "parts whose deformation has no sign; null where energies of single parts are not known",
+          lambda now: now.evidence.parts and now.evidence.parts.unsigned),
+)  # fmt: skip

@@ -114,9 +114,10 @@ def verdict(overview: Overview) -> list[tuple[str, str]]:
         cure = None if overview.unjudged else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
     flying = any(flight.parts for _, flight in overview.flights)
-    which = (
-        ["--part", "flying"] if flying else ["--part", "all"] if overview.parts else []
-    )
+    if flying:
+        which = ["--part", "flying"]
+    else:
+        which = ["--part", "all"] if overview.parts else []
     command = ["d2rpick", "plan", *which, *tables.positional(overview.source)]
     return [*lines, ("next", tables.shell_line(command))]
 
@@ -126,15 +127,15 @@ def as_markdown(overview: Overview, _: Shown) -> str:
     said = tables.listed(verdict(overview))
     known = [(name, value) for name, value in facts(overview) if value is not None]
     told = tables.as_markdown(("what", "value"), known)
-    parts = (
-        [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
-    )
+    if overview.parts:
+        parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))]
+    else:
+        parts = []
     listed = _health(overview)
-    health = (
-        [tables.as_markdown(head(overview.health), listed)]
-        if overview.health and listed
-        else []
-    )
+    if overview.health and listed:
+        health = [tables.as_markdown(head(overview.health), listed)]
+    else:
+        health = []
     return "\n\n".join(
         [
             *said,
@@ -221,9 +222,8 @@ def _force(force: ForceOverview) -> str:
 def _flight(source: str, flight: FreeFlight) -> str:
     names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
     who = ", ".join(names) or "the whole model"
-    end = (
-        f"to {flight.end:.6g}"
-        if flight.end_seen
-        else f"to the end of the record, {flight.end:.6g}"
-    )
+    if flight.end_seen:
+        end = f"to {flight.end:.6g}"
+    else:
+        end = f"to the end of the record, {flight.end:.6g}"
     return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"

@@ -48,6 +48,9 @@ _MOST_FILES: Final = 20  # of a deck that are named
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
+# The class of the card of a verdict, and of its badge.
+CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
+
 
 class Markup(str):
     """Text that is HTML already."""
@@ -309,10 +312,6 @@ def pair(
     )
 
 
-# The class of the card of a verdict, and of its badge.
-CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
-
-
 def decided(
     title: str,
     decision: Decision,
@@ -340,11 +339,10 @@ def deck_digests(
     """The same of a deck, its main file first, and of a file of weights; of many includes the first are named."""
     files = list({file.name: file for file in deck}.values())
     more = len(files) - _MOST_FILES
-    left = (
-        [("SHA-256", f"of {more} more files of the deck: in the JSON result")]
-        if more > 0
-        else []
-    )
+    if more > 0:
+        left = [("SHA-256", f"of {more} more files of the deck: in the JSON result")]
+    else:
+        left = []
     return [
         *digests(files[:_MOST_FILES]),
         *left,
@@ -408,7 +406,8 @@ def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
 
 def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
-    title, card = "Solver input", record.card
+    title = "Solver input"
+    card = record.card
     assert card is not None
     if card.refusal:
         return section(
@@ -437,11 +436,10 @@ def _read(situation: Situation, run: Run) -> Markup:
         for database in run.databases
         if database.version
     ]
-    whole = (
-        "the files end after a complete state"
-        if situation.history.complete
-        else "only complete states were used"
-    )
+    if situation.history.complete:
+        whole = "the files end after a complete state"
+    else:
+        whole = "only complete states were used"
     listed += [("complete", whole)]
     return pairs(listed + [("note", note) for note in situation.history.notes])
 

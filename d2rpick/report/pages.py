@@ -52,6 +52,10 @@ if TYPE_CHECKING:
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20
 
+# Of a table in a notebook.
+_FEW_ROWS: Final = 12
+_WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
+
 
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
     """Write a page about one run; where something can be explored it runs a script."""
@@ -73,9 +77,10 @@ def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> M
 
 
 def _draw_suggestion(answer: Suggestion) -> Markup:
-    shown = (
-        "the choice, and a better pair" if answer.clearly_better else "and the choice"
-    )
+    if answer.clearly_better:
+        shown = "the choice, and a better pair"
+    else:
+        shown = "and the choice"
     return _figures(
         "choice-",
         f"Internal energy with its level at td, {shown}",
@@ -107,12 +112,11 @@ def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Mar
 
 def _choice(answer: Suggestion) -> Markup:
     """Give the section above the figures: the pairs, large, and what to know of them."""
-    cards, better = [_recommended(answer)], answer.clearly_better
+    cards = [_recommended(answer)]
+    better = answer.clearly_better
     if better:
-        told, times = (
-            tag("p", suggestion.better_about(answer, better)),
-            (better.tr, better.td),
-        )
+        told = tag("p", suggestion.better_about(answer, better))
+        times = (better.tr, better.td)
         cards.append(
             page.pair(
                 "Better pair: another td", times, told, answer.situation.history, "card"
@@ -124,7 +128,8 @@ def _choice(answer: Suggestion) -> Markup:
 
 
 def _recommended(answer: Suggestion) -> Markup:
-    best, decision = answer.chosen, answer.decision
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
         return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
     times = best.tr, answer.td
@@ -148,7 +153,8 @@ def verdict_page(answer: Verdict, record: page.PageContext) -> str:
 
 
 def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
-    situation, candidate = answer.situation, answer.candidate
+    situation = answer.situation
+    candidate = answer.candidate
     times = candidate.tr, situation.td
     card = page.decided(
         "", answer.decision, times, situation.history, verdict.facts(answer)
@@ -303,7 +309,8 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
 
 
 def _common(answer: Study) -> Markup:
-    tr, title = answer.common.tr, tag("h2", "One tr for all runs")
+    tr = answer.common.tr
+    title = tag("h2", "One tr for all runs")
     if tr is None:
         return tag(
             "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
@@ -341,21 +348,19 @@ def _files(answer: Study) -> str:
 
 def parts_page(found: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    sets = (
-        [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
-        if found.sets
-        else []
-    )
+    if found.sets:
+        sets = [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
+    else:
+        sets = []
     tables = {
         name: unstarred(*parts.table(found, columns))
         for name, columns in parts.TABLES.items()
     }
     weights = [("weights", found.weights.source)] if found.weights else []
-    deck = (
-        page.deck_digests(found.inventory.files, found.weights)
-        if found.inventory
-        else []
-    )
+    if found.inventory:
+        deck = page.deck_digests(found.inventory.files, found.weights)
+    else:
+        deck = []
     return document(
         f"Parts to switch: {page.title_of(found.files)}",
         page.front([_set(found.recommended)], remarks(found.cautions)),
@@ -421,10 +426,8 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
     ]
     cards = cards or [tag("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights, rigid = (
-        [(one.free, one.contact or one.td) for one in switched],
-        [(one.tr, one.td) for one in switched],
-    )
+    flights = [(one.free, one.contact or one.td) for one in switched]
+    rigid = [(one.tr, one.td) for one in switched]
     return document(
         f"First run: {found.deck.name}",
         page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
@@ -437,9 +440,6 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
     )
 
 
-# Of a table in a notebook.
-_FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
 # What is said, the shortest first, and the head and rows of the table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]

@@ -112,6 +112,49 @@ PART: Final = row(
     Field("reasons", "texts"),
 )
 
+_HISTORY: Final = row(
+    Field("source", "texts", get=lambda run: run.sources),
+    Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
+    Field(
+        "format",
+        "text",
+        get=lambda run: " + ".join(one.format for one in run.databases),
+    ),
+    Field("notes", "texts"),
+)
+_DECK: Final = row(
+    *keys.FILES,
+    Field("solver", one_of("ls-dyna", "radioss")),
+    Field("parts", "integer", get=lambda deck: len(deck.parts)),
+    Field(
+        "elements",
+        "integer",
+        get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values()),
+    ),
+    Field("complete", "flag"),
+    Field("notes", "texts"),
+)
+_WEIGHTS: Final = row(
+    *keys.WEIGHTS,
+    Field("element_share", "number"),
+    Field("rigid_node", "number"),
+    Field("per_element", each("number")),
+)
+_FLIGHT: Final = row(
+    Field("start", "number"), Field("end", "number"), Field("longest", "flag")
+)
+_MOST_SHOWN = 6
+# Left out, in this order, where a terminal has no room for them.
+_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
+# Of parts, for people.
+_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
+# What the sets are called for people.
+_SET_NAMES: Final = {
+    "all that may": "all eligible parts",
+    "all but what moves": "all eligible parts but loose ones",
+    "heavy": "heaviest half by mass",
+}
+
 
 def _free(one: PartSet) -> bool | None:
     """Tell whether nothing deformable keeps the step."""
@@ -148,37 +191,6 @@ SET: Final = row(
     Field("reasons", "texts"),
     keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
 )  # fmt: skip
-_HISTORY: Final = row(
-    Field("source", "texts", get=lambda run: run.sources),
-    Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
-    Field(
-        "format",
-        "text",
-        get=lambda run: " + ".join(one.format for one in run.databases),
-    ),
-    Field("notes", "texts"),
-)
-_DECK: Final = row(
-    *keys.FILES,
-    Field("solver", one_of("ls-dyna", "radioss")),
-    Field("parts", "integer", get=lambda deck: len(deck.parts)),
-    Field(
-        "elements",
-        "integer",
-        get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values()),
-    ),
-    Field("complete", "flag"),
-    Field("notes", "texts"),
-)
-_WEIGHTS: Final = row(
-    *keys.WEIGHTS,
-    Field("element_share", "number"),
-    Field("rigid_node", "number"),
-    Field("per_element", each("number")),
-)
-_FLIGHT: Final = row(
-    Field("start", "number"), Field("end", "number"), Field("longest", "flag")
-)
 
 
 def _flights(found: Parts) -> list[dict[str, Any]]:
@@ -212,9 +224,6 @@ DOCUMENT: Final = Document(
     ),
     closed=True,
 )
-_MOST_SHOWN = 6
-# Left out, in this order, where a terminal has no room for them.
-_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
 
 
 def as_table(found: Parts, shown: Shown) -> str:
@@ -250,7 +259,8 @@ def as_value(found: Parts, _: Shown) -> str:
 
 def heading(found: Parts) -> list[tuple[str, str]]:
     """What was read, by names."""
-    run, deck = found.files, found.inventory
+    run = found.files
+    deck = found.inventory
     formats = " + ".join(one.format for one in run.databases)
     lines = [
         (
@@ -309,11 +319,9 @@ def _position(one: PartSet) -> str | None:
 
 def _least(one: PartSet, value: float | None) -> str | None:
     """An error, and whether it may be larger."""
-    return (
-        f">= {value:.3g}"
-        if one.position_is_lower_bound and value is not None
-        else _short(value)
-    )
+    if one.position_is_lower_bound and value is not None:
+        return f">= {value:.3g}"
+    return _short(value)
 
 
 def verdict(row: PartRow) -> str:
@@ -321,10 +329,6 @@ def verdict(row: PartRow) -> str:
     if row.merge_with is not None:
         return f"merge with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
-
-
-# Of parts, for people.
-_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
 
 
 def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
@@ -339,15 +343,15 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
             ("make rigid", "nothing: no set of parts can be recommended"),
             ("why", why),
         ]
-    bodies = (
-        "one rigid body"
-        if len(best.bodies) == 1
-        else f"{len(best.bodies)} rigid bodies"
-    )
+    if len(best.bodies) == 1:
+        bodies = "one rigid body"
+    else:
+        bodies = f"{len(best.bodies)} rigid bodies"
     flights = len(found.facts.flights)
-    where = (
-        f", if rigid in the longest of {flights} flights only" if flights > 1 else ""
-    )
+    if flights > 1:
+        where = f", if rigid in the longest of {flights} flights only"
+    else:
+        where = ""
     share = best.run_time_share
     saves = "unknown" if share is None else f"{saved(share)}{where}"
     return [
@@ -355,14 +359,6 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
         ("saves", saves),
         ("next", f"d2rpick plan --part {ranges(best.parts)} with the same files"),
     ]
-
-
-# What the sets are called for people.
-_SET_NAMES: Final = {
-    "all that may": "all eligible parts",
-    "all but what moves": "all eligible parts but loose ones",
-    "heavy": "heaviest half by mass",
-}
 
 
 def set_name(one: PartSet) -> str:
@@ -375,11 +371,10 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
     lines: list[tuple[str, str]] = []
     best = found.recommended
     if best and best.step_growth is not None and best.step_growth > 1:
-        much = (
-            "without limit"
-            if isinf(best.step_growth)
-            else f"{best.step_growth:.2g} times"
-        )
+        if isinf(best.step_growth):
+            much = "without limit"
+        else:
+            much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
         cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
         lines.append(("time step", f"{grows}: {cures}"))
@@ -392,19 +387,15 @@ def _number(count: int, what: str) -> str:
 
 
 def _counted(row: PartRow) -> str | None:
-    return (
-        None
-        if row.elements is None
-        else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
-    )
+    if row.elements is None:
+        return None
+    return ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
 
 
 def _sharing(row: PartRow) -> str | None:
-    return (
-        None
-        if row.shares_nodes is None
-        else list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
-    )
+    if row.shares_nodes is None:
+        return None
+    return list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
 
 
 def ranges(ids: Sequence[int]) -> str:

@@ -37,6 +37,16 @@ _WHEN: Final = {
     "left-out": "not planned",
 }
 
+_BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
+_POSITION: Final = (
+    "position_error",
+    "position_error_part",
+    "position_error_body",
+    "position_error_assumes",
+)
+# Columns that are left out first where the table would be too wide.
+_SPARE: Final = ("margin", "processor time", "out of place", "error")
+
 
 def _times(row: Planned, at: int) -> float | None:
     return row.window[at] if row.window else None
@@ -51,13 +61,6 @@ def _margin(key: str) -> Callable[[Planned], Any]:
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
-_BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
-_POSITION: Final = (
-    "position_error",
-    "position_error_part",
-    "position_error_body",
-    "position_error_assumes",
-)
 WINDOW: Final = row(
     Field("flight", kind_of("integer", minimum=1), "number of the flight in the record, from 1",
           lambda row: row.number),
@@ -104,17 +107,12 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 ))  # fmt: skip
 
 
-# Columns that are left out first where the table would be too wide.
-_SPARE: Final = ("margin", "processor time", "out of place", "error")
-
-
 def as_table(plan: Plan, shown: Shown) -> str:
     """The plan in a sentence, what to do next, a row per flight, and why windows are no better, or not planned."""
-    rows = (
-        tables.as_text(*table(plan), shown.width, _SPARE)
-        if plan.flights
-        else "no flight"
-    )
+    if plan.flights:
+        rows = tables.as_text(*table(plan), shown.width, _SPARE)
+    else:
+        rows = "no flight"
     below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
     said = [(name, make_printable(text)) for name, text in below]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
@@ -208,7 +206,8 @@ def as_value(plan: Plan, shown: Shown) -> str:
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
     """What was given up for quality, and where bodies will be; a name and a sentence each."""
-    supported, lines = plan.supported, []
+    supported = plan.supported
+    lines = []
     found = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
         (f"flight {number}", given_up(one.longer, one.recommended))
@@ -255,11 +254,10 @@ def error(row: Planned) -> str | None:
         return None
     if best.kind == "start":
         return "nothing vibrates"
-    name, off = (
-        ("level error", best.level_error)
-        if best.residual is None
-        else ("residual", best.residual)
-    )
+    if best.residual is None:
+        name, off = ("level error", best.level_error)
+    else:
+        name, off = ("residual", best.residual)
     return f"{name} {tables.measure(off)}"
 
 

@@ -48,7 +48,8 @@ class Scan(NamedTuple):
 def as_table(scan: Scan, shown: Shown) -> str:
     """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
     reference, outcomes, answer, _ = scan
-    td, recommended = answer.situation.td, _recommended(answer)
+    td = answer.situation.td
+    recommended = _recommended(answer)
     above = [
         (
             "load",
@@ -60,10 +61,8 @@ def as_table(scan: Scan, shown: Shown) -> str:
     rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
     told = "none"
     if chosen := next((one for one in outcomes if one.tr == recommended), None):
-        error, worst = (
-            abs(chosen.roll_error),
-            max(abs(one.roll_error) for one in outcomes),
-        )
+        error = abs(chosen.roll_error)
+        worst = max(abs(one.roll_error) for one in outcomes)
         told = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {error / worst:.2g} of the largest"
     shown_rows = tables.as_text(("", *RUN.keys), rows, shown.width)
     return "\n".join(

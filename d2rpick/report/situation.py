@@ -31,20 +31,16 @@ def what_was_read(history: History) -> str:
 def energy_name(history: History) -> str:
     """Name the energy; of many parts the first ones."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
-    return (
-        history.channel
-        if len(parts) <= _NAMED
-        else f"internal energy of {list_names(parts, most=_NAMED)}"
-    )
+    if len(parts) <= _NAMED:
+        return history.channel
+    return f"internal energy of {list_names(parts, most=_NAMED)}"
 
 
 def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
     """What stands above a table, by names: what was read, and what the choice rests on, ``verbose``: why."""
-    flight, share, why = (
-        situation.flight,
-        situation.kinetic_share,
-        situation.vibration.reasons if verbose else None,
-    )
+    flight = situation.flight
+    share = situation.kinetic_share
+    why = situation.vibration.reasons if verbose else None
     known = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
@@ -76,12 +72,15 @@ def spoken(source: str | None) -> str:
 
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
-    fit, vibration = situation.evidence.fit, situation.vibration
-    mode, told = vibration.whole.mode, vibration.told
+    fit = situation.evidence.fit
+    vibration = situation.vibration
+    mode = vibration.whole.mode
+    told = vibration.told
     if not (mode and fit):
-        kinetic = (
-            "; kinetic energy from the modes of each part" if vibration.signed else ""
-        )
+        if vibration.signed:
+            kinetic = "; kinetic energy from the modes of each part"
+        else:
+            kinetic = ""
         return f"{told}{kinetic}" if told else _level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
@@ -126,7 +125,8 @@ class Measure(NamedTuple):
 
 def measures_of(health: Health) -> list[Measure]:
     """All measures of a run, those of its window last."""
-    low, high = health.energy_ratio_min, health.energy_ratio_max
+    low = health.energy_ratio_min
+    high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)
     part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
     found = [

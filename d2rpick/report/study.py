@@ -183,14 +183,16 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
 
 def outcome(answer: Study) -> list[tuple[str, str]]:
     """What the runs have in common, by names, for people."""
-    spread, common = answer.spread, answer.common
+    spread = answer.spread
+    common = answer.common
     found = "none"
     if spread:
         found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
         found += (
             "the intervals overlap" if answer.agree else "the intervals do not overlap"
         )
-    heading, shared = "common tr", f"none: {common.reason}"
+    heading = "common tr"
+    shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
@@ -207,7 +209,8 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
 
 def _span(errors: Sequence[float]) -> str:
     """Write the least and the largest of some errors, one number if they read alike."""
-    low, high = tables.measure(min(errors)), tables.measure(max(errors))
+    low = tables.measure(min(errors))
+    high = tables.measure(max(errors))
     return low if low == high else f"{low} to {high}"
 
 

@@ -41,6 +41,10 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
+# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
+_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
+_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+
 
 def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
     """Give the candidates, each with the decision on it."""
@@ -51,11 +55,9 @@ def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
     """Give the windows of acceptable tr, and which of them holds the recommended one."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
-    return (
-        None
-        if windows is None
-        else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
-    )
+    if windows is None:
+        return None
+    return [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -79,11 +81,6 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),
 ))  # fmt: skip
-
-
-# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
-_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
 
 def as_table(answer: Suggestion, shown: Shown) -> str:
@@ -133,7 +130,9 @@ def as_csv(answer: Suggestion, _: Shown) -> str:
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
     """What to do with the recommended pair, why, and what comes after td; a name and a sentence each."""
-    best, decision, better = answer.chosen, answer.decision, answer.clearly_better
+    best = answer.chosen
+    decision = answer.decision
+    better = answer.clearly_better
     lines = [("no pair to use", answer.why_none)]
     if best and decision:
         lines = headed(decision, best.tr, answer.td)
@@ -146,7 +145,8 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
 
 def facts(answer: Suggestion) -> list[tuple[str, str]]:
     """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
-    best, decision = answer.chosen, answer.decision
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
         return []
     lines = [*statements(decision), ("rigid for", rigid_for(best))]
@@ -179,19 +179,18 @@ def better_about(answer: Suggestion, better: Pair) -> str:
         return "there an acceptable tr exists"
     if better.residual is not None and own.residual is not None:
         return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
-    level, here = (
-        answer.situation.vibration.whole.energy(better.td),
-        answer.situation.energy_td,
-    )
+    level = answer.situation.vibration.whole.energy(better.td)
+    here = answer.situation.energy_td
     return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     """What else there is to choose from; a name and a sentence each."""
     chosen = answer.recommended.tr if answer.recommended else None
-    lines = (
-        [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
-    )
+    if answer.windows:
+        lines = [("acceptable", acceptable(answer.windows, chosen))]
+    else:
+        lines = []
     best = answer.chosen
     if best and best.position_error is not None:
         lines.append(
@@ -220,11 +219,10 @@ def position(best: Candidate, *, deck: bool) -> str:
 
 def given_up(longer: Pair, chosen: Pair) -> str:
     """How much rigid time was given up for a better level or residual, and for which."""
-    what = (
-        "a lower level at td"
-        if longer.residual is None
-        else f"residual {tables.measure(longer.residual)}"
-    )
+    if longer.residual is None:
+        what = "a lower level at td"
+    else:
+        what = f"residual {tables.measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
     return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
@@ -242,11 +240,10 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
         f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
         for w in named
     ]
-    more = (
-        f" and {len(windows) - len(named)} shorter windows"
-        if len(windows) > len(named)
-        else ""
-    )
+    if len(windows) > len(named):
+        more = f" and {len(windows) - len(named)} shorter windows"
+    else:
+        more = ""
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
 
 

@@ -338,11 +338,9 @@ def as_json(result: Any, indent: int | None = 2) -> str:
     import unicodedata
 
     def seen(found: re.Match[str]) -> str:
-        return (
-            json.dumps(found[0])[1:-1]
-            if unicodedata.category(found[0]) in UNSEEN
-            else found[0]
-        )
+        if unicodedata.category(found[0]) in UNSEEN:
+            return json.dumps(found[0])[1:-1]
+        return found[0]
 
     return re.sub(
         r"[^\n -~]",

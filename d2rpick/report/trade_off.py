@@ -59,15 +59,16 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
+_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+
 
 def as_table(found: TradeOff, shown: Shown) -> str:
     """The answer in a sentence, the verdict on the best pair, some of the offers that nothing beats, what was read."""
     some = some_of(found, shown.limit)
-    offered = (
-        tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
-        if some
-        else "nothing to offer"
-    )
+    if some:
+        offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
+    else:
+        offered = "nothing to offer"
     low, high = found.td_window
     window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
@@ -103,24 +104,24 @@ def as_csv(found: TradeOff, _: Shown) -> str:
     return csv_of(COLUMNS, map(OFFER.plain, found.offers))
 
 
-_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
-
-
 def answer(found: TradeOff) -> str:
     """The shortest sensible answer in a sentence: how good the td asked for is, and what a step to another one changes.
 
     Without a td that was asked for, the step begins at the one that saves most.
     """
-    start, step, unit = found.start, found.step, found.situation.history.time_unit
+    start = found.start
+    step = found.step
+    unit = found.situation.history.time_unit
     if start is None:
         return "no td in the window has an acceptable tr"
     named = f"td = {start.td:.6g}" + ("" if found.asked else " saves the most")
     if start.best is None:
         what = f"{named} has no acceptable tr"
         return what if step is None else f"{what}; {_away(start, step, unit)} has one"
-    what = (
-        f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
-    )
+    if not found.asked:
+        what = f"{named}, {_error(start)}"
+    else:
+        what = f"{named}: {_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
         return (
@@ -177,11 +178,9 @@ def _cost(start: Offer, step: Offer) -> str:
     change = step.rigid_time / start.rigid_time - 1
     if abs(change) < _NO_CHANGE:
         return "costs no rigid time"
-    return (
-        f"costs {-change:.1%} of the rigid time"
-        if change < 0
-        else f"makes the rigid time {change:.1%} longer"
-    )
+    if change < 0:
+        return f"costs {-change:.1%} of the rigid time"
+    return f"makes the rigid time {change:.1%} longer"
 
 
 def _error(one: Offer) -> str:

@@ -117,14 +117,13 @@ def as_markdown(answer: Verdict, _: Shown) -> str:
     said = tables.listed((*verdict(answer), *facts(answer)))
     table = tables.as_markdown(("measure", "value"), measured(answer))
     switched = answer.switched
-    compared = (
-        [
+    if switched:
+        compared = [
             tables.as_markdown(COMPARED, comparison(switched)),
             *tables.listed(deviations(switched)),
         ]
-        if switched
-        else []
-    )
+    else:
+        compared = []
     reasons = [f"* {tables.in_markdown(reason)}" for reason in answer.reasons]
     return "\n\n".join([*said, table, *compared, *reasons])
 
@@ -168,17 +167,17 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
 
 def deviations(switched: Comparison) -> list[tuple[str, str]]:
     """How far the switched run moves off the reference after td."""
-    error, displacement = switched.momentum_error, switched.displacement
-    off = (
-        []
-        if error is None
-        else [("largest error of the momentum after td", f"{error:.2g} of its maximum")]
-    )
-    return (
-        off
-        if displacement is None
-        else [*off, ("largest displacement after td", f"{displacement:.3g}")]
-    )
+    error = switched.momentum_error
+    displacement = switched.displacement
+    if error is None:
+        off = []
+    else:
+        off = [
+            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+        ]
+    if displacement is None:
+        return off
+    return [*off, ("largest displacement after td", f"{displacement:.3g}")]
 
 
 def _comparison(switched: Comparison) -> list[str]:

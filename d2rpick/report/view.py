@@ -113,25 +113,25 @@ def view(
 
     Where no flight is known, the whole record is shown.
     """
-    first, last = float(history.time[0]), float(history.time[-1])
+    first = float(history.time[0])
+    last = float(history.time[-1])
     if flight.start is None:
         inner = first, last
     else:
-        end = (
-            flight.end
-            if flight.end is not None
-            else known
-            if known is not None
-            else last
-        )
+        if flight.end is not None:
+            end = flight.end
+        else:
+            end = known if known is not None else last
         inner = max(first, min(flight.start, *times)), min(last, max(end, *times))
         inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
-    start, end = max(first, inner[0] - beyond), min(last, inner[1] + beyond)
+    start = max(first, inner[0] - beyond)
+    end = min(last, inner[1] + beyond)
     begin = inner[0] if flight.start is None else flight.start
     stop = inner[1] if flight.end is None else flight.end
     flown = _flown(history, begin, stop, inner)
-    low, high = float(flown.min()), float(flown.max())
+    low = float(flown.min())
+    high = float(flown.max())
     middle = min(max(start, (begin + stop) / 2), end)
     sides = (("load", start, middle), ("landing", middle, end))
     highest = [
@@ -183,11 +183,9 @@ def replayed_motion(
     Motion or None
         None where no single oscillator describes the record at tr.
     """
-    mode, span, td = (
-        situation.vibration.whole.mode,
-        situation.evidence.span,
-        situation.td,
-    )
+    mode = situation.vibration.whole.mode
+    span = situation.evidence.span
+    td = situation.td
     if not (
         isinstance(mode, Mode) and span and situation.vibration.whole.described(tr)
     ):
@@ -222,11 +220,9 @@ class Response(NamedTuple):
 
 def response(situation: Situation) -> Response | None:
     """Give the response of the one oscillator that describes the record; None where none does."""
-    mode, span, td = (
-        situation.vibration.whole.mode,
-        situation.evidence.span,
-        situation.td,
-    )
+    mode = situation.vibration.whole.mode
+    span = situation.evidence.span
+    td = situation.td
     if not (isinstance(mode, Mode) and span):
         return None
     time = np.linspace(span.start, max(span.end, td), _POINTS)
@@ -242,13 +238,10 @@ def response(situation: Situation) -> Response | None:
 
 def locked_in(situation: Situation, tr: float | None) -> float | None:
     """Deformation that tr locks in [square root of energy]; None where no single oscillator describes it."""
-    mode = (
-        None
-        if tr is None or not situation.vibration.whole.described(tr)
-        else situation.vibration.whole.mode
-    )
-    return (
-        float(mode.deformation(tr))
-        if tr is not None and isinstance(mode, Mode)
-        else None
-    )
+    if tr is None or not situation.vibration.whole.described(tr):
+        mode = None
+    else:
+        mode = situation.vibration.whole.mode
+    if tr is not None and isinstance(mode, Mode):
+        return float(mode.deformation(tr))
+    return None
