@@ -1,4 +1,4 @@
-"""The answer of ``calibrate`` as table, JSON and the TOML file that ``--weights`` reads."""
+"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file that ``--weights`` reads."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
 def as_table(found: Calibration, shown: Shown) -> str:
-    """The weights beside those that were measured, and the legs they rest on."""
+    """Return the assumed and the measured weights of each formulation, and the restart segments behind them, as a
+    table.
+    """
     weights = found.weights
     lines = [
         tables.as_text(HEAD, _rows(found), shown.width), "",
@@ -49,7 +51,7 @@ def as_table(found: Calibration, shown: Shown) -> str:
 
 
 def as_markdown(found: Calibration, _: Shown) -> str:
-    """The weights and the legs as Markdown tables."""
+    """Return the weights and the restart segments as Markdown tables."""
     return "\n\n".join(
         [
             tables.as_markdown(HEAD, _rows(found)),
@@ -59,17 +61,17 @@ def as_markdown(found: Calibration, _: Shown) -> str:
 
 
 def as_csv(found: Calibration, _: Shown) -> str:
-    """A row per formulation."""
+    """Return CSV with one row per formulation."""
     return tables.as_csv(COLUMNS, plain_rows(found)).rstrip("\n")
 
 
 def as_toml(found: Calibration, _: Shown) -> str:
-    """The file that ``--weights`` reads."""
+    """Return the file that ``--weights`` reads."""
     return weights_as_toml(found.weights)
 
 
 def plain_rows(found: Calibration) -> list[list[tables.Cell]]:
-    """Cells of a row per formulation at full precision, below ``COLUMNS``."""
+    """Return one row of cells per formulation at full precision, in the order of ``COLUMNS``."""
     return [
         [name, weight, MEASURED[name], name in found.told]
         for name, weight in found.weights.per_element.items()

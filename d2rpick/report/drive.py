@@ -1,4 +1,4 @@
-"""The answer of ``drive`` as table and JSON."""
+"""Write the result of ``drive`` as a table and JSON."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps o
 
 
 def as_table(found: Driven, shown: Shown) -> str:
-    """The windows, what the legs took, and what was saved."""
+    """Return the rigid windows, the CPU time of the restart segments, and what was saved."""
     parts = [
         tables.as_text(*windows(found), shown.width) if found.windows else "no window",
         tables.as_text(*legs(found), shown.width),
@@ -44,7 +44,7 @@ def as_table(found: Driven, shown: Shown) -> str:
 
 
 def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the flights; ``deformable`` is what of each was computed so."""
+    """Return the column names and the rows of the flights; ``deformable`` is the share of a flight computed deformable."""
     columns = {
         "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
         "tr": lambda one: None if one.reason else one.tr, "td": lambda one: None if one.reason else one.td,
@@ -57,7 +57,7 @@ def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the same of the legs, those of a kind together."""
+    """Return the column names and the rows of the restart segments, one row per kind."""
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(one.kind for one in found.legs):
         own = [one for one in found.legs if one.kind == kind]
@@ -78,7 +78,7 @@ def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def outlook(found: Driven) -> list[tuple[str, str]]:
-    """What was saved, and what to know of it; a name and a sentence each."""
+    """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
     words = zip(
         found.saved,
         ("by the cost model", "by the processor time of its legs"),

@@ -1,7 +1,7 @@
-"""The interactive part of a page: td can be dragged, typed and moved by keys, and all that depends on it follows.
+"""Build the interactive part of a page: the user drags, types or steps td, and everything that depends on td follows.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.  What every page has stands in
-``explorer.html``.
+Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
+that every page has.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.
+# Number of intervals for which the lowest and highest energy is drawn: in the view, and in the overview of the run.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Between the section, the chart of the motion and what is said of a pair.
+# Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
 _NEXT: Final = "<!-- next -->"
 
-# What is listed of a pair, by key, in this order.
+# Labels of the values shown for a pair, by key and in display order.
 _VALUES: Final[Mapping[str, str]] = {
     "verdict": "verdict",
     "why": "why",
@@ -54,19 +54,19 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "acceptable tr",
     "reason": "no tr",
 }
-# Columns in which windows of acceptable tr are drawn, a multiple of eight.
+# Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
 _COLUMNS: Final = 480
-# Digits of a difference that people read.
+# significant digits of a difference
 _READ: Final = 3
 
 
 def styles() -> tuple[Markup, ...]:
-    """Give the style sheets that the interactive part needs."""
+    """Return the style sheets of the interactive part."""
     return resource("uplot/uPlot.min.css"), resource("explorer.css")
 
 
 def scripts() -> tuple[Markup, ...]:
-    """Give the scripts, in their order; that of uPlot with its licence."""
+    """Return the scripts in loading order; that of uPlot includes its licence."""
     licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
     return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
         "explorer.js"
@@ -74,16 +74,17 @@ def scripts() -> tuple[Markup, ...]:
 
 
 def explorer(explored: Explorer | None) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data; nothing without any.
+    """Return the interactive section and its data, or nothing if there is nothing to explore.
 
-    Charts and values stand in two columns; on a narrow page the style puts them below each other in another order.
+    The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
+    narrow page the style sheet puts them below each other in another order.
     """
     if explored is None:
         return Markup()
     flights = [_flight(one) for one in explored.trade_offs]
     known = {
         name for flight in flights for name in flight["texts"]
-    }  # what no pair has is left out
+    }  # values that no pair has are left out
     listed = (
         tag("div", tag("dt", name), tag("dd", data_value=key))
         for key, name in _VALUES.items()
@@ -116,12 +117,12 @@ def explorer(explored: Explorer | None) -> Markup:
 
 
 def _closed_up(text: str) -> str:
-    """Leave out the blanks and line ends between elements, and make one blank of those within a text."""
+    """Remove whitespace between elements, and reduce whitespace within a text to one blank."""
     return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
 
 
 def _data(name: str, content: Any) -> Markup:
-    """Give data for a script: JSON in which nothing can be taken for markup."""
+    """Return a data element for a script: JSON in which nothing can be mistaken for markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
@@ -129,7 +130,7 @@ def _data(name: str, content: Any) -> Markup:
 
 
 def _flight(found: TradeOff) -> dict[str, Any]:
-    """What is drawn and said of one flight."""
+    """Return the curves, marks and texts of one flight."""
     situation = found.situation
     history = situation.history
     flight = situation.flight
@@ -171,7 +172,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
 
 
 def _motion(situation: Situation) -> dict[str, Any] | None:
-    """Give the curves of which the script composes the deformation; None where no oscillator is known."""
+    """Return the curves from which the script composes the deformation, None if no oscillator is known."""
     found = response(situation)
     if found is None:
         return None
@@ -187,14 +188,15 @@ def _motion(situation: Situation) -> dict[str, Any] | None:
 
 
 def _brief(values: Samples) -> list[float]:
-    """Numbers for a curve, to six digits."""
+    """Round the values of a curve to six digits."""
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
 def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
-    """Give a row for each td, the names of its values once: ``numbers`` for curves, ``texts`` that stand beside them.
+    """Return one row per td, with the column names once: ``numbers`` for the curves, ``texts`` to be shown next to
+    them.
 
-    ``first`` is the td that is shown first, with which others are compared.
+    ``first`` is the offer whose td is shown first; the others are compared with it.
     """
     situation, unit = found.situation, found.situation.history.time_unit
     columns: dict[str, Callable[[Offer], Any]] = {
@@ -224,7 +226,7 @@ def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
 
 
 def _saved(offer: Offer) -> float | None:
-    """What a pair saves [%]: of the run time, or of the record where no cost is known."""
+    """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
     share = offer.saving
     if offer.best and share is None:
         share = offer.best.rigid_fraction
@@ -232,9 +234,9 @@ def _saved(offer: Offer) -> float | None:
 
 
 def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch, a bit each, in hexadecimal digits; empty without a window.
+    """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without a window.
 
-    However many windows noise makes, this is short, and finer than a screen shows.
+    The mask stays short however many windows noise makes, and it is finer than the screen.
     """
     ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
     first, last = (
@@ -251,19 +253,19 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
 
 
 def _short(value: float | None) -> float | None:
-    """Shorten a number that is drawn, not read."""
+    """Round a number that is only drawn."""
     return None if value is None else float(f"{value:.6g}")
 
 
 def _error_name(offers: Sequence[Offer]) -> str:
-    """Name what offers are compared by."""
+    """Return the name of the error by which the offers are compared."""
     if all(one.basis == "energy" for one in offers):
         return "shortfall of the level at td"
     return "residual"
 
 
 def _saved_name(offers: Sequence[Offer]) -> str:
-    """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
+    """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
     known = any(one.saving is not None for one in offers)
     if known:
         return "saved, % of the processor time"
@@ -271,7 +273,7 @@ def _saved_name(offers: Sequence[Offer]) -> str:
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
-    """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
     best = offer.best
     decision = offer.decision
     return {
@@ -292,7 +294,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
 
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
-    """What is said of the recommended tr."""
+    """Return the texts about the recommended tr."""
     kept = offer.answer.kept
     windows = offer.answer.windows
     return {
@@ -311,7 +313,7 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
 
 
 def _said(offer: Offer) -> str:
-    """What is said of the quality to who listens."""
+    """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
         return "nothing acceptable"
@@ -321,7 +323,7 @@ def _said(offer: Offer) -> str:
 
 
 def _compared(offer: Offer, start: Offer, unit: str) -> str:
-    """What an offer costs and gives, against the one that is shown first."""
+    """Describe what an offer costs and gains compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td

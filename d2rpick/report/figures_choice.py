@@ -1,4 +1,4 @@
-"""Figures of a choice: suggest and verify with flight, level and motion; of a plan, a trade-off, a study."""
+"""Draw the figures of suggest, verify, plan, explore, study and parts."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
+# Heights of a figure in a file [inch]: of the energy alone, and with the motion; on a page those of each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
+# Up to this number candidates are drawn as marks; more are drawn as a band of admissible tr.
 _FEW: Final = 20
-# Share of the axes at their foot in which the band lies, clear of the curve.
+# Height of the band at the bottom of the axes, clear of the curve, as a share of the axes.
 _BAND: Final = 0.045
-# Of the flights of a plan: so much is shown before and after them.
+# Time shown before and after the flights of a plan, as a share of their span.
 _BEYOND_FLIGHTS: Final = 0.05
-# Of the record: the times of a shorter window have no room beside each other.
+# Shortest window, as a share of the simulated time, whose label has room for its times.
 _ROOM_FOR_TIMES: Final = 0.2
 
 _COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
@@ -67,18 +67,18 @@ _HATCHES: Final = {
     "supported": None,
     "re-plan": "//",
     "done": None,
-}  # told apart without colour, too
-# Of the figure in a file, and of the axes on a page [inch].
+}  # distinguishable without colour, too
+# height of the figure in a file, and of the axes on a page [inch]
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn; parts of which the energy is drawn.
+# Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.
 _STRIP: Final = 0.07
 _MOST_PARTS: Final = 6
-# Of the figure in a file, and of one of its axes on a page [inch].
+# height of the figure in a file, and of one of its axes on a page [inch]
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Room beside the first and last td, as a share of the axes: lines and marks there are seen whole.
+# Space next to the first and last td, as a share of the axes, so that lines and marks there are complete.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
+# Palette of Okabe and Ito, without yellow, which is invisible on white; dashes distinguish lines of one colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,
@@ -89,30 +89,30 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to so many runs each has its own colour and name; beyond, all are grey and those that stand out are named.
+# Up to this number of runs each has its own colour and name; more are grey, and only those that stand out are named.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# Many curves over each other are together as dark as so many, and none is fainter than this.
+# Many grey curves are together as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
 _DARK, _FAINTEST = 10, 0.02
-# Above so many runs lines and marks are thin.
+# with more runs than this, lines and marks are thin
 _MANY: Final = 40
-# Shown before the first tr and after td, as shares of the time between.
+# Time shown before the first tr and after td, as shares of the time between them.
 _BEFORE, _AFTER = 0.25, 0.15
-# Height of the figure [inch].
+# height of the figure [inch]
 _HEIGHT: Final = 4.0
-# Height of a name, as a share of the axes.
+# height of a name, as a share of the axes
 _LINE: Final = 0.055
-# A line to a name begins at the left of it.
+# the line to a name begins at its left edge
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The lowest level may be so much lower than the others before it counts for the axis.
+# The lowest level is ignored for the axis if it is this many times lower than the others.
 _LOWEST: Final = 50.0
 
 
 def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
-    """Energy in the flight with its level at td, candidates or acceptable windows, the choice; below it the motion.
+    """Draw the energy in the flight with the target energy, the candidates or admissible windows, and the motion below.
 
-    On a page, where nobody asks for two figures that are nearly the same, a better pair too.
+    On a page a better pair is drawn in the same figure, since two figures would be nearly the same.
     """
     best = answer.chosen
     few = answer.windows is None and len(answer.candidates) <= _FEW
@@ -125,9 +125,9 @@ def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
 
 
 def draw_verdict(answer: Verdict, *, page: bool = False) -> Figure:
-    """Energy in the flight with its level at td and the pair that was judged; below it the motion after that pair.
+    """Draw the energy in the flight with the target energy and the judged pair; below it the motion after that pair.
 
-    With a finished switched run its energy is drawn over that of the reference, in place of the motion of a model.
+    With a finished switched run, its energy is drawn over that of the reference instead of the motion of a model.
     """
     pair = answer.situation, answer.candidate.tr, (answer.candidate,)
     return _draw(*pair, computed=answer.computed, page=page)
@@ -170,7 +170,7 @@ def _draw(
     panels[-1].set_xlabel(with_unit("time", situation.history.time_unit))
     for panel in panels:
         figures.finish(panel, legend=not page)
-    # the level belongs to the flight, also where td lies beyond
+    # the level belongs to the flight, even if td lies beyond it
     scale = scale_in(situation, seen, [situation.energy_td])
     figures.show_span(panels[0], (seen.start, seen.end), scale, seen.above)
     if page:
@@ -220,7 +220,7 @@ def _draw_energy(
 
 
 def _draw_better(panels: Sequence[Axes], there: Situation, tr: float) -> None:
-    """Draw a better pair, seen from its td: level, times and what follows, in a colour and a pattern of their own."""
+    """Draw a better pair as seen from its own td, with its level, times and motion, in its own colour and line style."""
     lines = [panels[0].axhline(there.energy_td)]
     lines += [panel.axvline(time) for panel in panels for time in (tr, there.td)]
     motion = replayed_motion(there, tr)
@@ -240,7 +240,7 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
 
 
 def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
-    """Draw the energy over time, the flights behind it and the rigid windows below it."""
+    """Draw the energy over time, with the flights behind it and the rigid windows below it."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
     span = float(history.time[-1] - history.time[0])
@@ -267,7 +267,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
             )
     low, high = axes.get_ylim()
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    # below the energies stand the windows alone
+    # below the energies only the windows are drawn
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
     _zoom_into_flights(axes, plan)
     _finish(figure, axes, with_unit("time", history.time_unit), page=page)
@@ -275,7 +275,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
 
 
 def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
-    """Show the flights, and a little of what lies before and after them."""
+    """Limit the time axis to the flights and a little before and after them."""
     if not plan.flights:
         return
     start = plan.flights[0].start
@@ -286,7 +286,7 @@ def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
 
 
 def _window_label(number: int, window: Times, span: float) -> str:
-    """Number a window, with its times if there is room for them."""
+    """Return the number of a window, with its times if there is room for them."""
     tr, td = window
     if td - tr < _ROOM_FOR_TIMES * span:
         return str(number)
@@ -296,7 +296,7 @@ def _window_label(number: int, window: Times, span: float) -> str:
 def draw_run(
     history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
 ) -> Figure:
-    """Draw the energy of a run, as far as it is believed, its flights and the windows in which parts were rigid."""
+    """Draw the trusted energy of a run, its flights, and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     rigid = np.any(
         [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
@@ -317,7 +317,7 @@ def draw_run(
 
 
 def draw_parts(found: Parts) -> Figure:
-    """Draw the energies of the parts that have most over time, and the flights; FormatError without parts."""
+    """Draw the energies of the parts with the largest energy, and the flights; raise FormatError without parts."""
     run = found.files
     energies = run.part_energies(run.parts)
     time = run.part_time
@@ -332,7 +332,7 @@ def draw_parts(found: Parts) -> Figure:
 
 
 def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
-    """Name the axes of a whole run, and put the legend below."""
+    """Label the axes of a whole run, and put the legend below."""
     axes.set(xlabel=time, ylabel="internal energy")
     figures.finish(axes, legend=False)
     if page:
@@ -342,7 +342,7 @@ def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
 
 
 def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
-    """Draw the energy in the window of td, and below it error and saving of the best pair for each td."""
+    """Draw the energy in the td range, and below it the error and saving of the best pair for each td."""
     figure, panels = figures.begin(3, _TRADE_HEIGHT, page=page)
     energy, error, rigid = panels
     history = found.situation.history
@@ -382,7 +382,7 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
 
 
 def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
-    """Draw one measure of all offers, with gaps where it is unknown, and mark those that nothing beats."""
+    """Draw one measure of all offers, with gaps where it is unknown, and mark the Pareto-optimal offers."""
     td = np.array([one.td for one in found.offers])
     shown = np.array([np.nan if value is None else value for value in values])
     best = np.array([one.unbeaten for one in found.offers], dtype=bool)
@@ -400,8 +400,8 @@ class _Named(NamedTuple):
 
 
 def draw_study(answer: Study, *, page: bool = False) -> Figure:
-    """Draw energies around td over each other, the tr of each, the common one and td."""
-    # names of runs stand beside the axes, so that the margins are not known, on a page neither
+    """Draw the energies of all runs around td, the tr of each run, the common tr, and td."""
+    # the names next to the axes make the margins unknown, on a page too
     figure = Figure(
         figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT),
         layout="constrained",
@@ -432,7 +432,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
 
 
 def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Named]:
-    """Give the runs that have a colour and a name: all where they are few, else those that stand out."""
+    """Return the runs with their own colour and name: all if there are few, else those that stand out."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:
@@ -455,7 +455,7 @@ def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Nam
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named: Sequence[_Named]
 ) -> None:
-    """Draw the runs without a name in grey; taken together they stay as dark as ten lines."""
+    """Draw the runs without a name in grey, so that many lines are together as dark as ten."""
     told = {id(one.curve) for one in named}
     others = [curve.T for curve in curves if id(curve) not in told]
     many = len(curves) > _MANY
@@ -469,7 +469,7 @@ def _draw_others(
 
 
 def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
-    """Mark the tr of each run at its level."""
+    """Mark the tr of each run at its target energy."""
     points = np.array([(row.tr, row.energy_td) for row in drawn if row.tr is not None])
     if points.size:
         many = len(drawn) > _MANY
@@ -482,7 +482,7 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
 def _show_runs(
     axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]
 ) -> None:
-    """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
+    """Limit the axes to the time from a little before the first tr to a little after td; higher energies are cut off."""
     if not curves:
         return
     first = min(float(one[0, 0]) for one in curves)
@@ -505,7 +505,7 @@ def _show_runs(
         np.concatenate([levels, *_energies(curves, *window)])
         for window in ((early, td), span)
     )
-    # the lowest level stays in sight beside the middle one
+    # keep the lowest level visible next to the median one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = scale_of(float(inner.min()), float(inner.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
@@ -514,13 +514,13 @@ def _show_runs(
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:
-    """Give the energies of each curve from ``start`` to ``end``."""
+    """Return the energies of each curve from ``start`` to ``end``."""
     for time, energy in curves:
         yield energy[(start <= time) & (time <= end)]
 
 
 def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
-    """Write the names of runs beside the axes, in the order of their curves there, with a line to each."""
+    """Write the names of runs next to the axes, in the order of their curves, each joined to its curve by a line."""
     end = axes.get_xlim()[1]
     free = 0.0
     places = ((_height(axes, float(np.interp(end, *one.curve))), one) for one in named)
@@ -535,7 +535,7 @@ def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
 
 
 def _height(axes: Axes, value: float) -> float:
-    """Where a value stands in the axes, 0 at their foot and 1 at their top."""
+    """Return the height of a value in the axes, 0 at the bottom and 1 at the top."""
     bottom, top = axes.get_ylim()
     value = min(max(value, bottom), top)
     if axes.get_yscale() == "log":

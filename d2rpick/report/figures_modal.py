@@ -1,4 +1,4 @@
-"""What is drawn of a vibration of many modes: the energy halfway, and the residual of each tr."""
+"""Draw a vibration of several modes: the energy halfway between tr and td, and the residual of each tr."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
-    """Mark the energy halfway between tr and td, which tells how the two deformations lie to each other."""
+    """Mark the energy halfway between tr and td, which shows the direction of the two deformations to each other."""
     middle = (tr + situation.td) / 2
     energy = situation.history.energy_at(middle)
     axes.scatter(

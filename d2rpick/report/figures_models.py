@@ -1,4 +1,4 @@
-"""Figures of the models: the oscillator and the rollover box."""
+"""Draw the sample models: the oscillator and the rollover box."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Outlines of the rolling box, as many as can be told apart.
+# number of outlines of the rolling box that are distinguishable
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6
 
 
 def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
-    """Displacements of both masses and the energies over time; the rigid window shaded."""
+    """Draw the displacements of both masses and the energies over time, with the rigid window shaded."""
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.plot(motion.time, motion.state.z, color=REFERENCE, label="z, frame")
@@ -62,9 +62,9 @@ def draw_rollover(
     switched: Record | None = None,
     windows: Sequence[RigidWindow] = (),
 ) -> Figure:
-    """Outlines of the box at even times with sled, curb and ground; roll and height over time, and what differs.
+    """Draw outlines of the box at regular times with sled, curb and ground, and roll and height over time.
 
-    ``switched`` is the same box, rigid in ``windows``; without it there is nothing to compare.
+    ``switched`` is the same box, rigid in ``windows``; with it, the difference of the two runs is drawn as well.
     """
     if switched:
         rows = ["roll", "roll difference", "height", "height difference"]
@@ -109,7 +109,9 @@ def draw_rollover(
 def _draw_outlines(
     axes: Axes, parameters: Parameters, reference: Record, switched: Record | None
 ) -> None:
-    """Outlines at even times, each with its time; the sled where it starts and where it comes to rest, the ground."""
+    """Draw outlines of the box at regular times, each with its time, the first and last position of the sled, the
+    ground.
+    """
     shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
     sled = Sled(parameters.speed, parameters.braking)
     for time in (0.0, float(reference.time[-1])):
@@ -147,7 +149,7 @@ def _draw_outlines(
 
 
 def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
-    """Shade the rigid windows; mark when the sled pushed last and when the ground pushes."""
+    """Shade the rigid windows; mark the end of the sled's push and the begin of the ground contact."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
         axes.axvspan(
@@ -169,7 +171,7 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
 def draw_scan(
     reference: Record, outcomes: Sequence[Outcome], answer: Suggestion
 ) -> Figure:
-    """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
+    """Draw the energy of the box with its level at td, and below it the errors of roll and mean energy against tr."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
     before = reference.time <= answer.situation.td
@@ -229,7 +231,7 @@ def draw_scan(
 
 
 def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
-    """Floor, curb and cushion of the sled when it has come to ``place`` [m], and the ground."""
+    """Draw floor, curb and cushion of the sled at ``place`` [m], and the ground."""
     p = parameters
     axes.axhline(-p.ground, color=REFERENCE, linewidth=1.2)
     if p.drop is not None:

@@ -1,4 +1,4 @@
-"""Findings of check as table, JSON, GitHub annotations, JUnit XML and SARIF; its rules as text."""
+"""Write the findings of ``check`` as a table, JSON, GitHub annotations, JUnit XML and SARIF; explain its rules."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ _WINDOW: Final = row(
 
 @dataclass(frozen=True)
 class Checks:
-    """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
+    """The findings in several decks; paths below ``root`` are shown relative to it.
 
-    ``failed`` are decks that could not be read, ``history`` are the files by which
-    the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
+    ``failed`` are decks that could not be read.  ``history`` are the files by which the windows were judged, None
+    without any.  Findings lighter than ``fail_on`` are no failures.
     """
 
     results: Sequence[Checked]
@@ -78,7 +78,7 @@ class Checks:
 
 
 def as_table(checks: Checks, _: Shown) -> str:
-    """Findings and windows of each deck, one per line, and how many there are; decks that failed are counted."""
+    """Return the findings and windows of each deck, one per line, and their number, with the number of failed decks."""
     lines: list[str] = []
     for result in checks.results:
         lines.append(_shown(result.deck, checks.root))
@@ -92,18 +92,18 @@ def as_table(checks: Checks, _: Shown) -> str:
 
 
 def as_ndjson(checks: Checks, shown: Shown) -> str:
-    """Give a line for each deck, by the same schema as the JSON of all."""
+    """Return a line of JSON per deck, each by the schema of the whole result."""
     each = (replace(checks, results=[result]) for result in checks.results)
     return "\n".join(DOCUMENT.as_json(one, shown.command, None) for one in each)
 
 
 def as_csv(checks: Checks, _: Shown) -> str:
-    """A row per finding, a column for each key of ``findings`` in the JSON output."""
+    """Return CSV with one row per finding and a column for each key of ``findings`` in the JSON output."""
     return csv_of(FINDING.keys, map(FINDING.plain, _findings(checks)))
 
 
 def as_markdown(checks: Checks, _: Shown) -> str:
-    """The findings as a Markdown table, and how many there are."""
+    """Return the findings as a Markdown table, and their number."""
     found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
     return "\n\n".join(
         [
@@ -114,7 +114,7 @@ def as_markdown(checks: Checks, _: Shown) -> str:
 
 
 def as_github(checks: Checks, _: Shown) -> str:
-    """Workflow commands that GitHub Actions shows beside the lines of a deck."""
+    """Return workflow commands that make GitHub Actions show the findings next to the lines of a deck."""
     found = [
         f"::{_GITHUB[f.severity]} file={_escaped(f.file, ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
@@ -133,7 +133,9 @@ def as_github(checks: Checks, _: Shown) -> str:
 
 
 def as_junit(checks: Checks, _: Shown) -> str:
-    """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
+    """Return one suite per deck and one case per finding; findings lighter than ``fail_on`` pass but show their
+    message.
+    """
     from xml.etree import ElementTree as ET  # start-up
 
     suites = ET.Element("testsuites", name="d2rpick check")
@@ -172,7 +174,7 @@ def as_junit(checks: Checks, _: Shown) -> str:
 
 
 def as_sarif(checks: Checks, _: Shown) -> str:
-    """SARIF 2.1.0 with all rules; ids are stable."""
+    """Return SARIF 2.1.0 with all rules; their ids are stable."""
     ids = list(RULES)
     rules = [
         {
@@ -227,7 +229,7 @@ def _line(one: Finding) -> str:
 
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
-    """Windows that the same cards make at the same times are one line."""
+    """Return a line per window; windows with the same cards and times share one line."""
     alike = (
         ((window.cards, window.unit.kind, window.tr, window.td), window)
         for window in windows
@@ -257,7 +259,7 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
 
 
 def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
-    """Give what was found in all decks, or in some ``results``, with paths as they are shown."""
+    """Return the findings in all decks, or in some ``results``, with displayed paths."""
     for one in (one for result in results or checks.results for one in result.findings):
         yield one._replace(
             file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root)
@@ -265,7 +267,7 @@ def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
 
 
 def _warnings(checks: Checks) -> list[Caution]:
-    """Give what to be aware of, decks that could not be read among it."""
+    """Return all warnings, including one for each deck that could not be read."""
     return [*checks.cautions, *(Caution(one.code, one.reason) for one in checks.failed)]
 
 
@@ -293,7 +295,7 @@ def _counts(results: Sequence[Checked]) -> dict[str, int]:
 
 
 def _last_line(checks: Checks) -> str:
-    """How many findings and decks there are, and what was not judged."""
+    """Return the number of findings and decks, and what was not judged."""
     results = checks.results
     found = [
         f"{count} {name if count != 1 else name[:-1]}"
@@ -306,7 +308,7 @@ def _last_line(checks: Checks) -> str:
 
 
 def _shown(path: str, root: str) -> str:
-    """Path relative to the working folder where it lies below it, with ``/``; bytes that are no text replaced."""
+    """Return a path for display: relative to ``root`` if it lies below it, with ``/``, undecodable bytes replaced."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
@@ -319,7 +321,7 @@ def _shown(path: str, root: str) -> str:
 
 
 def _places(shown: str, **more: Any) -> list[dict[str, Any]]:
-    """Give a place in a file as SARIF has it."""
+    """Return a location in a file as SARIF defines it."""
     from urllib.parse import quote
 
     uri = f"{'file://' * shown.startswith('/')}{quote(shown)}"
@@ -338,14 +340,14 @@ def _xml(text: str) -> str:
 
 
 def as_list() -> str:
-    """Id, severity and summary of every rule."""
+    """Return id, severity and summary of every rule."""
     return "\n".join(
         f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values()
     )
 
 
 def explained_rules(names: Iterable[str], width: int) -> str:
-    """Explain rules by their ids or beginnings, and warnings by their codes.
+    """Explain the rules with these ids or prefixes, and the warnings with these codes.
 
     Raises
     ------
@@ -356,7 +358,7 @@ def explained_rules(names: Iterable[str], width: int) -> str:
 
 
 def _explained(name: str, width: int) -> Iterator[str]:
-    """Explain the rules that begin so, or the warning of this code."""
+    """Explain the rules whose id begins with ``name``, or the warning with this code."""
     from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
 
     if name in EXPLANATIONS:
@@ -367,7 +369,7 @@ def _explained(name: str, width: int) -> Iterator[str]:
 
 
 def as_text(rule: Rule, width: int) -> str:
-    """One rule: what it finds, why that matters, and decks that pass and fail, which are as wide as their cards."""
+    """Explain one rule: what it finds, why that matters, and decks that pass and fail, as wide as their cards."""
     from textwrap import wrap  # not above: findings do without it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
@@ -381,7 +383,7 @@ def as_text(rule: Rule, width: int) -> str:
 
 
 def _example(title: str, example: Example, width: int) -> Iterator[str]:
-    """A deck as it stands in its file, with what it includes and what it is checked against."""
+    """Return the lines of an example deck, of its included files, and of the files that it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.continued(

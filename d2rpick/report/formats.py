@@ -1,6 +1,6 @@
-"""One table: which result can be written in which form.
+"""List which result can be written in which form, and write it.
 
-A result is a module of this folder, imported when it is written: ``--help`` lists the forms without it.
+Each result has a module in this folder, which is imported only to write it: ``--help`` lists the forms without it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-# Columns of text that are read at a glance; a terminal may have fewer.
+# widest text that is easy to read [columns]; a terminal may have fewer
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")
-# The first form of each is the default.
+# forms of each result; the first is the default
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "suggestion": (*PLAIN, "ndjson", "value"),
     "plan": (*PLAIN, "ndjson", "value"),
@@ -35,10 +35,10 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class Shown(NamedTuple):
-    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
+    """What to show besides the answer: the command, the number of rows, lines already written.
 
-    ``every``: all windows of a plan, not only the supported ones.  ``verbose``: all that is known; tables and text are
-    no wider than ``width`` columns.
+    With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
+    and text are no wider than ``width`` columns.
     """
 
     command: Sequence[str] = ()
@@ -61,7 +61,7 @@ def write(result: str, form: str, answer: Any, shown: Shown) -> str:
 
 
 def written_by(report: Any, form: str, answer: Any, shown: Shown) -> str:
-    """Write an answer in a form of the module of its result."""
+    """Write an answer in a form that the module ``report`` provides."""
     if own := getattr(report, f"as_{form}", None):
         return str(own(answer, shown))
     return str(

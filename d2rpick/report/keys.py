@@ -1,6 +1,6 @@
-"""Fields that several results share: of a candidate and its measures, the history, its health, the situation at td.
+"""Define the fields that several results share: of a candidate, the history, its health, and the situation at td.
 
-Tests hold the schemas in ``d2rpick/schemas`` against these tables: ``python -m tests.generated_schemas`` writes them.
+Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# Where a rigid body will be at td, as far as single parts tell.
+# position of the rigid body at td, estimated from single parts
 _POSITION: Final = (
     Field("position_error", "size?",
           "how far a rigid body will be out of place at td since a part is frozen elsewhere, the largest of several "
@@ -108,7 +108,7 @@ _POSITION: Final = (
           "whether the body may be further off: inner motion that is slower than the flight, or that bends the body, "
           "passes for its rotation; null where nothing is known", later=True),
 )  # fmt: skip
-# What is said of a candidate beside its parts; in CSV the notes come last.  A new measure stands at the end.
+# Values of a candidate besides its parts; in CSV the notes come last. Add a new measure at the end.
 CANDIDATE: Final = row(
     Field("rank", kind_of("integer", minimum=1)),
     Field("tr", "number"),
@@ -148,7 +148,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
+# Values that explain tr but do not measure the pair; and the measures that ``verify`` shows first, in its order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
@@ -175,7 +175,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys that came later than the schemas of ``suggest`` and ``verify``, but not than others.
+# Keys added after the first schemas of ``suggest`` and ``verify``, but present from the start in the others.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -191,7 +191,7 @@ MATCHES: Final = Field("parts", many(row(
 )))  # fmt: skip
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
-# What is said of a pair, by the decision on it.
+# values of the decision on a pair
 DECIDED: Final = row(
     Field("verdict", VERDICT, "what to do with the pair, by its grade"),
     Field("verdict_reason", "text", "why, in words", lambda decision: decision.reason),
@@ -201,7 +201,7 @@ DECIDED: Final = row(
     Field("worst_residual", kind_of("number", minimum=0),
           "the largest residual that the record allows; 2 if nothing is known of it"),
 )  # fmt: skip
-# The same of what has a decision, or None.
+# the same values for a result whose decision may be None
 DECISION: Final = tuple(
     field._replace(kind=maybe(field.kind), later=True)
     for field in DECIDED.of_part(lambda answer: answer.decision)
@@ -266,18 +266,18 @@ HEALTH: Final = Field("health", maybe(row(
 
 
 class Read(Protocol):
-    """A file that was read."""
+    """An input file."""
 
     @property
     def name(self) -> str:
-        """Name that the user gave it."""
+        """Name as the user gave it."""
 
     def sha256(self) -> str:
-        """SHA-256 of what was read."""
+        """Return the SHA-256 digest of the content."""
 
 
 def _once(files: Iterable[Read]) -> dict[str, Read]:
-    """Files by their names: one that is included twice once."""
+    """Return the files by name; a file that is included twice occurs once."""
     return {file.name: file for file in files}
 
 
@@ -292,7 +292,7 @@ FILES: Final = (
 
 
 def _asked(answer: Any) -> Plan | Situation:
-    """Give what knows the history of an answer, and the settings."""
+    """Return the plan or situation of an answer, which holds the history and the settings."""
     known: Plan | Situation = (
         answer if hasattr(answer, "settings") else answer.situation
     )
@@ -304,7 +304,7 @@ def _weights(answer: Any) -> Weights | None:
     return used.weights if used else None
 
 
-# What the JSON of an answer about a history begins with.
+# fields with which the JSON of every answer about a history begins
 FRAME: Final = (
     WARNINGS,
     Field("history", HISTORY, get=lambda answer: _asked(answer).history),
@@ -318,7 +318,7 @@ FRAME: Final = (
 
 
 def _oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Give the oscillator that was fitted, or None if none was looked for."""
+    """Return the oscillator that was fitted, or None if none was searched for."""
     fit = situation.evidence.fit
     if fit is None:
         return None
@@ -333,12 +333,12 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
 
 
 def _modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Give the modes that the choice rests on, or None if it does not rest on the lines of the energy."""
+    """Return the modes on which the choice rests, or None if it does not rest on modes."""
     modal = situation.vibration.modal
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 
 
-# What is known at td; of a situation.
+# values of a situation at td
 MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),

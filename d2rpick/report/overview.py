@@ -1,4 +1,4 @@
-"""The answer of ``info`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``info`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -77,9 +77,9 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("verdict_reason", "text", "why, in words", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are written", later=True),
 ))  # fmt: skip
-_MOST_TIMES: Final = 4  # that are named of a contact which acts at many
+_MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# Keys of the JSON output with a single value.
+# keys of the JSON output with a single value
 _PLAIN = (
     "format",
     "version",
@@ -93,7 +93,7 @@ _PLAIN = (
 
 
 def as_table(overview: Overview, shown: Shown) -> str:
-    """Whether the run can be used, why, and what to type next; then a line per fact, and the parts."""
+    """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.in_line(verdict(overview))
     if overview.health and (health := _health(overview)):
         lines += ["", tables.as_text(head(overview.health), health, shown.width)]
@@ -107,7 +107,7 @@ def as_table(overview: Overview, shown: Shown) -> str:
 
 
 def verdict(overview: Overview) -> list[tuple[str, str]]:
-    """Whether the run can be used, why, its flights, and what to type next; a name and a sentence each."""
+    """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
     lines = [("this run", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
@@ -123,7 +123,7 @@ def verdict(overview: Overview) -> list[tuple[str, str]]:
 
 
 def as_markdown(overview: Overview, _: Shown) -> str:
-    """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
+    """Return the facts and the parts as Markdown tables, with the notes below."""
     said = tables.listed(verdict(overview))
     known = [(name, value) for name, value in facts(overview) if value is not None]
     told = tables.as_markdown(("what", "value"), known)
@@ -148,7 +148,7 @@ def as_markdown(overview: Overview, _: Shown) -> str:
 
 
 def as_csv(overview: Overview, _: Shown) -> str:
-    """One row, a column for each key of the JSON output, what is a list there with semicolons."""
+    """Return one row of CSV with a column for each key of the JSON output; lists are joined by semicolons."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {
         "source": "; ".join(overview.source),
@@ -173,7 +173,7 @@ def as_csv(overview: Overview, _: Shown) -> str:
 
 
 def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
-    """Name each fact, and give it."""
+    """Return each fact as a pair of its name and value."""
     sampling = overview.sampling
     rows: list[tuple[str, tables.Cell]] = [
         ("source", ", ".join(overview.source)),
@@ -197,7 +197,7 @@ def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
 
 
 def _health(overview: Overview) -> list[list[tables.Cell]]:
-    """Measures that the files hold, with what practice allows."""
+    """Return the health measures that the files contain, with the limits of good practice."""
     if overview.health is None:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}
@@ -213,7 +213,7 @@ def _parts(overview: Overview) -> list[list[tables.Cell]]:
 
 
 def _force(force: ForceOverview) -> str:
-    """Name a contact and the times in which it acts."""
+    """Return the name of a contact and the times in which it acts."""
     times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
     when = f"acts from {list_names(times, most=_MOST_TIMES)}" if times else "never acts"
     return f"{force.name} {when}"
