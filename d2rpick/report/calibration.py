@@ -36,9 +36,7 @@ LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
 def as_table(found: Calibration, shown: Shown) -> str:
-    """Return the assumed and the measured weights of each formulation, and the restart segments behind them, as a
-    table.
-    """
+    """Return a table of the assumed and measured weights of each formulation, and of the restart segments used."""
     weights = found.weights
     lines = [
         tables.as_text(HEAD, _rows(found), shown.width), "",

@@ -1,6 +1,4 @@
-"""Write the verdict on a pair of times as sentences: what to do, why, what to expect after td, and what would be
-better.
-"""
+"""Write the verdict on a pair of times: what to do, why, what to expect after td, and what would be better."""
 
 from __future__ import annotations
 

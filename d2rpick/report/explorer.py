@@ -193,8 +193,7 @@ def _brief(values: Samples) -> list[float]:
 
 
 def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
-    """Return one row per td, with the column names once: ``numbers`` for the curves, ``texts`` to be shown next to
-    them.
+    """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """

@@ -217,7 +217,7 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer by its schema; without ``indent`` in one line, so that lines of several runs can be joined."""
+        """Write an answer by its schema; without ``indent`` in one line, which can be joined to those of other runs."""
         return tables.as_json(self.of(answer, command), indent)
 
 

@@ -106,7 +106,7 @@ def picture_format(name: str) -> str:
 
 
 def render(figure: figures.Figure, name: str) -> bytes:
-    """Return the bytes of the file ``name`` in the format of its suffix; the same figure always gives the same bytes."""
+    """Return the bytes of the file ``name`` in the format of its suffix; a figure always gives the same bytes."""
     content = io.BytesIO()
     form = picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)

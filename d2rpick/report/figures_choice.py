@@ -220,7 +220,7 @@ def _draw_energy(
 
 
 def _draw_better(panels: Sequence[Axes], there: Situation, tr: float) -> None:
-    """Draw a better pair as seen from its own td, with its level, times and motion, in its own colour and line style."""
+    """Draw a better pair as seen from its own td: level, times and motion, in its own colour and line style."""
     lines = [panels[0].axhline(there.energy_td)]
     lines += [panel.axvline(time) for panel in panels for time in (tr, there.td)]
     motion = replayed_motion(there, tr)
@@ -482,7 +482,7 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
 def _show_runs(
     axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]
 ) -> None:
-    """Limit the axes to the time from a little before the first tr to a little after td; higher energies are cut off."""
+    """Limit the axes to the time from shortly before the first tr to shortly after td; higher energies are cut off."""
     if not curves:
         return
     first = min(float(one[0, 0]) for one in curves)

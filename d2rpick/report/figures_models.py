@@ -109,9 +109,7 @@ def draw_rollover(
 def _draw_outlines(
     axes: Axes, parameters: Parameters, reference: Record, switched: Record | None
 ) -> None:
-    """Draw outlines of the box at regular times, each with its time, the first and last position of the sled, the
-    ground.
-    """
+    """Draw labelled outlines of the box at regular times, the first and last position of the sled, and the ground."""
     shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
     sled = Sled(parameters.speed, parameters.braking)
     for time in (0.0, float(reference.time[-1])):

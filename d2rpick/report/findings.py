@@ -133,9 +133,7 @@ def as_github(checks: Checks, _: Shown) -> str:
 
 
 def as_junit(checks: Checks, _: Shown) -> str:
-    """Return one suite per deck and one case per finding; findings lighter than ``fail_on`` pass but show their
-    message.
-    """
+    """Return a suite per deck and a case per finding; findings lighter than ``fail_on`` pass but show their message."""
     from xml.etree import ElementTree as ET  # start-up
 
     suites = ET.Element("testsuites", name="d2rpick check")

@@ -1,4 +1,4 @@
-"""Answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
+"""Write answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# More rows than one compares by eye; csv and json hold all.
+# Most rows of a table on a page: the eye cannot compare more, and CSV and JSON hold all.
 _MOST_ROWS = 20
 
-# Of a table in a notebook.
+# Most rows of a table in a notebook.
 _FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
+_WIDEST: Final = "max-width: 40em"  # a picture without a width fills the screen
 
 
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
-    """Write a page about one run; where something can be explored it runs a script."""
+    """Write a page about one run, with its script if something can be explored."""
     needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
     return document(
         f"Switch times: {page.title_of(record.run)}",
@@ -69,7 +69,7 @@ def _of_run(record: page.PageContext, *sections: Markup) -> str:
 
 
 def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
-    """Draw something of a kind under its caption, an SVG element whose ids begin with ``prefix``."""
+    """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
     drawn = getattr(figures_choice, f"draw_{kind}")(*asked, **how)
@@ -91,7 +91,7 @@ def _draw_suggestion(answer: Suggestion) -> Markup:
 
 
 def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
-    """Give a table whose first column has a star for what is recommended: the row stands out instead."""
+    """Return a table without its first column, whose star marks the recommended row: that row is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return table(title, *unstarred(head, rows), marked)
 
@@ -111,7 +111,7 @@ def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Mar
 
 
 def _choice(answer: Suggestion) -> Markup:
-    """Give the section above the figures: the pairs, large, and what to know of them."""
+    """Return the section above the figures: the pairs in large type, and remarks."""
     cards = [_recommended(answer)]
     better = answer.clearly_better
     if better:
@@ -177,7 +177,7 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
 
 
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
-    """Show what the finished switched run has of the reference."""
+    """Return the comparison of the finished switched run with the reference."""
     title = "The switched run"
     listed = [
         ("compared", f"from td to {found.end:.6g}"),
@@ -231,11 +231,11 @@ def plan_page(
     ----------
     found : Plan
     run : Run
-        What was read.
+        The run that was read.
     command : sequence of str
         Arguments that repeat the answer.
     card : str or None
-        Solver input for the next run, where it is known whom it switches.
+        Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
         The flights of the plan.
     """
@@ -336,7 +336,7 @@ def _common(answer: Study) -> Markup:
 
 
 def _files(answer: Study) -> str:
-    """Name what was read, with size and time, in the order of the runs."""
+    """Return the input files with size and time, in the order of the runs."""
     from datetime import UTC, datetime
 
     files = dict.fromkeys(stamp for row in answer.runs for stamp in row.files)
@@ -440,7 +440,7 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
     )
 
 
-# What is said, the shortest first, and the head and rows of the table.
+# For each kind of answer: sentences, the shortest first, and the head and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
@@ -467,12 +467,12 @@ _LOOKS: Final[
 
 
 def sentence(kind: str, answer: Any) -> str:
-    """Say an answer in short."""
+    """Return an answer in one sentence."""
     return ": ".join(filter(None, _LOOKS[kind][0](answer)[0]))
 
 
 def of_run(run: Run) -> str:
-    """Say what a run is in short: files, format, states, times, parts, as far as its files can be read."""
+    """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
     told = [" + ".join(one.format for one in run.databases)]
@@ -486,7 +486,7 @@ def of_run(run: Run) -> str:
 
 
 def glance(kind: str, answer: Any, figure: Figure | None) -> str:
-    """Show an answer, or the overview of a run, as HTML; columns in which nothing is known are left out."""
+    """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
     said, table = _LOOKS[kind]
     lines = [tag("div", tag("b", name), f" {text}") for name, text in said(answer)]
     head, rows = table(answer)
@@ -506,5 +506,5 @@ def _picture(figure: Figure) -> Markup:
 
 
 def _told(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
-    """Leave out what is not known."""
+    """Return only the facts whose values are known."""
     return [fact for fact in facts if fact[1] is not None]

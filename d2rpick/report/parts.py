@@ -1,4 +1,4 @@
-"""The answer of ``parts`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``parts`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switchable_parts import PartRow
     from d2rpick.report.formats import Shown
 
-# Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
+# Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.
 SETS = (
     "set",
     "parts",
@@ -86,7 +86,7 @@ _IN_FLIGHT: Final = row(
         "whether its energy still scatters by a tenth of its mean or more",
     ),
 )
-# What it does in flight is that of the longest.
+# a part's behaviour in flight is that in the longest flight
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers by kind; null without a deck"),
@@ -144,11 +144,11 @@ _FLIGHT: Final = row(
     Field("start", "number"), Field("end", "number"), Field("longest", "flag")
 )
 _MOST_SHOWN = 6
-# Left out, in this order, where a terminal has no room for them.
+# Columns that are left out, in this order, if a terminal is too narrow.
 _SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
-# Of parts, for people.
+# Verdicts on parts, for people.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
-# What the sets are called for people.
+# Names of the sets, for people.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
     "all but what moves": "all eligible parts but loose ones",
@@ -157,7 +157,7 @@ _SET_NAMES: Final = {
 
 
 def _free(one: PartSet) -> bool | None:
-    """Tell whether nothing deformable keeps the step."""
+    """Return True if no deformable part limits the time step."""
     return None if one.step_growth is None else isinf(one.step_growth)
 
 
@@ -227,7 +227,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(found: Parts, shown: Shown) -> str:
-    """The set to take and what to do next, a row per set, a row per part in two tables, and what was read."""
+    """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
     lines = tables.in_line(verdict_on_set(found))
     if found.sets:
         lines += ["", tables.as_text(*set_table(found, SETS), shown.width, _SPARE)]
@@ -240,7 +240,7 @@ def as_table(found: Parts, shown: Shown) -> str:
 
 
 def as_markdown(found: Parts, _: Shown) -> str:
-    """The set to take, the sets and the parts as Markdown tables, and what was read."""
+    """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
     sets = [tables.as_markdown(*set_table(found))] if found.sets else []
     above = tables.listed(verdict_on_set(found))
     below = tables.listed(outlook(found))
@@ -248,17 +248,17 @@ def as_markdown(found: Parts, _: Shown) -> str:
 
 
 def as_csv(found: Parts, _: Shown) -> str:
-    """A row per part, a column for each key of ``parts`` in the JSON output; lists separated by semicolons."""
+    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output; lists have semicolons."""
     return csv_of(PART.keys, map(PART.plain, found.rows), ";")
 
 
 def as_value(found: Parts, _: Shown) -> str:
-    """Numbers of the recommended set as ``--part`` takes them; nothing where there is none."""
+    """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
     return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
 
 
 def heading(found: Parts) -> list[tuple[str, str]]:
-    """What was read, by names."""
+    """Return what was read, as pairs of a name and a description."""
     run = found.files
     deck = found.inventory
     formats = " + ".join(one.format for one in run.databases)
@@ -293,7 +293,7 @@ def heading(found: Parts) -> list[tuple[str, str]]:
 def table(
     found: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names and cells of all columns of the parts, or of some; the parts of the recommended set have a star."""
+    """Return the names and cells of all or some columns of the parts, with a star for parts of the recommended set."""
     best = set(found.recommended.parts) if found.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.filled(
@@ -304,7 +304,7 @@ def table(
 def set_table(
     found: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the same of the sets, among which the recommended one has a star."""
+    """Return the names and cells of all or some columns of the sets, with a star for the recommended set."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
     return tables.filled(
         {"": lambda one: "*" if one.recommended else " ", **columns}, found.sets
@@ -312,27 +312,27 @@ def set_table(
 
 
 def _position(one: PartSet) -> str | None:
-    """How far a set is out of place, and what that takes for granted."""
+    """Return the position error of a set, and the assumption behind it."""
     found = _least(one, one.position_error)
     return f"{found} if one body" if one.position_assumes else found
 
 
 def _least(one: PartSet, value: float | None) -> str | None:
-    """An error, and whether it may be larger."""
+    """Return an error, with a sign if it is only a lower limit."""
     if one.position_is_lower_bound and value is not None:
         return f">= {value:.3g}"
     return _short(value)
 
 
 def verdict(row: PartRow) -> str:
-    """Whether to make a part rigid, in a word or two."""
+    """Return whether to make a part rigid, in one or two words."""
     if row.merge_with is not None:
         return f"merge with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
 def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
-    """Which parts to make rigid, why, and what to do next; a name and a sentence each."""
+    """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
     best = found.recommended
     if best is None:
         why = next(
@@ -362,12 +362,12 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
 
 
 def set_name(one: PartSet) -> str:
-    """Give what a set is called for people."""
+    """Return the name of a set for people."""
     return _SET_NAMES.get(one.name, one.name)
 
 
 def outlook(found: Parts) -> list[tuple[str, str]]:
-    """What to know of the recommended set, and why others are not compared; a name and a sentence each."""
+    """Return remarks on the recommended set, and why other sets are not compared, as pairs of a name and a sentence."""
     lines: list[tuple[str, str]] = []
     best = found.recommended
     if best and best.step_growth is not None and best.step_growth > 1:
@@ -399,7 +399,7 @@ def _sharing(row: PartRow) -> str | None:
 
 
 def ranges(ids: Sequence[int]) -> str:
-    """Numbers of parts as ``--part`` takes them.
+    """Return part ids as ``--part`` takes them.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The answer of ``plan`` as table, JSON, CSV, Markdown and bare values."""
+"""Write the result of ``plan`` as a table, JSON, CSV, Markdown and bare values."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _POSITION: Final = (
     "position_error_body",
     "position_error_assumes",
 )
-# Columns that are left out first where the table would be too wide.
+# Columns that are left out first if the table would be too wide.
 _SPARE: Final = ("margin", "processor time", "out of place", "error")
 
 
@@ -57,7 +57,7 @@ def _situation(row: Planned) -> Situation | None:
 
 
 def _margin(key: str) -> Callable[[Planned], Any]:
-    """Take what is known of the margin of a window that is not done."""
+    """Return a function that reads a value of the margin of a window, unless that window is done already."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
@@ -108,7 +108,7 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 
 
 def as_table(plan: Plan, shown: Shown) -> str:
-    """The plan in a sentence, what to do next, a row per flight, and why windows are no better, or not planned."""
+    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or not planned."""
     if plan.flights:
         rows = tables.as_text(*table(plan), shown.width, _SPARE)
     else:
@@ -123,7 +123,7 @@ def as_table(plan: Plan, shown: Shown) -> str:
 
 
 def sentence(plan: Plan) -> str:
-    """What to do, in a sentence."""
+    """Return what to do, in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
     if not supported:
@@ -141,7 +141,7 @@ def sentence(plan: Plan) -> str:
 
 
 def _how_to_use(plan: Plan) -> str:
-    """Say how many windows can be used now, and which of them with care."""
+    """Return how many windows can be used now, and which of them only with care."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
@@ -155,7 +155,7 @@ def _how_to_use(plan: Plan) -> str:
 
 
 def next_steps(plan: Plan) -> list[tuple[str, str]]:
-    """What to do next with the windows that can be used now."""
+    """Return the next commands for the windows that can be used now, as pairs of a name and a command."""
     if not plan.windows:
         return []
     waiting = any(row.status == "re-plan" for row in plan.flights)
@@ -167,7 +167,7 @@ def next_steps(plan: Plan) -> list[tuple[str, str]]:
 
 
 def verdicts(plan: Plan) -> list[tuple[str, str]]:
-    """Why the windows that are planned are no better, and what would make them so; the flight and a sentence each."""
+    """Return why the planned windows are not better, and what would improve them, as pairs of a flight and a sentence."""
     return [
         (f"flight {row.number}", in_full(row.decision))
         for row in plan.flights
@@ -176,7 +176,7 @@ def verdicts(plan: Plan) -> list[tuple[str, str]]:
 
 
 def as_markdown(plan: Plan, _: Shown) -> str:
-    """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
+    """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
     below = tables.listed(
         (*next_steps(plan), *verdicts(plan), *outlook(plan), *reasons(plan))
     )
@@ -186,26 +186,27 @@ def as_markdown(plan: Plan, _: Shown) -> str:
 
 
 def reasons(plan: Plan) -> list[tuple[str, str]]:
-    """Why windows are not supported; the flight and a sentence each."""
+    """Return why windows are not supported, as pairs of a flight and a sentence."""
     return [(f"flight {row.number}", row.reason) for row in plan.flights if row.reason]
 
 
 def as_csv(plan: Plan, _: Shown) -> str:
-    """A row per flight, a column for each key of ``windows`` in the JSON output."""
+    """Return CSV with one row per flight and a column for each key of ``windows`` in the JSON output."""
     return csv_of(WINDOW.keys, map(WINDOW.plain, plan.flights))
 
 
 def as_value(plan: Plan, shown: Shown) -> str:
-    """A line ``tr td`` for each window of the next run, in the shortest digits that read back.
+    """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
-    Those that are done, and the supported ones, or every new one; nothing where none is new.
+    These are the windows that are done, and the supported new ones or, if asked for, all new ones.  Nothing is returned
+    if there is no new window.
     """
     new = plan.all_windows if shown.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
-    """What was given up for quality, and where bodies will be; a name and a sentence each."""
+    """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
     supported = plan.supported
     lines = []
     found = [(row.number, row.answer) for row in supported if row.answer]
@@ -232,7 +233,7 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
 
 
 def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of all flights; run time and place only where they are known."""
+    """Return the column names and cells of all flights; CPU time and position error only if they are known."""
     placed = any(
         row.candidate and row.candidate.position_error is not None
         for row in plan.flights
@@ -248,7 +249,7 @@ def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def error(row: Planned) -> str | None:
-    """How well the pair of a window matches, in a word or two."""
+    """Return the name and value of the error of a window's pair."""
     best = row.candidate
     if best is None:
         return None
@@ -262,7 +263,7 @@ def error(row: Planned) -> str | None:
 
 
 def _place(row: Planned) -> str | None:
-    """How far a rigid body is out of place at td [length]."""
+    """Return the position error of a rigid body at td [length]."""
     best = row.candidate
     if best is None or best.position_error is None:
         return None

@@ -1,4 +1,4 @@
-"""The scan of ``rollover`` as table, JSON, CSV and Markdown."""
+"""Write the scan of ``rollover`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Suggestion
     from d2rpick.report.formats import Shown
 
-# Of each run, in JSON and as columns.
+# fields of each run, in JSON and as columns
 RUN: Final = row(*(Field(key, "number") for key in (
     "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio",
 )), closed=True)  # fmt: skip
@@ -37,7 +37,7 @@ DOCUMENT: Final = Document(
 
 
 class Scan(NamedTuple):
-    """Runs switched at many tr beside the ``reference`` without switching, and what is recommended from that one."""
+    """Runs switched at many tr, the ``reference`` run, and the recommendation from the reference run."""
 
     reference: Record
     outcomes: Sequence[Outcome]
@@ -46,7 +46,7 @@ class Scan(NamedTuple):
 
 
 def as_table(scan: Scan, shown: Shown) -> str:
-    """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
+    """Return what happened in the reference run, a row for each tr, and the error of the tr that d2rpick recommends."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
     recommended = _recommended(answer)
@@ -71,12 +71,12 @@ def as_table(scan: Scan, shown: Shown) -> str:
 
 
 def as_markdown(scan: Scan, _: Shown) -> str:
-    """A row for each tr."""
+    """Return a Markdown table with one row for each tr."""
     return tables.as_markdown(RUN.keys, [_short(one) for one in scan.outcomes])
 
 
 def as_csv(scan: Scan, _: Shown) -> str:
-    """A row for each tr, at full precision."""
+    """Return CSV with one row for each tr, at full precision."""
     return csv_of(RUN.keys, map(RUN.plain, scan.outcomes))
 
 
@@ -85,7 +85,7 @@ def _recommended(answer: Suggestion) -> float | None:
 
 
 def _short(one: Outcome) -> list[tables.Cell]:
-    """Four digits are enough to read: runs differ in the second."""
+    """Return the cells of a run with four digits: runs already differ in the second."""
     return [float(f"{value:.4g}") for value in RUN.plain(one).values()]
 
 

@@ -1,4 +1,4 @@
-"""What suggest and verify have in common in their output: history, flight, oscillator, health of the run."""
+"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-# Parts that a line names of those that are switched or fly together; the JSON document has all.
+# Largest number of parts that a line names; the JSON document contains all.
 _NAMED = 5
 
 
 def what_was_read(history: History) -> str:
-    """Name files, format, energy and span of a history."""
+    """Return files, format, energy and time span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     what = f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
@@ -29,7 +29,7 @@ def what_was_read(history: History) -> str:
 
 
 def energy_name(history: History) -> str:
-    """Name the energy; of many parts the first ones."""
+    """Return the name of the energy; with many parts only the first ones are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
     if len(parts) <= _NAMED:
         return history.channel
@@ -37,7 +37,7 @@ def energy_name(history: History) -> str:
 
 
 def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
-    """What stands above a table, by names: what was read, and what the choice rests on, ``verbose``: why."""
+    """Return the history and what the choice rests on, as pairs of a name and a text; ``verbose`` adds the reasons."""
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
@@ -66,12 +66,12 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
 
 
 def spoken(source: str | None) -> str:
-    """Name the source of a flight for people."""
+    """Return the name of the source of a flight for people."""
     return "energy alone, not certain" if source == "energy" else str(source)
 
 
 def _basis(situation: Situation) -> str:
-    """What the choice rests on, and the oscillator behind it."""
+    """Return what the choice rests on, and the fitted oscillator."""
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
@@ -96,7 +96,7 @@ def _basis(situation: Situation) -> str:
 
 
 def _level_alone(situation: Situation) -> str:
-    """Say that no deformation is known, and where it is so, that several modes are why."""
+    """Return a note that no deformation is known, with the reason if it is that several modes vibrate."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
@@ -105,7 +105,7 @@ def _level_alone(situation: Situation) -> str:
 
 
 def head(health: Health) -> tuple[str, ...]:
-    """Names of the columns of a table of health; the first says up to when the run was judged."""
+    """Return the column names of a table of health; the first says up to which time the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -115,7 +115,7 @@ def head(health: Health) -> tuple[str, ...]:
 
 
 class Measure(NamedTuple):
-    """A measure for people: ``value`` None where the files lack it, and then ``good`` is None too."""
+    """A health measure for people: ``value`` and ``good`` are None if the files lack it."""
 
     what: str
     value: str | None
@@ -124,7 +124,7 @@ class Measure(NamedTuple):
 
 
 def measures_of(health: Health) -> list[Measure]:
-    """All measures of a run, those of its window last."""
+    """Return all health measures of a run, those of its rigid window last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)

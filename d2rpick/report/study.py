@@ -1,4 +1,4 @@
-"""The answer of ``study`` as table, JSON, CSV, Markdown, and its last line of newline-delimited JSON."""
+"""Write the result of ``study`` as a table, JSON, CSV, Markdown, and the last line of newline-delimited JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STATUS: Final = one_of(
     "ok", "none", "unreadable", "out-of-range", "failed", "internal-error"
 )
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
-# What a run has where it is of status ok, and otherwise.
+# Fields of a run whose status is ok; they are None otherwise.
 _JUDGED: Final[dict[str, Any]] = {
     "description": "One run; null where nothing can be said.",
     "if": {"properties": {"status": {"const": "ok"}}},
@@ -65,7 +65,7 @@ _ERROR: Final = Field(
     "common_errors of the last line",
     lambda one: one[1],
 )  # fmt: skip
-# A run in JSON, and a row of the csv; of a run and its error at the common tr.
+# A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
 RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
 _RUN: Final = row(
     *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
@@ -96,7 +96,7 @@ _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
-# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and what follows them.
+# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and the line after them.
 _CURVE: Final = kind_of(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
@@ -109,7 +109,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Left out, in this order, where a terminal has no room for them.
+# Columns that are left out, in this order, if a terminal is too narrow.
 _SPARE: Final = ("E(td)", "+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -121,7 +121,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: Study, shown: Shown) -> str:
-    """What the runs have in common, and below it one line per run, by what tells its name from the others."""
+    """Return what the runs have in common, and one line per run with its shortened name."""
     head, rows = tables.known(*table(answer))
     rows = [
         [name, *row[1:]]
@@ -134,31 +134,31 @@ def as_table(answer: Study, shown: Shown) -> str:
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
-    """What the runs have in common, and below it the runs as a Markdown table."""
+    """Return what the runs have in common, and the runs as a Markdown table."""
     said = tables.listed([*outcome(answer), *reasons(answer)])
     listed = "\n".join(f"* {line}" for line in said)
     return f"{listed}\n\n{tables.as_markdown(*table(answer))}"
 
 
 def as_csv(answer: Study, _: Shown) -> str:
-    """One row per run, a column for each key of the JSON output."""
+    """Return CSV with one row per run and a column for each key of the JSON output."""
     return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
 
 
 def as_ndjson(answer: Study, shown: Shown) -> str:
-    """The lines of the runs, as far as they are not written yet, and what the runs have in common."""
+    """Return the lines of the runs that are not written yet, and what the runs have in common."""
     return "\n".join([*shown.lines, LAST.as_json(answer, shown.command, None)])
 
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
-    """Give the runs, each with its error at the common tr."""
+    """Yield the runs, each with its error at the common tr."""
     return zip(
         answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True
     )
 
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the runs."""
+    """Return the column names and cells of the runs."""
     cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.runs)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda one: one[0].source,
@@ -182,7 +182,7 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def outcome(answer: Study) -> list[tuple[str, str]]:
-    """What the runs have in common, by names, for people."""
+    """Return what the runs have in common, as pairs of a name and a text."""
     spread = answer.spread
     common = answer.common
     found = "none"
@@ -208,14 +208,14 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
 
 
 def _span(errors: Sequence[float]) -> str:
-    """Write the least and the largest of some errors, one number if they read alike."""
+    """Return the smallest and largest of some errors, or one number if they are displayed the same."""
     low = tables.measure(min(errors))
     high = tables.measure(max(errors))
     return low if low == high else f"{low} to {high}"
 
 
 def _verdicts(answer: Study) -> str:
-    """Count the runs by what is said of their own pairs."""
+    """Return how many runs have each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {runs_of(counts[word])}"
@@ -227,7 +227,7 @@ def _verdicts(answer: Study) -> str:
 
 
 def reasons(answer: Study) -> list[tuple[str, str]]:
-    """Why the pairs of runs are no better, each reason once, and what would make them so."""
+    """Return each reason once why pairs of runs are not better, and what would improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -240,7 +240,7 @@ def reasons(answer: Study) -> list[tuple[str, str]]:
 
 
 def td_of(answer: Study) -> str:
-    """The td of all runs, or the window in which each has its own."""
+    """Return the td of all runs, or the range in which each run has its own td."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     if answer.td is None:
@@ -249,7 +249,7 @@ def td_of(answer: Study) -> str:
 
 
 def short_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Give of each name what tells it from the others: folders and file names that all share are left out.
+    """Return the distinctive part of each name, without folders and file names that all have in common.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The answer of ``suggest`` as table, JSON, CSV, Markdown and bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from d2rpick.choice.decision import Decision
     from d2rpick.report.formats import Shown
 
-# Windows of acceptable tr that a line names.
+# largest number of windows of acceptable tr that a line names
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
 )
-# A candidate, and the decision on it.
+# a candidate and the decision on it
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda one: one[0]),
     keys.MATCHES._replace(get=lambda one: one[0].parts),
@@ -41,18 +41,18 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
+# Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
 
 def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
-    """Give the candidates, each with the decision on it."""
+    """Return each candidate with the decision on it."""
     return [(one, answer.decision_on(one)) for one in answer.candidates]
 
 
 def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
-    """Give the windows of acceptable tr, and which of them holds the recommended one."""
+    """Return the windows of acceptable tr, and which of them contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
     if windows is None:
@@ -84,9 +84,9 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 
 
 def as_table(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, what it rests on, and the first candidates; the recommended row has a star.
+    """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
 
-    Where nothing is recommended the candidates stand there only if all is asked for.
+    If nothing is recommended, candidates are listed only if all details are asked for.
     """
     above = heading(answer.situation, verbose=shown.verbose)
     lines = [
@@ -102,7 +102,7 @@ def as_table(answer: Suggestion, shown: Shown) -> str:
 
 
 def as_markdown(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, the candidates as a Markdown table, and below it what the verdict rests on."""
+    """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
     above = tables.listed((*verdict(answer), *next_step(answer)))
     below = tables.listed((*facts(answer), *outlook(answer)))
     table = tables.as_markdown(*_some(answer, shown))
@@ -112,14 +112,14 @@ def as_markdown(answer: Suggestion, shown: Shown) -> str:
 def _some(
     answer: Suggestion, shown: Shown
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the first candidates, in the columns that hold something."""
+    """Return the first candidates, without empty columns."""
     head, rows = tables.known(*table(answer, shown.limit))
     kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
 def as_csv(answer: Suggestion, _: Shown) -> str:
-    """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
+    """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
@@ -129,7 +129,7 @@ def as_csv(answer: Suggestion, _: Shown) -> str:
 
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to do with the recommended pair, why, and what comes after td; a name and a sentence each."""
+    """Return what to do with the recommended pair, why, and what to expect after td, as pairs of a name and a sentence."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better
@@ -144,7 +144,7 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def facts(answer: Suggestion) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, as pairs of a name and a sentence."""
     best = answer.chosen
     decision = answer.decision
     if best is None or decision is None:
@@ -160,7 +160,7 @@ def facts(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def next_step(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to type next: for a pair that can be used."""
+    """Return the next command for a pair that can be used."""
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
         return []
@@ -173,7 +173,7 @@ def next_step(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def better_about(answer: Suggestion, better: Pair) -> str:
-    """What is better about the better pair."""
+    """Return in which respect the better pair is better."""
     own = answer.recommended
     if own is None:
         return "there an acceptable tr exists"
@@ -185,7 +185,7 @@ def better_about(answer: Suggestion, better: Pair) -> str:
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
-    """What else there is to choose from; a name and a sentence each."""
+    """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
     if answer.windows:
         lines = [("acceptable", acceptable(answer.windows, chosen))]
@@ -205,7 +205,7 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def position(best: Candidate, *, deck: bool) -> str:
-    """How far a body is out of place at td, why, and what that takes for granted, with a ``deck`` or without."""
+    """Return the position error of a body at td, its cause, and the assumptions behind it, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` tells which do)" if taken and not deck else ""
@@ -218,7 +218,7 @@ def position(best: Candidate, *, deck: bool) -> str:
 
 
 def given_up(longer: Pair, chosen: Pair) -> str:
-    """How much rigid time was given up for a better level or residual, and for which."""
+    """Return how much rigid time was given up for a better level or residual, and how much better it is."""
     if longer.residual is None:
         what = "a lower level at td"
     else:
@@ -229,7 +229,7 @@ def given_up(longer: Pair, chosen: Pair) -> str:
 
 
 def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
-    """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
+    """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
     share = sum(one.share for one in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
@@ -248,12 +248,15 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
 
 
 def holds(window: AcceptableWindow, tr: float | None) -> bool:
-    """Whether the recommended tr lies in a window."""
+    """Return True if the recommended tr lies in the window."""
     return tr is not None and window.start <= tr <= window.end
 
 
 def as_value(answer: Suggestion, _: Shown) -> str:
-    """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
+    """Return the recommended tr, and td if it was chosen too, with the fewest digits that give the same number.
+
+    Without a recommendation the text is empty.
+    """
     pair = answer.recommended
     if pair is None:
         return ""
@@ -261,7 +264,7 @@ def as_value(answer: Suggestion, _: Shown) -> str:
 
 
 def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the first ``limit`` candidates."""
+    """Return the column names and cells of the first ``limit`` candidates."""
     columns: dict[str, Callable[[Candidate], tables.Cell]] = {
         "": lambda c: "*" if c.recommended else " ",
         "rank": lambda c: c.rank,

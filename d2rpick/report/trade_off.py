@@ -1,4 +1,4 @@
-"""The answer of ``explore`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``explore`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# Columns of the csv and of a frame.
+# columns of the CSV and of a frame
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
 
 
-# A change of the rigid time below this share is none that people read.
+# smallest change of the rigid time, as a share of it, that is mentioned
 _NO_CHANGE: Final = 5e-4
-# An error that falls to about this share of itself is halved; much further, it is as good as gone.
+# An error that falls to a share within these limits is halved; if it falls further, its new value is what counts.
 _HALF: Final = (0.45, 0.5)
 
 
-# Columns that are left out first where the table would be too wide.
+# Columns that are left out first if the table would be too wide.
 _SPARE: Final = (
     "timing tolerance",
     "level error",
@@ -63,7 +63,7 @@ _NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
 
 
 def as_table(found: TradeOff, shown: Shown) -> str:
-    """The answer in a sentence, the verdict on the best pair, some of the offers that nothing beats, what was read."""
+    """Return the answer in a sentence, the verdict on the best pair, some Pareto-optimal offers, and the input."""
     some = some_of(found, shown.limit)
     if some:
         offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
@@ -85,7 +85,7 @@ def as_table(found: TradeOff, shown: Shown) -> str:
 
 
 def verdict(found: TradeOff) -> list[tuple[str, str]]:
-    """What to do with the recommended pair, why, and what would be better."""
+    """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
     best = found.recommended
     if best is None or best.best is None or best.decision is None:
         return [("no pair to use", "no td in the window has an acceptable tr")]
@@ -93,21 +93,21 @@ def verdict(found: TradeOff) -> list[tuple[str, str]]:
 
 
 def as_markdown(found: TradeOff, shown: Shown) -> str:
-    """The same offers as a Markdown table, and the answer below it."""
+    """Return the same offers as a Markdown table, with the answer below it."""
     some = tables.known(*table(some_of(found, shown.limit)))
     said = [tables.in_markdown(answer(found)), *tables.listed(verdict(found))]
     return "\n\n".join([*said, tables.as_markdown(*some)])
 
 
 def as_csv(found: TradeOff, _: Shown) -> str:
-    """All offers, a column for each key of ``offers`` in the JSON output that is a single value."""
+    """Return CSV with all offers and a column for each key of ``offers`` in the JSON output that is a single value."""
     return csv_of(COLUMNS, map(OFFER.plain, found.offers))
 
 
 def answer(found: TradeOff) -> str:
-    """The shortest sensible answer in a sentence: how good the td asked for is, and what a step to another one changes.
+    """Return in one sentence how good the requested td is, and what a change to another td gains or costs.
 
-    Without a td that was asked for, the step begins at the one that saves most.
+    Without a requested td, the comparison starts from the td that saves most.
     """
     start = found.start
     step = found.step
@@ -150,14 +150,14 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 
 
 def _away(start: Offer, step: Offer, unit: str) -> str:
-    """Where the step leads."""
+    """Return how far the other td is away, and its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
 
 
 def _less(start: Offer, step: Offer) -> str:
-    """What the step does to the error."""
+    """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
         return "brings the level below twice the mean energy"
@@ -167,7 +167,7 @@ def _less(start: Offer, step: Offer) -> str:
 
 
 def _cost(start: Offer, step: Offer) -> str:
-    """What the step does to the run time, or to the rigid time where the cost of the parts is not known."""
+    """Return how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
@@ -184,7 +184,7 @@ def _cost(start: Offer, step: Offer) -> str:
 
 
 def _error(one: Offer) -> str:
-    """The error of an offer, with its name."""
+    """Return the error of an offer with its name."""
     if one.error is None:
         return "a level above twice the mean energy"
     if one.basis == "energy":
@@ -193,7 +193,7 @@ def _error(one: Offer) -> str:
 
 
 def some_of(found: TradeOff, limit: int) -> list[Offer]:
-    """Offers that the answer names, and evenly over those that nothing beats as many as make ``limit``."""
+    """Return the offers that the answer names, and Pareto-optimal ones at even distances, up to ``limit`` in all."""
     named = {
         one.td
         for one in (found.asked, found.recommended, found.start, found.step)
@@ -208,12 +208,12 @@ def some_of(found: TradeOff, limit: int) -> list[Offer]:
 
 
 def table(offers: Sequence[Offer]) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of some offers; the recommended one has a star."""
+    """Return the column names and cells of some offers; the recommended offer has a star."""
     return tables.filled(_COLUMNS, offers)
 
 
 def _of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
-    """Show a measure of the best pair of an offer."""
+    """Return a function that formats a measure of the best pair of an offer."""
     return lambda one: tables.shown(getattr(one.best, key), form) if one.best else None
 
 

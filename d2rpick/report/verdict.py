@@ -1,4 +1,4 @@
-"""The answer of ``verify`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``verify`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.report.formats import Shown
 
-# The pair that was judged, its measures and what they come to.
+# the judged pair, its measures and the verdict
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -60,7 +60,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: Verdict, shown: Shown) -> str:
-    """The verdict, why, and what would be better; then what it rests on, and the measures of the pair."""
+    """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
     decided = answer.decision.reason
     remarks = [("note", what) for what in answer.reasons if what not in decided]
     above = heading(answer.situation, verbose=shown.verbose)
@@ -75,12 +75,12 @@ def as_table(answer: Verdict, shown: Shown) -> str:
 
 
 def verdict(answer: Verdict) -> list[tuple[str, str]]:
-    """What to do with the pair, why, and what would be better; a name and a sentence each."""
+    """Return what to do with the pair, why, and what would be better, as pairs of a name and a sentence."""
     return headed(answer.decision, answer.candidate.tr, answer.td)
 
 
 def facts(answer: Verdict) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, as pairs of a name and a sentence."""
     best = answer.candidate
     lines = [*statements(answer.decision), ("rigid for", rigid_for(best))]
     if best.run_time_share is not None:
@@ -91,7 +91,7 @@ def facts(answer: Verdict) -> list[tuple[str, str]]:
 
 
 def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
-    """The measures of the pair by names for people, without those that are not known."""
+    """Return the known measures of the pair with their names for people."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
     found: list[tuple[str, tables.Cell]] = [
@@ -113,7 +113,7 @@ def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
 
 
 def as_markdown(answer: Verdict, _: Shown) -> str:
-    """The verdict, and the measures as a Markdown table of two columns."""
+    """Return the verdict, and the measures as a Markdown table of two columns."""
     said = tables.listed((*verdict(answer), *facts(answer)))
     table = tables.as_markdown(("measure", "value"), measured(answer))
     switched = answer.switched
@@ -129,7 +129,7 @@ def as_markdown(answer: Verdict, _: Shown) -> str:
 
 
 def measures(answer: Verdict) -> dict[str, Any]:
-    """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
+    """Return each measure by its key, those of a switched run with the prefix ``switched_``; reasons are one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -147,13 +147,13 @@ def measures(answer: Verdict) -> dict[str, Any]:
 
 
 def as_csv(answer: Verdict, _: Shown) -> str:
-    """One row, a column for each key of `measures`."""
+    """Return one row of CSV with a column for each key of `measures`."""
     found = measures(answer)
     return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Rows of numbers that both runs have, below ``COMPARED``."""
+    """Return the numbers that both runs have, as rows of name, reference and switched run, in the order of `COMPARED`."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
@@ -166,7 +166,7 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
 
 
 def deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """How far the switched run moves off the reference after td."""
+    """Return how far the switched run deviates from the reference after td, as pairs of a name and a text."""
     error = switched.momentum_error
     displacement = switched.displacement
     if error is None:
@@ -181,7 +181,7 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 
 
 def _comparison(switched: Comparison) -> list[str]:
-    """Lines that hold the switched run against the reference."""
+    """Return the lines that compare the switched run with the reference."""
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
@@ -191,7 +191,7 @@ def _comparison(switched: Comparison) -> list[str]:
 
 
 def _of_switched(answer: Verdict) -> dict[str, Any]:
-    """Measures of the switched run under names of their own; empty where there is none."""
+    """Return the measures of the switched run under their own names, empty without a switched run."""
     found = SWITCHED.plain(answer.switched) if answer.switched else {}
     found = {
         name: "; ".join(value) if name == "objections" else value
