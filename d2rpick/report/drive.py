@@ -44,7 +44,7 @@ def as_table(found: Driven, shown: Shown) -> str:
 
 
 def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and rows of the flights; ``deformable`` is the share of a flight that stays deformable."""
+    """Return the column names and rows of the flights; ``deformable`` is the deformable time of a flight."""
     columns = {
         "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
         "tr": lambda one: None if one.reason else one.tr, "td": lambda one: None if one.reason else one.td,

@@ -336,7 +336,7 @@ def digests(files: Iterable[Read]) -> list[tuple[str, str]]:
 def deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """Return the digests of a deck, its main file first, and of a file of weights; only the first includes are named."""
+    """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
     files = list({file.name: file for file in deck}.values())
     more = len(files) - _MOST_FILES
     if more > 0:

@@ -91,7 +91,7 @@ def _draw_suggestion(answer: Suggestion) -> Markup:
 
 
 def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
-    """Return a table without its first column, whose star marks the recommended row: that row is highlighted instead."""
+    """Return a table without its first column; a star there marks the recommended row, which is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return table(title, *unstarred(head, rows), marked)
 

@@ -248,7 +248,7 @@ def as_markdown(found: Parts, _: Shown) -> str:
 
 
 def as_csv(found: Parts, _: Shown) -> str:
-    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output; lists have semicolons."""
+    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
     return csv_of(PART.keys, map(PART.plain, found.rows), ";")
 
 

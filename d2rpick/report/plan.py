@@ -108,7 +108,7 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 
 
 def as_table(plan: Plan, shown: Shown) -> str:
-    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or not planned."""
+    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
     if plan.flights:
         rows = tables.as_text(*table(plan), shown.width, _SPARE)
     else:
@@ -167,7 +167,7 @@ def next_steps(plan: Plan) -> list[tuple[str, str]]:
 
 
 def verdicts(plan: Plan) -> list[tuple[str, str]]:
-    """Return why the planned windows are not better, and what would improve them, as pairs of a flight and a sentence."""
+    """Return why the planned windows are not better and what would improve them, each with the name of its flight."""
     return [
         (f"flight {row.number}", in_full(row.decision))
         for row in plan.flights

@@ -129,7 +129,7 @@ def as_csv(answer: Suggestion, _: Shown) -> str:
 
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and what to expect after td, as pairs of a name and a sentence."""
+    """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better
@@ -144,7 +144,7 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def facts(answer: Suggestion) -> list[tuple[str, str]]:
-    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, as pairs of a name and a sentence."""
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.chosen
     decision = answer.decision
     if best is None or decision is None:
@@ -205,7 +205,7 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def position(best: Candidate, *, deck: bool) -> str:
-    """Return the position error of a body at td, its cause, and the assumptions behind it, with or without a ``deck``."""
+    """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` tells which do)" if taken and not deck else ""

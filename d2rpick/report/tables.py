@@ -257,7 +257,7 @@ def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
 
 
 def _lines(text: str, width: int) -> list[str]:
-    """Wrap a text between words; words that are too long break after the signs that join names, folders and part ids."""
+    """Wrap a text between words; too long words break after the signs that join names, folders and part ids."""
     from textwrap import TextWrapper
 
     wrapper = TextWrapper(width, break_on_hyphens=False)

@@ -80,7 +80,7 @@ def verdict(answer: Verdict) -> list[tuple[str, str]]:
 
 
 def facts(answer: Verdict) -> list[tuple[str, str]]:
-    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, as pairs of a name and a sentence."""
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.candidate
     lines = [*statements(answer.decision), ("rigid for", rigid_for(best))]
     if best.run_time_share is not None:
@@ -153,7 +153,7 @@ def as_csv(answer: Verdict, _: Shown) -> str:
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Return the numbers that both runs have, as rows of name, reference and switched run, in the order of `COMPARED`."""
+    """Return the numbers that both runs have as rows of name, reference and switched run, below `COMPARED`."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
