@@ -80,12 +80,14 @@ def rigid_for(best: Candidate) -> str:
 
 def accuracy(best: Candidate) -> str:
     """Return the accuracy and the timing tolerance of tr as text, empty if neither is known."""
-    known = "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
+    interval = (
+        "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
+    )
     if best.timing_tolerance is None:
         room = ""
     else:
         room = f"any tr within ±{best.timing_tolerance:.1g} is nearly as good (error larger by at most 0.05)"
-    return "; ".join(filter(None, (known, room)))
+    return "; ".join(filter(None, (interval, room)))
 
 
 def saving(best: Candidate) -> str | None:

@@ -81,14 +81,14 @@ def explorer(explored: Explorer | None) -> Markup:
     """
     if explored is None:
         return Markup()
-    flights = [_flight(one) for one in explored.trade_offs]
-    known = {
+    flights = [_flight(trade_off) for trade_off in explored.trade_offs]
+    known_values = {
         name for flight in flights for name in flight["texts"]
     }  # values that no pair has are left out
     listed = (
         tag("div", tag("dt", name), tag("dd", data_value=key))
         for key, name in _VALUES.items()
-        if key in known
+        if key in known_values
     )
     section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
     values = Template(values).substitute(listed=join(listed))
@@ -106,14 +106,18 @@ def explorer(explored: Explorer | None) -> Markup:
         else "",
         unit=join([f" [{unit}]"] if unit else []),
         windows=tag("li", tag("i", class_="windows"), "acceptable tr")
-        if "windows" in known
+        if "windows" in known_values
         else "",
         below_energy=below[0],
         below_trade=below[1],
     )
-    before, behind = (shell_line(words) for words in explored.command)
-    found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
-    return join([Markup(section), _data("explorer-data", found)])
+    command_start, command_end = (shell_line(words) for words in explored.command)
+    data = {
+        "flight": 0,
+        "flights": flights,
+        "command": [f"{command_start} ", f" {command_end}"],
+    }
+    return join([Markup(section), _data("explorer-data", data)])
 
 
 def _closed_up(text: str) -> str:
@@ -129,34 +133,39 @@ def _data(name: str, content: Any) -> Markup:
     return tag("script", Markup(text), type="application/json", id=name)
 
 
-def _flight(found: TradeOff) -> dict[str, Any]:
+def _flight(trade_off: TradeOff) -> dict[str, Any]:
     """Return the curves, marks and texts of one flight."""
-    situation = found.situation
+    situation = trade_off.situation
     history = situation.history
     flight = situation.flight
-    first = found.asked or found.recommended or found.start or found.offers[-1]
-    seen = view_of(situation, found.offers[-1].td)
-    levels = [one.energy_td for one in found.offers]
-    scale = scale_in(situation, seen, levels)
+    first = (
+        trade_off.asked
+        or trade_off.recommended
+        or trade_off.start
+        or trade_off.offers[-1]
+    )
+    view = view_of(situation, trade_off.offers[-1].td)
+    levels = [offer.energy_td for offer in trade_off.offers]
+    scale = scale_in(situation, view, levels)
     whole = draw_outline(history.time, history.energy, _OVERVIEW)
-    inner = history.between(seen.start, seen.end)
+    inner = history.between(view.start, view.end)
     time, energy = draw_outline(*inner, stretches=_STRETCHES)
     unit = history.time_unit
     above = [
-        f"the {what}, up to {energy:.4g}"
-        for what, energy in seen.above
+        f"the {peak_name}, up to {energy:.4g}"
+        for peak_name, energy in view.above
         if energy > scale.high
     ]
     cut = f"; cut at the top: {' and '.join(above)}" if above else ""
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",
-        "error": _error_name(found.offers),
-        "saved": _saved_name(found.offers),
-        "view": [seen.start, seen.end],
+        "error": _error_name(trade_off.offers),
+        "saved": _saved_name(trade_off.offers),
+        "view": [view.start, view.end],
         "flight": [
-            seen.start if flight.start is None else flight.start,
-            seen.end if flight.end is None else flight.end,
+            view.start if flight.start is None else flight.start,
+            view.end if flight.end is None else flight.end,
         ],
         "heights": [scale.low, scale.high],
         "log": scale.logarithmic,
@@ -166,24 +175,24 @@ def _flight(found: TradeOff) -> dict[str, Any]:
         ],
         "whole": [_brief(column) for column in whole],
         "motion": _motion(situation),
-        "start": found.offers.index(first),
-        **_table(found, first, seen),
+        "start": trade_off.offers.index(first),
+        **_table(trade_off, first, view),
     }
 
 
 def _motion(situation: Situation) -> dict[str, Any] | None:
     """Return the curves from which the script composes the deformation, None if no oscillator is known."""
-    found = response(situation)
-    if found is None:
+    motion = response(situation)
+    if motion is None:
         return None
     columns = {
-        "time": found.time,
-        "reference": found.reference,
-        "release": found.release,
+        "time": motion.time,
+        "reference": motion.reference,
+        "release": motion.release,
     }
     return {
         **{name: _brief(column) for name, column in columns.items()},
-        "preload": found.preload,
+        "preload": motion.preload,
     }
 
 
@@ -192,36 +201,38 @@ def _brief(values: Samples) -> list[float]:
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
-def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
+def _table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
     """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """
-    situation, unit = found.situation, found.situation.history.time_unit
+    situation, unit = trade_off.situation, trade_off.situation.history.time_unit
     columns: dict[str, Callable[[Offer], Any]] = {
-        "td": lambda one: one.td,
-        "tr": lambda one: _short(one.tr),
-        "level": lambda one: _short(one.energy_td),
-        "locked": lambda one: _short(one.best.energy if one.best else None),
-        "deformation": lambda one: _short(
-            locked_in(situation, one.tr) if one.basis == "oscillator" else None
+        "td": lambda offer: offer.td,
+        "tr": lambda offer: _short(offer.tr),
+        "level": lambda offer: _short(offer.energy_td),
+        "locked": lambda offer: _short(offer.best.energy if offer.best else None),
+        "deformation": lambda offer: _short(
+            locked_in(situation, offer.tr) if offer.basis == "oscillator" else None
         ),
-        "saved": lambda one: _short(_saved(one)),
-        "error": lambda one: _short(one.error),
-        "windows": lambda one: _marked_columns(one.answer.windows or (), seen),
-        "peak": lambda one: int(one.peak),
-        "unbeaten": lambda one: int(one.unbeaten),
+        "saved": lambda offer: _short(_saved(offer)),
+        "error": lambda offer: _short(offer.error),
+        "windows": lambda offer: _marked_columns(offer.answer.windows or (), view),
+        "peak": lambda offer: int(offer.peak),
+        "unbeaten": lambda offer: int(offer.unbeaten),
     }
-    names, numbers = filled(columns, found.offers)
-    texts = [_texts(one, first, f" {unit}" if unit else "") for one in found.offers]
-    said = list(
+    names, numbers = filled(columns, trade_off.offers)
+    texts = [
+        _texts(offer, first, f" {unit}" if unit else "") for offer in trade_off.offers
+    ]
+    text_names = list(
         dict.fromkeys(name for row in texts for name, text in row.items() if text)
     )
     rows = [
-        [values, [row.get(name) or "" for name in said]]
+        [values, [row.get(name) or "" for name in text_names]]
         for values, row in zip(numbers, texts, strict=True)
     ]
-    return {"numbers": names, "texts": said, "rows": rows}
+    return {"numbers": names, "texts": text_names, "rows": rows}
 
 
 def _saved(offer: Offer) -> float | None:
@@ -237,7 +248,7 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
 
     The mask stays short however many windows noise makes, and it is finer than the screen.
     """
-    ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
+    ends = np.array([(window.start, window.end) for window in windows]).reshape(-1, 2)
     first, last = (
         np.clip(
             (ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1
@@ -258,15 +269,15 @@ def _short(value: float | None) -> float | None:
 
 def _error_name(offers: Sequence[Offer]) -> str:
     """Return the name of the error by which the offers are compared."""
-    if all(one.basis == "energy" for one in offers):
+    if all(offer.basis == "energy" for offer in offers):
         return "shortfall of the level at td"
     return "residual"
 
 
 def _saved_name(offers: Sequence[Offer]) -> str:
     """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
-    known = any(one.saving is not None for one in offers)
-    if known:
+    is_cost_known = any(offer.saving is not None for offer in offers)
+    if is_cost_known:
         return "saved, % of the processor time"
     return "rigid, % of the simulated time"
 
@@ -294,11 +305,13 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     """Return the texts about the recommended tr."""
-    kept = offer.answer.kept
+    kept_share = offer.answer.kept
     windows = offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None if kept is None else f"{span_of(kept)} of the reference's",
+        "after": None
+        if kept_share is None
+        else f"{span_of(kept_share)} of the reference's",
         "level_error": shown(
             best.level_error if best.residual is None else None, ".3f"
         ),
@@ -326,18 +339,18 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
     if offer is start:
         return ""
     apart = offer.td - start.td
-    said = [
+    comparisons = [
         f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"
     ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
         share = offer.best.rigid_fraction - start.best.rigid_fraction
-        said.append(
+        comparisons.append(
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
             f"{share:+.1%} of the simulated time"
         )
     if offer.saving is not None and start.saving is not None:
-        said.append(
+        comparisons.append(
             f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
         )
     if (
@@ -345,7 +358,7 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         and start.error is not None
         and (offer.basis == "energy") == (start.basis == "energy")
     ):
-        said.append(
+        comparisons.append(
             f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}"
         )
-    return ", ".join(said)
+    return ", ".join(comparisons)

@@ -76,7 +76,7 @@ class Field(NamedTuple):
 
 def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
     return field._replace(
-        get=lambda thing: None if (found := part(thing)) is None else field.taken(found)
+        get=lambda thing: None if (inner := part(thing)) is None else field.taken(inner)
     )
 
 
@@ -85,7 +85,7 @@ def row(
     name: str = "",
     later: Iterable[str] = (),
     closed: bool = False,
-    **more: Any,
+    **keywords: Any,
 ) -> Kind:
     """Make a row of fields; older results may lack keys given as ``later``, a ``closed`` row allows no other keys.
 
@@ -105,7 +105,7 @@ def row(
         ],
         "properties": {field.key: field for field in fields},
         **({"additionalProperties": False} if closed else {}),
-        **more,
+        **keywords,
     }
     return Kind(
         schema,
@@ -117,24 +117,24 @@ def row(
 
 def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
     """Return a kind by its name, with limits in the words of JSON schema, such as ``minimum=0``."""
-    known = _KINDS[kind] if isinstance(kind, str) else kind
+    named_kind = _KINDS[kind] if isinstance(kind, str) else kind
     if limits:
-        return Kind({**known.schema, **limits}, known.plain, known.name)
-    return known
+        return Kind({**named_kind.schema, **limits}, named_kind.plain, named_kind.name)
+    return named_kind
 
 
 def maybe(kind: Kind | Name) -> Kind:
     """Return a kind that also allows None, for values that may be unknown."""
     kind = kind_of(kind)
-    known = kind.schema
-    if None in known.get("enum", ()) or "null" in known.get("type", ()):
+    schema = kind.schema
+    if None in schema.get("enum", ()) or "null" in schema.get("type", ()):
         return kind
-    if "enum" in known:
-        null = {"enum": [*known["enum"], None]}
+    if "enum" in schema:
+        null = {"enum": [*schema["enum"], None]}
     else:
-        null = {"type": [known["type"], "null"]}
+        null = {"type": [schema["type"], "null"]}
     return Kind(
-        {**known, **null},
+        {**schema, **null},
         lambda value: None if value is None else kind.plain(value),
         kind.name,
     )
@@ -142,10 +142,10 @@ def maybe(kind: Kind | Name) -> Kind:
 
 def many(kind: Kind | Name) -> Kind:
     """Return the kind of an array of such values."""
-    one = kind_of(kind)
+    item_kind = kind_of(kind)
     return Kind(
-        {"type": "array", "items": one},
-        lambda values: [one.plain(value) for value in values],
+        {"type": "array", "items": item_kind},
+        lambda values: [item_kind.plain(value) for value in values],
     )
 
 
@@ -196,14 +196,14 @@ class Document(NamedTuple):
             Field("tool_version", "text"),
             Field("command", "texts"),
         )
-        known = self.row.schema
-        later = {*self.row.keys} - {*known["required"]}
-        more = {
+        schema = self.row.schema
+        later = {*self.row.keys} - {*schema["required"]}
+        further_keys = {
             key: value
-            for key, value in known.items()
+            for key, value in schema.items()
             if key not in ("type", "required", "properties")
         }
-        return row(*head, *self.row.fields, later=later, **more)
+        return row(*head, *self.row.fields, later=later, **further_keys)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
         """Return the content of the JSON document; ``command`` are the arguments that repeat the answer."""
@@ -226,7 +226,7 @@ def csv_of(
 ) -> str:
     """Write rows as CSV with these columns; lists are joined in their cell."""
     return tables.as_csv(
-        keys, ([_cell(found[key], between) for key in keys] for found in rows)
+        keys, ([_cell(values[key], between) for key in keys] for values in rows)
     ).rstrip("\n")
 
 

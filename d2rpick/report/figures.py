@@ -86,13 +86,13 @@ def shade(
 def note(
     axes: Axes,
     text: str,
-    place: tuple[float, float],
+    position: tuple[float, float],
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
     """Write a text at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
-    axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
+    axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 
 
 def picture_format(name: str) -> str:
@@ -154,15 +154,20 @@ def show_span(
     if scale.logarithmic:
         make_logarithmic(axes, scale.low, scale.high)
     axes.set_ylim(scale.low, scale.high)
-    for what, highest in above:
+    for peak_name, highest in above:
         if highest <= scale.high:
             continue
-        early = what == "load"  # the load is on the left, the landing on the right
+        early = peak_name == "load"  # the load is on the left, the landing on the right
         note(
-            axes, f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), (6 if early else -6, -6),
-            xycoords="axes fraction", ha="left" if early else "right", va="top",
+            axes,
+            f"{peak_name}, up to {highest:.4g} \N{UPWARDS ARROW}",
+            (0 if early else 1, 1),
+            (6 if early else -6, -6),
+            xycoords="axes fraction",
+            ha="left" if early else "right",
+            va="top",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-        )  # fmt: skip
+        )
 
 
 def mark_times(
@@ -173,16 +178,20 @@ def mark_times(
     A label that would cross an edge moves to the other side of its line if there is room.
     """
     width, (low, high) = LABEL[page], panels[0].get_xlim()
-    places = [
+    positions = [
         None if time is None else (time - low) / (high - low) for time in (tr, td)
     ]
-    room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
+    room = (
+        1.0
+        if positions[0] is None or positions[1] is None
+        else positions[1] - positions[0]
+    )
     sides = ["right", "left"]
-    if places[0] is not None and places[0] < width < room:
+    if positions[0] is not None and positions[0] < width < room:
         sides[0] = "left"
     if (
-        places[1] is not None
-        and places[1] > 1 - width
+        positions[1] is not None
+        and positions[1] > 1 - width
         and room > width * (1 + (sides[0] == "left"))
     ):
         sides[1] = "right"
@@ -214,8 +223,10 @@ def finish(axes: Axes, *, legend: bool = True) -> None:
 
 def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     """Return the legend entries of several panels, each name once."""
-    known = (zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels)
-    return {name: handle for pairs in known for handle, name in pairs}
+    panel_entries = (
+        zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
+    )
+    return {name: handle for pairs in panel_entries for handle, name in pairs}
 
 
 def legend_below(
@@ -225,10 +236,10 @@ def legend_below(
     size: str | None = "small",
 ) -> None:
     """Put one legend for all panels below them."""
-    if known := _entries(panels):
+    if entries := _entries(panels):
         figure.legend(
-            known.values(),
-            known,
+            entries.values(),
+            entries,
             loc="outside lower left",
             ncols=columns,
             fontsize=size,
@@ -247,9 +258,9 @@ def plain(name: str) -> str:
     A name may otherwise be read as a formula, or be hidden if it begins with an underscore.  Long names are cut off;
     unprintable letters become question marks.
     """
-    shown = "".join(letter if letter.isprintable() else "?" for letter in name)
-    shown = shown if len(shown) <= _LONGEST_NAME else f"{shown[: _LONGEST_NAME - 1]}…"
-    return f"{' ' if shown.startswith('_') else ''}{shown}".replace("$", r"\$")
+    text = "".join(letter if letter.isprintable() else "?" for letter in name)
+    text = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 1]}…"
+    return f"{' ' if text.startswith('_') else ''}{text}".replace("$", r"\$")
 
 
 def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
@@ -258,24 +269,24 @@ def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> No
     Margins are measured once, from the numbers on the vertical axes; a layout engine would draw the figure three times.
     """
     FigureCanvasSVG(figure)
-    known = _entries(panels)
-    foot = _BELOW + _LINE * ceil(len(known) / _COLUMNS)
+    entries = _entries(panels)
+    foot = _BELOW + _LINE * ceil(len(entries) / _COLUMNS)
     full = _TOP + len(panels) * height + (len(panels) - 1) * _BETWEEN + foot
     figure.set_size_inches(PAGE_WIDTH, full)
     panels[-1].locator_params(axis="x", nbins=_NUMBERS)
     _place(panels, 0.15 * PAGE_WIDTH, height, full)
     boxes = ((panel, panel.yaxis.get_tightbbox()) for panel in panels)
-    left = (
+    left_margin = (
         max(panel.bbox.x0 - box.x0 for panel, box in boxes if box) / figure.dpi + _EDGE
     )
-    _place(panels, left, height, full)
+    _place(panels, left_margin, height, full)
     for panel in panels:
         panel.yaxis.set_label_coords(
-            (_EDGE + _NAME - left) / (PAGE_WIDTH - left - _RIGHT), 0.5
+            (_EDGE + _NAME - left_margin) / (PAGE_WIDTH - left_margin - _RIGHT), 0.5
         )
     figure.legend(
-        known.values(),
-        known,
+        entries.values(),
+        entries,
         loc="lower left",
         ncols=_COLUMNS,
         fontsize="small",
@@ -284,15 +295,17 @@ def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> No
     )
 
 
-def _place(panels: Sequence[Axes], left: float, height: float, full: float) -> None:
+def _place(
+    panels: Sequence[Axes], left_margin: float, height: float, full: float
+) -> None:
     """Place the panels in a figure of height ``full`` [inch]."""
-    for place, panel in enumerate(panels):
-        bottom = full - _TOP - (place + 1) * height - place * _BETWEEN
+    for index, panel in enumerate(panels):
+        bottom = full - _TOP - (index + 1) * height - index * _BETWEEN
         panel.set_position(
             (
-                left / PAGE_WIDTH,
+                left_margin / PAGE_WIDTH,
                 bottom / full,
-                1 - (left + _RIGHT) / PAGE_WIDTH,
+                1 - (left_margin + _RIGHT) / PAGE_WIDTH,
                 height / full,
             )
         )

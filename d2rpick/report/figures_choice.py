@@ -115,12 +115,12 @@ def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
     On a page a better pair is drawn in the same figure, since two figures would be nearly the same.
     """
     best = answer.chosen
-    few = answer.windows is None and len(answer.candidates) <= _FEW
-    shown = tuple(answer.candidates) if few else (best,) if best else ()
-    bands = () if few else answer.acceptable_windows
+    has_few = answer.windows is None and len(answer.candidates) <= _FEW
+    drawn = tuple(answer.candidates) if has_few else (best,) if best else ()
+    bands = () if has_few else answer.acceptable_windows
     better = answer.clearly_better if page else None
     return _draw(
-        answer.situation, best.tr if best else None, shown, bands, better, page=page
+        answer.situation, best.tr if best else None, drawn, bands, better, page=page
     )
 
 
@@ -148,10 +148,10 @@ def _draw(
     modal = situation.basis == "modal" and modelled
     below = modal or motion is not None
     figure, panels = figures.begin(2 if below else 1, _HEIGHTS[below], page=page)
-    seen = view_of(
+    view = view_of(
         situation, *(() if tr is None else (tr,)), *(better[:2] if better else ())
     )
-    _draw_energy(panels[0], situation, seen, candidates, bands)
+    _draw_energy(panels[0], situation, view, candidates, bands)
     if computed is not None:
         panels[0].plot(
             computed.time,
@@ -171,8 +171,8 @@ def _draw(
     for panel in panels:
         figures.finish(panel, legend=not page)
     # the level belongs to the flight, even if td lies beyond it
-    scale = scale_in(situation, seen, [situation.energy_td])
-    figures.show_span(panels[0], (seen.start, seen.end), scale, seen.above)
+    scale = scale_in(situation, view, [situation.energy_td])
+    figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
         figures.arrange(figure, panels, _PANELS[below])
     figures.mark_times(panels, tr, situation.td, page=page)
@@ -182,7 +182,7 @@ def _draw(
 def _draw_energy(
     axes: Axes,
     situation: Situation,
-    seen: View,
+    view: View,
     candidates: Sequence[Candidate],
     bands: Sequence[tuple[float, float]],
 ) -> None:
@@ -190,40 +190,52 @@ def _draw_energy(
     level = situation.energy_td
     flight = situation.flight
     span = situation.evidence.span
-    drawn = draw_outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
+    drawn = draw_outline(*history.between(view.start, view.end), stretches=STRETCHES)
     if flight.start is not None:
         if span:
-            known = span.end
+            last_seen = span.end
         else:
-            known = situation.td
-        end = known if flight.end is None else flight.end
+            last_seen = situation.td
+        end = last_seen if flight.end is None else flight.end
         shade(axes, (flight.start, end), f"flight ({flight.source})")
     axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
     axes.axhline(
         level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}"
     )
-    for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
+    for number, band in enumerate(merged(bands, (view.end - view.start) / STRETCHES)):
         label = "_" if number else "acceptable tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
     for acceptable, fill, name in (
         (True, GOOD, "acceptable"),
         (False, "none", "not acceptable"),
     ):
-        some = [one for one in candidates if one.acceptable == acceptable]
-        if some:
+        marked = [
+            candidate for candidate in candidates if candidate.acceptable == acceptable
+        ]
+        if marked:
             label = name if len(candidates) > 1 else "tr"
             axes.scatter(
-                [one.tr for one in some], [one.energy for one in some], s=28, linewidths=0.7, facecolors=fill,
-                edgecolors=GOOD, zorder=3, label=label,
-            )  # fmt: skip
+                [candidate.tr for candidate in marked],
+                [candidate.energy for candidate in marked],
+                s=28,
+                linewidths=0.7,
+                facecolors=fill,
+                edgecolors=GOOD,
+                zorder=3,
+                label=label,
+            )
     axes.set_ylabel("internal energy")
 
 
-def _draw_better(panels: Sequence[Axes], there: Situation, tr: float) -> None:
+def _draw_better(
+    panels: Sequence[Axes], better_situation: Situation, tr: float
+) -> None:
     """Draw a better pair as seen from its own td: level, times and motion, in its own colour and line style."""
-    lines = [panels[0].axhline(there.energy_td)]
-    lines += [panel.axvline(time) for panel in panels for time in (tr, there.td)]
-    motion = replayed_motion(there, tr)
+    lines = [panels[0].axhline(better_situation.energy_td)]
+    lines += [
+        panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
+    ]
+    motion = replayed_motion(better_situation, tr)
     if motion and len(panels) > 1:
         lines += panels[1].plot(motion.time, motion.switched)
     for line in lines:
@@ -316,16 +328,16 @@ def draw_run(
     return figure
 
 
-def draw_parts(found: Parts) -> Figure:
+def draw_parts(answer: Parts) -> Figure:
     """Draw the energies of the parts with the largest energy, and the flights; raise FormatError without parts."""
-    run = found.files
+    run = answer.files
     energies = run.part_energies(run.parts)
     time = run.part_time
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     for at in energies.max(axis=0).argsort()[::-1][:_MOST_PARTS]:
         curve = draw_outline(time, energies[:, at], stretches=STRETCHES)
         axes.plot(*curve, linewidth=1, label=plain(run.parts[at].name))
-    for flight in found.facts.flights:
+    for flight in answer.facts.flights:
         shade(axes, flight, "flight")
     _finish(figure, axes, "time", page=True)
     return figure
@@ -341,36 +353,40 @@ def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
         figures.legend_below(figure, [axes])
 
 
-def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
+def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     """Draw the energy in the td range, and below it the error and saving of the best pair for each td."""
     figure, panels = figures.begin(3, _TRADE_HEIGHT, page=page)
     energy, error, rigid = panels
-    history = found.situation.history
-    inner = history.between(*found.td_window)
+    history = trade_off.situation.history
+    inner = history.between(*trade_off.td_window)
     energy.plot(
         *draw_outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1
     )
     energy.set(ylabel="internal energy")
-    by_energy = bool(found.offers) and all(
-        one.basis == "energy" for one in found.offers
+    by_energy = bool(trade_off.offers) and all(
+        offer.basis == "energy" for offer in trade_off.offers
     )
-    _curve(error, found, [one.error for one in found.offers])
+    _curve(error, trade_off, [offer.error for offer in trade_off.offers])
     error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
-    saved = [one.saving for one in found.offers]
-    cost = any(one is not None for one in saved)
-    _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
+    saved = [offer.saving for offer in trade_off.offers]
+    cost = any(offer is not None for offer in saved)
+    _curve(
+        rigid,
+        trade_off,
+        saved if cost else [offer.rigid_time for offer in trade_off.offers],
+    )
     td = with_unit("td", history.time_unit)
     rigid.set(
         ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None)
     )
     for axes in panels:
-        for one, colour, name in (
-            (found.asked, FLIGHT, "td asked for"),
-            (found.recommended, SWITCHED, "recommended"),
+        for offer, colour, name in (
+            (trade_off.asked, FLIGHT, "td asked for"),
+            (trade_off.recommended, SWITCHED, "recommended"),
         ):
-            if one:
+            if offer:
                 axes.axvline(
-                    one.td, color=colour, linewidth=1, linestyle="--", label=name
+                    offer.td, color=colour, linewidth=1, linestyle="--", label=name
                 )
         figures.finish(axes, legend=False)
         axes.margins(x=_AT_EDGE)
@@ -381,14 +397,14 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     return figure
 
 
-def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
+def _curve(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
     """Draw one measure of all offers, with gaps where it is unknown, and mark the Pareto-optimal offers."""
-    td = np.array([one.td for one in found.offers])
-    shown = np.array([np.nan if value is None else value for value in values])
-    best = np.array([one.unbeaten for one in found.offers], dtype=bool)
-    axes.plot(td, shown, color=REFERENCE, linewidth=0.8, label="best pair for each td")
+    td = np.array([offer.td for offer in trade_off.offers])
+    drawn = np.array([np.nan if value is None else value for value in values])
+    best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
+    axes.plot(td, drawn, color=REFERENCE, linewidth=0.8, label="best pair for each td")
     axes.plot(
-        td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it"
+        td[best], drawn[best], "o", color=GOOD, markersize=4, label="nothing beats it"
     )
 
 
@@ -409,11 +425,15 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     axes = figure.subplots()
     drawn = {id(row): row.curve for row in answer.runs if row.curve is not None}
     runs = [row for row in answer.runs if id(row) in drawn]
-    named = _named(runs, drawn)
-    _draw_others(axes, [*drawn.values()], named)
-    for one in named:
+    named_runs = _named(runs, drawn)
+    _draw_others(axes, [*drawn.values()], named_runs)
+    for named_run in named_runs:
         axes.plot(
-            *one.curve, color=one.colour, linestyle=one.pattern, linewidth=1, label="_"
+            *named_run.curve,
+            color=named_run.colour,
+            linestyle=named_run.pattern,
+            linewidth=1,
+            label="_",
         )
     if answer.common.window:
         shade(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
@@ -425,7 +445,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     )
     figures.finish(axes, legend=False)
     _show_runs(axes, answer, runs, [*drawn.values()])
-    _name(axes, named, page=page)
+    _name(axes, named_runs, page=page)
     figures.legend_below(figure, [axes], columns=1 if page else 4)
     figures.mark_times([axes], answer.common.tr, answer.td, page=page)
     return figure
@@ -453,17 +473,20 @@ def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Nam
 
 
 def _draw_others(
-    axes: Axes, curves: Sequence[Samples], named: Sequence[_Named]
+    axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
     """Draw the runs without a name in grey, so that many lines are together as dark as ten."""
-    told = {id(one.curve) for one in named}
-    others = [curve.T for curve in curves if id(curve) not in told]
-    many = len(curves) > _MANY
+    named_curves = {id(named_run.curve) for named_run in named_runs}
+    other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
+    is_thin = len(curves) > _MANY
     lines = LineCollection(
-        others, colors=_GREY if told or len(others) > 1 else REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
-        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(others)))),
-        label=f"internal energy of {runs_of(len(curves))}" if others else "_",
-    )  # fmt: skip
+        other_curves,
+        colors=_GREY if named_curves or len(other_curves) > 1 else REFERENCE,
+        linewidths=0.6 if is_thin else 1,
+        rasterized=is_thin,
+        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(other_curves)))),
+        label=f"internal energy of {runs_of(len(curves))}" if other_curves else "_",
+    )
     axes.add_collection(lines)
     axes.autoscale_view()
 
@@ -472,10 +495,10 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
     """Mark the tr of each run at its target energy."""
     points = np.array([(row.tr, row.energy_td) for row in drawn if row.tr is not None])
     if points.size:
-        many = len(drawn) > _MANY
+        is_thin = len(drawn) > _MANY
         axes.scatter(
-            points[:, 0], points[:, 1], s=8 if many else 28, linewidths=0.7, facecolors=GOOD, edgecolors="white",
-            zorder=3, label="tr of each run", rasterized=many,
+            points[:, 0], points[:, 1], s=8 if is_thin else 28, linewidths=0.7, facecolors=GOOD, edgecolors="white",
+            zorder=3, label="tr of each run", rasterized=is_thin,
         )  # fmt: skip
 
 
@@ -485,8 +508,8 @@ def _show_runs(
     """Limit the axes to the time from shortly before the first tr to shortly after td; higher energies are cut off."""
     if not curves:
         return
-    first = min(float(one[0, 0]) for one in curves)
-    last = max(float(one[0, -1]) for one in curves)
+    first = min(float(curve[0, 0]) for curve in curves)
+    last = max(float(curve[0, -1]) for curve in curves)
     times = [row.tr for row in drawn if row.tr is not None]
     if answer.td is None:
         td = max((row.td for row in drawn if row.td is not None), default=last)
@@ -501,7 +524,7 @@ def _show_runs(
         min(last, td + _AFTER * (td - early)),
     )
     levels = np.array([row.energy_td for row in drawn if row.energy_td is not None])
-    inner, seen = (
+    inner, visible_energies = (
         np.concatenate([levels, *_energies(curves, *window)])
         for window in ((early, td), span)
     )
@@ -509,8 +532,10 @@ def _show_runs(
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = scale_of(float(inner.min()), float(inner.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
-        scale = scale_of(0.0, max(float(one[1].max()) for one in curves), 0.0)
-    figures.show_span(axes, span, scale, [("highest run", float(seen.max()))])
+        scale = scale_of(0.0, max(float(curve[1].max()) for curve in curves), 0.0)
+    figures.show_span(
+        axes, span, scale, [("highest run", float(visible_energies.max()))]
+    )
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:
@@ -519,19 +544,35 @@ def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[S
         yield energy[(start <= time) & (time <= end)]
 
 
-def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
+def _name(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
     """Write the names of runs next to the axes, in the order of their curves, each joined to its curve by a line."""
     end = axes.get_xlim()[1]
     free = 0.0
-    places = ((_height(axes, float(np.interp(end, *one.curve))), one) for one in named)
-    for place, one in sorted(places, key=lambda known: known[0]):
-        at = max(free, min(place, 1 - _LINE * (len(named) - 1)))
+    runs_by_height = (
+        (_height(axes, float(np.interp(end, *named_run.curve))), named_run)
+        for named_run in named_runs
+    )
+    for height, named_run in sorted(runs_by_height, key=lambda pair: pair[0]):
+        at = max(free, min(height, 1 - _LINE * (len(named_runs) - 1)))
         free = at + _LINE
         axes.annotate(
-            one.name, (1, place), xycoords="axes fraction", xytext=(1.03, at), textcoords="axes fraction", va="center",
-            fontsize="x-small" if page else "small", color=one.colour, annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern, **_ENDS},
-        )  # fmt: skip
+            named_run.name,
+            (1, height),
+            xycoords="axes fraction",
+            xytext=(1.03, at),
+            textcoords="axes fraction",
+            va="center",
+            fontsize="x-small" if page else "small",
+            color=named_run.colour,
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": named_run.colour,
+                "linewidth": 0.6,
+                "linestyle": named_run.pattern,
+                **_ENDS,
+            },
+        )
 
 
 def _height(axes: Axes, value: float) -> float:

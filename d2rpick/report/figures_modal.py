@@ -31,12 +31,12 @@ def draw_residuals(axes: Axes, situation: Situation) -> None:
     profile = situation.vibration.profile
     start = situation.earliest_tr
     assert profile is not None
-    shown = profile.time >= (-np.inf if start is None else start)
+    is_visible = profile.time >= (-np.inf if start is None else start)
     residuals = np.asarray(
-        residual(profile.error[shown], situation.kinetic_share or 0.0)
+        residual(profile.error[is_visible], situation.kinetic_share or 0.0)
     )
     axes.plot(
-        *draw_outline(profile.time[shown], residuals, stretches=STRETCHES),
+        *draw_outline(profile.time[is_visible], residuals, stretches=STRETCHES),
         color=REFERENCE,
         linewidth=1,
         label="_",

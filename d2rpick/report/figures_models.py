@@ -88,10 +88,10 @@ def draw_rollover(
         grid["roll"].plot(time, np.degrees(record.roll), **drawn)
         grid["height"].plot(time, record.centre.imag, **drawn)
     if switched:
-        off = np.degrees(switched.roll - reference.roll)
-        grid["roll difference"].plot(time, off, color=SWITCHED, linewidth=1)
-        off = 1e3 * (switched.centre - reference.centre).imag
-        grid["height difference"].plot(time, off, color=SWITCHED, linewidth=1)
+        deviation = np.degrees(switched.roll - reference.roll)
+        grid["roll difference"].plot(time, deviation, color=SWITCHED, linewidth=1)
+        deviation = 1e3 * (switched.centre - reference.centre).imag
+        grid["height difference"].plot(time, deviation, color=SWITCHED, linewidth=1)
     units = {
         "roll": "roll [degrees]",
         "roll difference": "roll off by [degrees]",
@@ -110,7 +110,9 @@ def _draw_outlines(
     axes: Axes, parameters: Parameters, reference: Record, switched: Record | None
 ) -> None:
     """Draw labelled outlines of the box at regular times, the first and last position of the sled, and the ground."""
-    shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
+    drawn_states = (
+        np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
+    )
     sled = Sled(parameters.speed, parameters.braking)
     for time in (0.0, float(reference.time[-1])):
         draw_sled(axes, parameters, sled.place(time))
@@ -120,12 +122,12 @@ def _draw_outlines(
     ):
         if record:
             closed = np.column_stack(
-                [record.outline[shown], record.outline[shown, 0]]
+                [record.outline[drawn_states], record.outline[drawn_states, 0]]
             ).T
             axes.plot(
                 closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style
             )
-    for state in shown:
+    for state in drawn_states:
         centre = reference.centre[state]
         text = f"{1e3 * reference.time[state]:.0f}"
         axes.text(
@@ -172,10 +174,10 @@ def draw_scan(
     """Draw the energy of the box with its level at td, and below it the errors of roll and mean energy against tr."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
-    before = reference.time <= answer.situation.td
-    internal = reference.internal_energy[before, 0]
+    is_before_td = reference.time <= answer.situation.td
+    internal = reference.internal_energy[is_before_td, 0]
     energy.plot(
-        reference.time[before],
+        reference.time[is_before_td],
         internal,
         color=REFERENCE,
         linewidth=1,
@@ -187,17 +189,17 @@ def draw_scan(
         linewidth=0.8,
         label=f"level at td, {internal[-1]:.4g}",
     )
-    times = [one.tr for one in outcomes]
+    times = [outcome.tr for outcome in outcomes]
     roll.plot(
         times,
-        [abs(one.roll_error) for one in outcomes],
+        [abs(outcome.roll_error) for outcome in outcomes],
         ".-",
         color=REFERENCE,
         label="roll error at td",
     )
     mean.plot(
         times,
-        [one.mean_ratio - 1 for one in outcomes],
+        [outcome.mean_ratio - 1 for outcome in outcomes],
         ".-",
         color=REFERENCE,
         label="error of the mean energy",
@@ -228,7 +230,7 @@ def draw_scan(
     return figure
 
 
-def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
+def draw_sled(axes: Axes, parameters: Parameters, position: float) -> None:
     """Draw floor, curb and cushion of the sled at ``place`` [m], and the ground."""
     p = parameters
     axes.axhline(-p.ground, color=REFERENCE, linewidth=1.2)
@@ -247,7 +249,7 @@ def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
         ),
         ((0.0, CURB_THICKNESS, CURB_THICKNESS + 1j * p.curb, 1j * p.curb), SWITCHED),
     ):
-        shape = place + np.array(corners) * turn
+        shape = position + np.array(corners) * turn
         axes.add_patch(
             Polygon(
                 np.column_stack([shape.real, shape.imag]),

@@ -87,14 +87,17 @@ def as_table(checks: Checks, _: Shown) -> str:
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
         lines += [f"  {line}" for line in _window_lines(result.windows, checks.root)]
-        lines += [f"  {_line(one)}" for one in _findings(checks, result)]
+        lines += [f"  {_line(finding)}" for finding in _findings(checks, result)]
     return "\n".join([*map(make_printable, lines), "", _last_line(checks)])
 
 
-def as_ndjson(checks: Checks, shown: Shown) -> str:
+def as_ndjson(checks: Checks, display: Shown) -> str:
     """Return a line of JSON per deck, each by the schema of the whole result."""
-    each = (replace(checks, results=[result]) for result in checks.results)
-    return "\n".join(DOCUMENT.as_json(one, shown.command, None) for one in each)
+    deck_checks = (replace(checks, results=[result]) for result in checks.results)
+    return "\n".join(
+        DOCUMENT.as_json(deck_check, display.command, None)
+        for deck_check in deck_checks
+    )
 
 
 def as_csv(checks: Checks, _: Shown) -> str:
@@ -104,10 +107,10 @@ def as_csv(checks: Checks, _: Shown) -> str:
 
 def as_markdown(checks: Checks, _: Shown) -> str:
     """Return the findings as a Markdown table, and their number."""
-    found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
+    rows = [list(FINDING.plain(finding).values()) for finding in _findings(checks)]
     return "\n\n".join(
         [
-            *([tables.as_markdown(FINDING.keys, found)] if found else []),
+            *([tables.as_markdown(FINDING.keys, rows)] if rows else []),
             _last_line(checks),
         ]
     )
@@ -115,15 +118,18 @@ def as_markdown(checks: Checks, _: Shown) -> str:
 
 def as_github(checks: Checks, _: Shown) -> str:
     """Return workflow commands that make GitHub Actions show the findings next to the lines of a deck."""
-    found = [
+    annotations = [
         f"::{_GITHUB[f.severity]} file={_escaped(f.file, ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
         for f in _findings(checks)
     ]
-    failed = ((_shown(one.deck, checks.root), one.reason) for one in checks.failed)
+    failed = (
+        (_shown(failed_deck.deck, checks.root), failed_deck.reason)
+        for failed_deck in checks.failed
+    )
     return "\n".join(
         [
-            *found,
+            *annotations,
             *(
                 f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}"
                 for deck, reason in failed
@@ -148,23 +154,29 @@ def as_junit(checks: Checks, _: Shown) -> str:
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         ET.SubElement(case, "error", type=failed.code, message=_xml(failed.reason))
     for result in checks.results:
-        failing = [one.severity.rank <= checks.fail_on.rank for one in result.findings]
+        failing = [
+            finding.severity.rank <= checks.fail_on.rank for finding in result.findings
+        ]
         suite, name = begin(
             result.deck, tests=max(1, len(failing)), failures=sum(failing), errors=0
         )
         if not failing:
             ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        for one, fails in zip(_findings(checks, result), failing, strict=True):
+        for finding, fails in zip(_findings(checks, result), failing, strict=True):
             case = ET.SubElement(
                 suite,
                 "testcase",
-                name=_xml(f"{one.rule} {_place(one)}"),
+                name=_xml(f"{finding.rule} {_place(finding)}"),
                 classname=name,
             )
-            about = {"type": one.rule, "message": _xml(one.message)} if fails else {}
+            about = (
+                {"type": finding.rule, "message": _xml(finding.message)}
+                if fails
+                else {}
+            )
             ET.SubElement(
                 case, "failure" if fails else "system-out", about
-            ).text = _xml(_line(one))
+            ).text = _xml(_line(finding))
     ET.indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(
         suites, encoding="unicode"
@@ -184,7 +196,7 @@ def as_sarif(checks: Checks, _: Shown) -> str:
         }
         for rule in RULES.values()
     ]
-    found = [
+    results = [
         {
             "ruleId": f.rule,
             "ruleIndex": ids.index(f.rule),
@@ -199,10 +211,10 @@ def as_sarif(checks: Checks, _: Shown) -> str:
     messages = [
         {
             "level": "error",
-            "message": {"text": one.reason},
-            "locations": _places(_shown(one.deck, checks.root)),
+            "message": {"text": failed_deck.reason},
+            "locations": _places(_shown(failed_deck.deck, checks.root)),
         }
-        for one in checks.failed
+        for failed_deck in checks.failed
     ]
     run = {
         "tool": {"driver": {"name": "d2rpick", "version": __version__, "rules": rules}},
@@ -213,17 +225,17 @@ def as_sarif(checks: Checks, _: Shown) -> str:
                 "toolExecutionNotifications": messages,
             }
         ],
-        "results": found,
+        "results": results,
     }
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
-def _place(one: Finding) -> str:
-    return f"{one.file}:{one.line}:{one.column}"
+def _place(finding: Finding) -> str:
+    return f"{finding.file}:{finding.line}:{finding.column}"
 
 
-def _line(one: Finding) -> str:
-    return f"{_place(one)}: {one.severity} {one.rule} {one.message}"
+def _line(finding: Finding) -> str:
+    return f"{_place(finding)}: {finding.severity} {finding.rule} {finding.message}"
 
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
@@ -242,7 +254,7 @@ def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
 def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
     for result in checks.results:
         for window in result.windows:
-            place = window.place
+            location = window.place
             unit = window.unit
             yield {
                 "part": window.part,
@@ -250,23 +262,32 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
                 "node": unit.id if unit.is_body else None,
                 "tr": window.tr,
                 "td": window.td,
-                "file": _shown(place.file, checks.root),
-                "line": place.line,
+                "file": _shown(location.file, checks.root),
+                "line": location.line,
                 "deck": _shown(result.deck, checks.root),
             }
 
 
 def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
     """Return the findings in all decks, or in some ``results``, with displayed paths."""
-    for one in (one for result in results or checks.results for one in result.findings):
-        yield one._replace(
-            file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root)
+    for finding in (
+        finding for result in results or checks.results for finding in result.findings
+    ):
+        yield finding._replace(
+            file=_shown(finding.file, checks.root),
+            deck=_shown(finding.deck, checks.root),
         )
 
 
 def _warnings(checks: Checks) -> list[Caution]:
     """Return all warnings, including one for each deck that could not be read."""
-    return [*checks.cautions, *(Caution(one.code, one.reason) for one in checks.failed)]
+    return [
+        *checks.cautions,
+        *(
+            Caution(failed_deck.code, failed_deck.reason)
+            for failed_deck in checks.failed
+        ),
+    ]
 
 
 DOCUMENT: Final = Document(
@@ -295,14 +316,14 @@ def _counts(results: Sequence[Checked]) -> dict[str, int]:
 def _last_line(checks: Checks) -> str:
     """Return the number of findings and decks, and what was not judged."""
     results = checks.results
-    found = [
+    counted = [
         f"{count} {name if count != 1 else name[:-1]}"
         for name, count in _counts(results).items()
     ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
     unjudged = checks.history is None and any(result.windows for result in results)
-    return f"{', '.join(found)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
+    return f"{', '.join(counted)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
 
 
 def _shown(path: str, root: str) -> str:
@@ -310,24 +331,24 @@ def _shown(path: str, root: str) -> str:
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
-    shown = (
+    displayed = (
         os.path.relpath(absolute, root)
         if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118
         else absolute
     )
-    return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
+    return os.fsencode(displayed).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _places(shown: str, **more: Any) -> list[dict[str, Any]]:
+def _places(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
     """Return a location in a file as SARIF defines it."""
     from urllib.parse import quote
 
-    uri = f"{'file://' * shown.startswith('/')}{quote(shown)}"
-    return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **more}}]
+    uri = f"{'file://' * displayed.startswith('/')}{quote(displayed)}"
+    return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **keywords}}]
 
 
-def _escaped(text: str, more: str = "") -> str:
-    for letter in "%\r\n" + more:
+def _escaped(text: str, separators: str = "") -> str:
+    for letter in "%\r\n" + separators:
         text = text.replace(letter, f"%{ord(letter):02X}")
     return make_printable(text)
 

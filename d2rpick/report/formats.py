@@ -49,7 +49,7 @@ class Shown(NamedTuple):
     width: int = WIDEST
 
 
-def write(result: str, form: str, answer: Any, shown: Shown) -> str:
+def write(result: str, form: str, answer: Any, display: Shown) -> str:
     """Write an answer in one of the forms of its result: by ``as_FORM`` of its module, JSON by its ``DOCUMENT``.
 
     Examples
@@ -57,13 +57,13 @@ def write(result: str, form: str, answer: Any, shown: Shown) -> str:
     >>> list(FORMATS["suggestion"])
     ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
-    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, shown)
+    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, display)
 
 
-def written_by(report: Any, form: str, answer: Any, shown: Shown) -> str:
+def written_by(report: Any, form: str, answer: Any, display: Shown) -> str:
     """Write an answer in a form that the module ``report`` provides."""
-    if own := getattr(report, f"as_{form}", None):
-        return str(own(answer, shown))
+    if write_form := getattr(report, f"as_{form}", None):
+        return str(write_form(answer, display))
     return str(
-        report.DOCUMENT.as_json(answer, shown.command, 2 if form == "json" else None)
+        report.DOCUMENT.as_json(answer, display.command, 2 if form == "json" else None)
     )

@@ -39,12 +39,12 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
         return "csv"
     path = PurePath(name.lower())
     by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
-    asked = _SUFFIXES.get(path.suffix[1:], by_name)
-    if asked not in formats:
+    form = _SUFFIXES.get(path.suffix[1:], by_name)
+    if form not in formats:
         raise FormatError(
             f"{make_printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}"
         )
-    return str(asked)
+    return str(form)
 
 
 def write_table(form: str, columns: Table) -> bytes:
@@ -151,7 +151,9 @@ def _box_matsum(record: Record) -> bytes:
         strict=True,
     )  # fmt: skip
     return matsum.write(
-        "rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns)
+        "rollover box",
+        record.time,
+        tuple(matsum.PartColumns(*part_columns) for part_columns in columns),
     )
 
 

@@ -282,21 +282,21 @@ def _once(files: Iterable[Read]) -> dict[str, Read]:
 
 
 FILES: Final = (
-    Field("source", "texts", get=lambda read: _once(read.files)),
+    Field("source", "texts", get=lambda answer: _once(answer.files)),
     Field(
         "sha256",
         "texts",
-        get=lambda read: [file.sha256() for file in _once(read.files).values()],
+        get=lambda answer: [file.sha256() for file in _once(answer.files).values()],
     ),
 )
 
 
 def _asked(answer: Any) -> Plan | Situation:
     """Return the plan or situation of an answer, which holds the history and the settings."""
-    known: Plan | Situation = (
+    holder: Plan | Situation = (
         answer if hasattr(answer, "settings") else answer.situation
     )
-    return known
+    return holder
 
 
 def _weights(answer: Any) -> Weights | None:

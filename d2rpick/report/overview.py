@@ -24,12 +24,12 @@ _EVIDENCE: Final = one_of(
     "energy",
 )
 _FLIGHT: Final = row(
-    Field("start", "number", get=lambda seen: seen[1].start),
+    Field("start", "number", get=lambda flight: flight[1].start),
     Field("end", "number?", "null where the record ends in flight",
-          lambda seen: seen[1].end if seen[1].end_seen else None),
+          lambda flight: flight[1].end if flight[1].end_seen else None),
     Field("parts", maybe(many(keys.PART)), "that fly together, null for the whole model",
-          lambda seen: seen[1].parts or None),
-    Field("source", _EVIDENCE, get=lambda seen: seen[0]),
+          lambda flight: flight[1].parts or None),
+    Field("source", _EVIDENCE, get=lambda flight: flight[0]),
 )  # fmt: skip
 _TIMES: Final = row(
     Field("start", "number", get=lambda times: times[0]),
@@ -44,7 +44,7 @@ _FORCE: Final = row(
     Field("acts", many(_TIMES), "times in which it acts, to one output interval"),
 )
 _PART: Final = row(
-    *keys.PART.of_part(lambda one: one.part),
+    *keys.PART.of_part(lambda overview_part: overview_part.part),
     Field("energy_max", "number?", "null where not written in every state"),
 )
 _SAMPLING: Final = row(
@@ -92,15 +92,17 @@ _PLAIN = (
 )
 
 
-def as_table(overview: Overview, shown: Shown) -> str:
+def as_table(overview: Overview, display: Shown) -> str:
     """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.in_line(verdict(overview))
     if overview.health and (health := _health(overview)):
-        lines += ["", tables.as_text(head(overview.health), health, shown.width)]
-    known = [(name, value) for name, value in facts(overview) if value is not None]
-    lines += ["", *tables.in_line(known)]
+        lines += ["", tables.as_text(head(overview.health), health, display.width)]
+    known_facts = [
+        (name, value) for name, value in facts(overview) if value is not None
+    ]
+    lines += ["", *tables.in_line(known_facts)]
     if overview.parts:
-        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), display.width)]
     return "\n".join(
         [*lines, *(f"note: {make_printable(note)}" for note in overview.notes)]
     )
@@ -124,9 +126,11 @@ def verdict(overview: Overview) -> list[tuple[str, str]]:
 
 def as_markdown(overview: Overview, _: Shown) -> str:
     """Return the facts and the parts as Markdown tables, with the notes below."""
-    said = tables.listed(verdict(overview))
-    known = [(name, value) for name, value in facts(overview) if value is not None]
-    told = tables.as_markdown(("what", "value"), known)
+    verdict_lines = tables.listed(verdict(overview))
+    known_facts = [
+        (name, value) for name, value in facts(overview) if value is not None
+    ]
+    fact_table = tables.as_markdown(("what", "value"), known_facts)
     if overview.parts:
         parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))]
     else:
@@ -138,8 +142,8 @@ def as_markdown(overview: Overview, _: Shown) -> str:
         health = []
     return "\n\n".join(
         [
-            *said,
-            told,
+            *verdict_lines,
+            fact_table,
             *parts,
             *health,
             *(f"* {tables.in_markdown(note)}" for note in overview.notes),
@@ -159,11 +163,14 @@ def as_csv(overview: Overview, _: Shown) -> str:
         },
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(
-            f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts
+            f"{overview_part.part.id} {overview_part.part.title}".rstrip()
+            for overview_part in overview.parts
         ),
         "flights": "; ".join(_flight(*flight) for flight in overview.flights),
         "should_write": overview.should_write,
-        "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
+        "health": "; ".join(
+            f"{measure_name} {value}" for measure_name, value, *_ in _health(overview)
+        ),
         "notes": "; ".join(overview.notes),
         "verdict": overview.verdict,
         "verdict_reason": overview.reason,
@@ -202,14 +209,22 @@ def _health(overview: Overview) -> list[list[tables.Cell]]:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}
     return [
-        [one.what, one.value, one.limit, verdicts[one.good]]
-        for one in measures_of(overview.health)
-        if one.value
+        [
+            health_measure.what,
+            health_measure.value,
+            health_measure.limit,
+            verdicts[health_measure.good],
+        ]
+        for health_measure in measures_of(overview.health)
+        if health_measure.value
     ]
 
 
 def _parts(overview: Overview) -> list[list[tables.Cell]]:
-    return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
+    return [
+        [overview_part.part.id, overview_part.part.title, overview_part.energy_max]
+        for overview_part in overview.parts
+    ]
 
 
 def _force(force: ForceOverview) -> str:
@@ -221,9 +236,9 @@ def _force(force: ForceOverview) -> str:
 
 def _flight(source: str, flight: FreeFlight) -> str:
     names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
-    who = ", ".join(names) or "the whole model"
+    flying = ", ".join(names) or "the whole model"
     if flight.end_seen:
         end = f"to {flight.end:.6g}"
     else:
         end = f"to the end of the record, {flight.end:.6g}"
-    return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"
+    return f"{flying} from {flight.start:.6g} {end} ({spoken(source)})"

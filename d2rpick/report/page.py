@@ -68,14 +68,14 @@ def tag(name: str, /, *children: str, **attributes: str) -> Markup:
     >>> tag("meta", charset="utf-8")
     '<meta charset="utf-8">'
     """
-    given = "".join(
+    written_attributes = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_escape(text)}"'
         for key, text in attributes.items()
     )
     return Markup(
-        f"<{name}{given}>"
+        f"<{name}{written_attributes}>"
         if name in _VOID
-        else f"<{name}{given}>{join(children)}</{name}>"
+        else f"<{name}{written_attributes}>{join(children)}</{name}>"
     )
 
 
@@ -203,20 +203,23 @@ def grid(
     Columns of numbers are aligned right.  Lines break only at blanks, never within a number.
     """
     body = [list(row) for row in rows]
-    right = [
+    is_number = [
         name == "±"
         or all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
         for i, name in enumerate(head)
     ]
-    classes = [{"class_": "number"} if one else {} for one in right]
+    classes = [{"class_": "number"} if is_right else {} for is_right in is_number]
     top = (
-        tag("th", name, scope="col", **own)
-        for name, own in zip(head, classes, strict=True)
+        tag("th", name, scope="col", **cell_class)
+        for name, cell_class in zip(head, classes, strict=True)
     )
     lines = [
         tag(
             "tr",
-            *(_cell(cell, own) for cell, own in zip(row, classes, strict=True)),
+            *(
+                _cell(cell, cell_class)
+                for cell, cell_class in zip(row, classes, strict=True)
+            ),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
@@ -224,9 +227,11 @@ def grid(
     return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
 
 
-def _cell(cell: Cell, own: Mapping[str, str]) -> Markup:
+def _cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
     text = cell if isinstance(cell, Markup) else short(cell)
-    return tag("td", text, **(own or ({"class_": "words"} if " " in text else {})))
+    return tag(
+        "td", text, **(attributes or ({"class_": "words"} if " " in text else {}))
+    )
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
@@ -289,11 +294,15 @@ def title_of(run: Run) -> str:
 
 
 def pair(
-    title: str, times: tuple[float, float], told: Markup, history: History, class_: str
+    title: str,
+    times: tuple[float, float],
+    description: Markup,
+    history: History,
+    class_: str,
 ) -> Markup:
     """Return the card of (tr, td): the times large, a description of the pair, and the times with all digits."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    shown = (
+    large_times = (
         tag("span", tag("i", name), f"{short(time)}{unit}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
@@ -305,8 +314,8 @@ def pair(
     return tag(
         "div",
         tag("h2", title),
-        tag("div", *shown, class_="times"),
-        told,
+        tag("div", *large_times, class_="times"),
+        description,
         exact,
         class_=class_,
     )
@@ -338,14 +347,16 @@ def deck_digests(
 ) -> list[tuple[str, str]]:
     """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
     files = list({file.name: file for file in deck}.values())
-    more = len(files) - _MOST_FILES
-    if more > 0:
-        left = [("SHA-256", f"of {more} more files of the deck: in the JSON result")]
+    hidden_count = len(files) - _MOST_FILES
+    if hidden_count > 0:
+        hidden = [
+            ("SHA-256", f"of {hidden_count} more files of the deck: in the JSON result")
+        ]
     else:
-        left = []
+        hidden = []
     return [
         *digests(files[:_MOST_FILES]),
-        *left,
+        *hidden,
         *digests([weights.file] if weights and weights.file else []),
     ]
 
@@ -363,12 +374,12 @@ def parts(candidate: Candidate | None) -> Markup:
     sign = {True: "same", False: "opposite", None: "unknown"}
     listed = [
         (
-            one.name,
-            sign[one.sign_match],
-            "-" if one.share is None else f"{one.share:.0%}",
-            one.reason or "",
+            part.name,
+            sign[part.sign_match],
+            "-" if part.share is None else f"{part.share:.0%}",
+            part.reason or "",
         )
-        for one in candidate.parts
+        for part in candidate.parts
     ]
     title = "Parts at this pair"
     return section(
@@ -398,9 +409,9 @@ def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
 
 def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
     """Return the arguments that repeat an answer as a command line to paste."""
-    said = [tag("p", "with the same history on standard input:")] if stdin else []
+    stdin_note = [tag("p", "with the same history on standard input:")] if stdin else []
     return section(
-        "To repeat this", *said, tag("pre", shell_line(command), class_="wrap")
+        "To repeat this", *stdin_note, tag("pre", shell_line(command), class_="wrap")
     )
 
 
@@ -445,7 +456,9 @@ def _read(situation: Situation, run: Run) -> Markup:
 
 
 def _health(health: Health | None) -> Iterator[Markup]:
-    if health is None or not any(one.value for one in measures_of(health)):
+    if health is None or not any(
+        health_measure.value for health_measure in measures_of(health)
+    ):
         yield tag("p", "The files do not hold the energies this needs.")
         return
     verdicts = {
@@ -454,8 +467,13 @@ def _health(health: Health | None) -> Iterator[Markup]:
         None: "-",
     }
     listed = [
-        (one.what, one.value or "not written", one.limit, verdicts[one.good])
-        for one in measures_of(health)
+        (
+            health_measure.what,
+            health_measure.value or "not written",
+            health_measure.limit,
+            verdicts[health_measure.good],
+        )
+        for health_measure in measures_of(health)
     ]
     yield table(
         "Health of the reference run",

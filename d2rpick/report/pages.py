@@ -68,22 +68,24 @@ def _of_run(record: page.PageContext, *sections: Markup) -> str:
     )
 
 
-def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
+def _figures(
+    prefix: str, caption: str, kind: str, *arguments: Any, **how: Any
+) -> Markup:
     """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
-    drawn = getattr(figures_choice, f"draw_{kind}")(*asked, **how)
+    drawn = getattr(figures_choice, f"draw_{kind}")(*arguments, **how)
     return page.drawing(caption, figures.svg_element(drawn, prefix))
 
 
 def _draw_suggestion(answer: Suggestion) -> Markup:
     if answer.clearly_better:
-        shown = "the choice, and a better pair"
+        choice_text = "the choice, and a better pair"
     else:
-        shown = "and the choice"
+        choice_text = "and the choice"
     return _figures(
         "choice-",
-        f"Internal energy with its level at td, {shown}",
+        f"Internal energy with its level at td, {choice_text}",
         "suggestion",
         answer,
         page=True,
@@ -98,8 +100,12 @@ def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) ->
 
 def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
-    shown = (_choice(answer), explorer(record.explorer), _draw_suggestion(answer))
-    return _of_run(record, *shown, *_below_figures(answer, record))
+    first_sections = (
+        _choice(answer),
+        explorer(record.explorer),
+        _draw_suggestion(answer),
+    )
+    return _of_run(record, *first_sections, *_below_figures(answer, record))
 
 
 def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
@@ -115,11 +121,15 @@ def _choice(answer: Suggestion) -> Markup:
     cards = [_recommended(answer)]
     better = answer.clearly_better
     if better:
-        told = tag("p", suggestion.better_about(answer, better))
+        better_text = tag("p", suggestion.better_about(answer, better))
         times = (better.tr, better.td)
         cards.append(
             page.pair(
-                "Better pair: another td", times, told, answer.situation.history, "card"
+                "Better pair: another td",
+                times,
+                better_text,
+                answer.situation.history,
+                "card",
             )
         )
     return page.front(
@@ -143,8 +153,10 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
         yield tag("p", "None.")
         return
     yield _starred("Candidates", *known(*suggestion.table(answer, _MOST_ROWS)))
-    if (left := len(answer.candidates) - _MOST_ROWS) > 0:
-        yield tag("p", f"{left} more in the csv and json results.", class_="soft")
+    if (hidden_count := len(answer.candidates) - _MOST_ROWS) > 0:
+        yield tag(
+            "p", f"{hidden_count} more in the csv and json results.", class_="soft"
+        )
 
 
 def verdict_page(answer: Verdict, record: page.PageContext) -> str:
@@ -159,8 +171,10 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     card = page.decided(
         "", answer.decision, times, situation.history, verdict.facts(answer)
     )
-    remarked = [one for one in answer.reasons if one not in answer.decision.reason]
-    yield page.front([card], remarks(answer.cautions, remarked))
+    further_reasons = [
+        reason for reason in answer.reasons if reason not in answer.decision.reason
+    ]
+    yield page.front([card], remarks(answer.cautions, further_reasons))
     yield explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
     yield _figures("pair-", caption, "verdict", answer, page=True)
@@ -176,50 +190,56 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
         yield page.solver_input(times, record)
 
 
-def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
+def _switched(comparison: Comparison, files: Iterable[Source]) -> Markup:
     """Return the comparison of the finished switched run with the reference."""
     title = "The switched run"
     listed = [
-        ("compared", f"from td to {found.end:.6g}"),
-        *verdict.deviations(found),
+        ("compared", f"from td to {comparison.end:.6g}"),
+        *verdict.deviations(comparison),
         *page.digests(files),
     ]
-    listed += [("note", note) for note in found.notes]
+    listed += [("note", note) for note in comparison.notes]
     return section(
         title,
-        table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)),
+        table(
+            title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(comparison)
+        ),
         pairs(listed),
     )
 
 
-def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
+def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
     """Write the page of ``explore``."""
-    further = [one for one in found.cautions if one not in found.suggestion.cautions]
+    further = [
+        caution
+        for caution in answer.cautions
+        if caution not in answer.suggestion.cautions
+    ]
     caption = "Error and rigid time of the best pair for each td"
-    best = trade_off.some_of(found, _MOST_ROWS)
-    left = tag(
+    best = trade_off.some_of(answer, _MOST_ROWS)
+    hidden = tag(
         "p",
-        f"{len(found.offers) - len(best)} more td in the csv and json results.",
+        f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
     return _of_run(
         record,
-        _choice(found.suggestion),
-        tag("section", tag("p", trade_off.answer(found)), remarks(further)),
+        _choice(answer.suggestion),
+        tag("section", tag("p", trade_off.answer(answer)), remarks(further)),
         explorer(record.explorer),
-        _draw_suggestion(found.suggestion),
-        _figures("explore-", caption, "trade_off", found, page=True),
+        _draw_suggestion(answer.suggestion),
+        _figures("explore-", caption, "trade_off", answer, page=True),
         section(
             "Pairs that nothing beats",
             _starred("Pairs", *known(*trade_off.table(best))),
-            left,
+            hidden,
         ),
-        *_below_figures(found.suggestion, record),
+        *_below_figures(answer.suggestion, record),
     )
 
 
 def plan_page(
-    found: Plan,
+    answer: Plan,
     run: Run,
     command: Sequence[str],
     card: str | None,
@@ -239,49 +259,49 @@ def plan_page(
     explored : Explorer, optional
         The flights of the plan.
     """
-    cards = [_window(row, found) for row in found.supported]
+    cards = [_window(row, answer) for row in answer.supported]
     cards = cards or [page.refused("No window of this run can be recommended.")]
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    files = [*page.digests(run.files), *page.digests_of(found.settings)]
-    notes = [("note", note) for note in found.history.notes]
+    files = [*page.digests(run.files), *page.digests_of(answer.settings)]
+    notes = [("note", note) for note in answer.history.notes]
     return _of_run(
         page.PageContext(run, command, (), explorer=explored),
         page.front(
             cards,
-            remarks(found.cautions),
+            remarks(answer.cautions),
             pairs(
                 [
-                    ("plan", plan.sentence(found)),
-                    *plan.next_steps(found),
-                    *plan.outlook(found),
+                    ("plan", plan.sentence(answer)),
+                    *plan.next_steps(answer),
+                    *plan.outlook(answer),
                 ]
             ),
         ),
         explorer(explored),
-        _figures("plan-", caption, "plan", found, page=True),
+        _figures("plan-", caption, "plan", answer, page=True),
         section(
             "Flights",
-            table("Flights", *unstarred(*plan.table(found))),
-            pairs([*plan.verdicts(found), *plan.reasons(found)]),
+            table("Flights", *unstarred(*plan.table(answer))),
+            pairs([*plan.verdicts(answer), *plan.reasons(answer)]),
         ),
         section("For the solver's input", tag("pre", card, tabindex="0"))
         if card
         else Markup(),
         section(
             "What was read",
-            pairs([("history", what_was_read(found.history)), *files, *notes]),
+            pairs([("history", what_was_read(answer.history)), *files, *notes]),
         ),
         *page.method(command),
     )
 
 
-def _window(row: Planned, found: Plan) -> Markup:
+def _window(row: Planned, answer: Plan) -> Markup:
     assert row.window is not None
     assert row.candidate is not None
     assert row.decision is not None
     facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
     title = f"Flight {row.number}: "
-    return page.decided(title, row.decision, row.window, found.history, facts)
+    return page.decided(title, row.decision, row.window, answer.history, facts)
 
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
@@ -322,11 +342,11 @@ def _common(answer: Study) -> Markup:
         "" if answer.td is None else f", td = {answer.td!r}"
     )
     verdict = VERDICTS[answer.grade or POOR]
-    (_, said), *_ = study.outcome(answer)
+    (_, outcome), *_ = study.outcome(answer)
     kind = page.CLASSES[verdict]
     lines = (
         tag("div", *times, class_="times"),
-        tag("p", said),
+        tag("p", outcome),
         tag("p", exact, class_="soft"),
     )
     badge = tag(
@@ -346,34 +366,34 @@ def _files(answer: Study) -> str:
     )
 
 
-def parts_page(found: Parts, command: Sequence[str]) -> str:
+def parts_page(answer: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    if found.sets:
-        sets = [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
+    if answer.sets:
+        sets = [section("Sets", _starred("Sets", *parts.set_table(answer, parts.SETS)))]
     else:
         sets = []
     tables = {
-        name: unstarred(*parts.table(found, columns))
+        name: unstarred(*parts.table(answer, columns))
         for name, columns in parts.TABLES.items()
     }
-    weights = [("weights", found.weights.source)] if found.weights else []
-    if found.inventory:
-        deck = page.deck_digests(found.inventory.files, found.weights)
+    weights = [("weights", answer.weights.source)] if answer.weights else []
+    if answer.inventory:
+        deck = page.deck_digests(answer.inventory.files, answer.weights)
     else:
         deck = []
     return document(
-        f"Parts to switch: {page.title_of(found.files)}",
-        page.front([_set(found.recommended)], remarks(found.cautions)),
+        f"Parts to switch: {page.title_of(answer.files)}",
+        page.front([_set(answer.recommended)], remarks(answer.cautions)),
         *sets,
         *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What to know", pairs(parts.outlook(found))),
+        section("What to know", pairs(parts.outlook(answer))),
         section(
             "What was read",
             pairs(
                 [
-                    *parts.heading(found),
+                    *parts.heading(answer),
                     *weights,
-                    *page.digests(found.files.files),
+                    *page.digests(answer.files.files),
                     *deck,
                 ]
             ),
@@ -402,39 +422,39 @@ def _set(best: PartSet | None) -> Markup:
     )
 
 
-def drive_page(found: Driven, command: Sequence[str]) -> str:
+def drive_page(answer: Driven, command: Sequence[str]) -> str:
     """Write the page of ``drive``; ``command`` are the arguments that repeat the run."""
     from d2rpick.histories.names import Selection
 
-    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
-    switched = [one for one in found.windows if not one.reason]
+    history = answer.run.history(Selection(parts=tuple(map(str, answer.deck.parts))))
+    switched = [window for window in answer.windows if not window.reason]
     contacts = (
-        "none to the end" if one.contact is None else f"{one.contact:.6g}"
-        for one in switched
+        "none to the end" if window.contact is None else f"{window.contact:.6g}"
+        for window in switched
     )
     cards = [
         page.pair(
             f"Window {number}",
-            (one.tr, one.td),
+            (window.tr, window.td),
             pairs([("contact", text)]),
             history,
             "card chosen",
         )
-        for number, (one, text) in enumerate(
+        for number, (window, text) in enumerate(
             zip(switched, contacts, strict=True), start=1
         )
     ]
     cards = cards or [tag("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights = [(one.free, one.contact or one.td) for one in switched]
-    rigid = [(one.tr, one.td) for one in switched]
+    flights = [(window.free, window.contact or window.td) for window in switched]
+    rigid = [(window.tr, window.td) for window in switched]
     return document(
-        f"First run: {found.deck.name}",
-        page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
+        f"First run: {answer.deck.name}",
+        page.front(cards, remarks(answer.cautions), pairs(drive.outlook(answer))),
         _figures("driven-", caption, "run", history, flights, rigid),
-        section("Evidence", table("Windows", *drive.windows(found))),
-        section("Cost", table("Legs", *drive.legs(found))),
-        section("What was read", pairs(page.digests(found.run.files))),
+        section("Evidence", table("Windows", *drive.windows(answer))),
+        section("Cost", table("Legs", *drive.legs(answer))),
+        section("What was read", pairs(page.digests(answer.run.files))),
         page.repeated(command),
         signed=page.CHECKED,
     )
@@ -446,21 +466,27 @@ _LOOKS: Final[
 ] = {
     "overview": (
         overview.verdict,
-        lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
+        lambda answer: (("", ""), _told(overview.facts(answer)[1:])),
     ),
-    "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
+    "suggestion": (
+        suggestion.verdict,
+        lambda answer: suggestion.table(answer, _FEW_ROWS),
+    ),
     "verdict": (
         verdict.verdict,
-        lambda one: (("measure", "value"), verdict.measured(one)),
+        lambda answer: (("measure", "value"), verdict.measured(answer)),
     ),
     "trade_off": (
-        lambda one: [("", trade_off.answer(one))],
-        lambda one: trade_off.table(trade_off.some_of(one, _FEW_ROWS)),
+        lambda answer: [("", trade_off.answer(answer))],
+        lambda answer: trade_off.table(trade_off.some_of(answer, _FEW_ROWS)),
     ),
-    "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
+    "plan": (
+        lambda answer: [("", plan.sentence(answer)), *plan.outlook(answer)],
+        plan.table,
+    ),
     "parts": (
         parts.verdict_on_set,
-        lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
+        lambda answer: parts.table(answer, next(iter(parts.TABLES.values()))),
     ),
     "study": (study.outcome, study.table),
 }
@@ -475,20 +501,22 @@ def of_run(run: Run) -> str:
     """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
-    told = [" + ".join(one.format for one in run.databases)]
+    facts = [" + ".join(database.format for database in run.databases)]
     if time is not None and time.size:
-        told += [
+        facts += [
             f"{time.size} states",
             f"{time[0]:.6g} to {time[-1]:.6g} {first.time_unit}".rstrip(),
         ]
-    told += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
-    return f"{', '.join(map(repr, run.sources))}: {', '.join(told)}"
+    facts += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
+    return f"{', '.join(map(repr, run.sources))}: {', '.join(facts)}"
 
 
 def glance(kind: str, answer: Any, figure: Figure | None) -> str:
     """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
-    said, table = _LOOKS[kind]
-    lines = [tag("div", tag("b", name), f" {text}") for name, text in said(answer)]
+    give_sentences, table = _LOOKS[kind]
+    lines = [
+        tag("div", tag("b", name), f" {text}") for name, text in give_sentences(answer)
+    ]
     head, rows = table(answer)
     lines += [grid(*known(head, rows[:_FEW_ROWS]))] if rows else []
     lines += (

@@ -65,19 +65,22 @@ TABLES = {
 _COUNTS: Final = maybe(each("integer"))
 _IN_FLIGHT: Final = row(
     Field(
-        "energy", "number?", "mean internal energy in the flight", lambda one: one.mean
+        "energy",
+        "number?",
+        "mean internal energy in the flight",
+        lambda part_set: part_set.mean,
     ),
     Field(
         "energy_change",
         "number?",
         "at its end less at its start",
-        lambda one: one.change,
+        lambda part_set: part_set.change,
     ),
     Field(
         "energy_scatter",
         "number?",
         "standard deviation over mean",
-        lambda one: one.scatter,
+        lambda part_set: part_set.scatter,
     ),
     Field("flies", "flag?", "whether the part flies with the rest"),
     Field(
@@ -156,9 +159,9 @@ _SET_NAMES: Final = {
 }
 
 
-def _free(one: PartSet) -> bool | None:
+def _free(part_set: PartSet) -> bool | None:
     """Return True if no deformable part limits the time step."""
-    return None if one.step_growth is None else isinf(one.step_growth)
+    return None if part_set.step_growth is None else isinf(part_set.step_growth)
 
 
 SET: Final = row(
@@ -166,25 +169,26 @@ SET: Final = row(
     Field("recommended", "flag"),
     Field("parts", many("integer")),
     Field("bodies", maybe(many(many("integer"))), "the rigid bodies that its parts make; null without a deck",
-          lambda one: one.bodies or None),
+          lambda part_set: part_set.bodies or None),
     Field("elements", "integer?", "elements that are rigid with it"),
     Field("element_fraction", "number?"),
     Field("mass_fraction", "number?"),
     Field("cost_share", "number?", "share of a step that is saved while it is rigid"),
     Field("step_growth", "number?", "how much the step may at least grow while it is rigid",
-          lambda one: None if _free(one) else one.step_growth),
+          lambda part_set: None if _free(part_set) else part_set.step_growth),
     Field("step_free", "flag?", "whether nothing deformable keeps the step", _free),
-    Field("tr", "number?", get=lambda one: one.window and one.window[0]),
-    Field("td", "number?", get=lambda one: one.window and one.window[1]),
+    Field("tr", "number?", get=lambda part_set: part_set.window and part_set.window[0]),
+    Field("td", "number?", get=lambda part_set: part_set.window and part_set.window[1]),
     Field("rigid_fraction", "number?"),
     Field("run_time_share", "number?"),
     Field("saving", "number?"),
     keys.CANDIDATE.field("position_error")._replace(kind="number?"),
     Field("position_limit", "number?"),
-    Field("position_part", maybe(many(keys.PART)), get=lambda one: one.position_part and (one.position_part,)),
+    Field("position_part", maybe(many(keys.PART)),
+          get=lambda part_set: part_set.position_part and (part_set.position_part,)),
     Field("position_body", maybe(many("integer")),
           "parts of the rigid body that is off, where there are several; else null",
-          lambda one: one.position_body or None),
+          lambda part_set: part_set.position_body or None),
     keys.CANDIDATE.field("position_error_assumes")._replace(key="position_assumes"),
     Field("angle_error", "number?",
           "by how much the body is turned at td from where it should be [degrees]; null where the parts do not tell"),
@@ -193,11 +197,11 @@ SET: Final = row(
 )  # fmt: skip
 
 
-def _flights(found: Parts) -> list[dict[str, Any]]:
-    facts = found.facts
+def _flights(answer: Parts) -> list[dict[str, Any]]:
+    facts = answer.facts
     return [
-        {"start": one[0], "end": one[1], "longest": at == facts.longest}
-        for at, one in enumerate(facts.flights)
+        {"start": span[0], "end": span[1], "longest": at == facts.longest}
+        for at, span in enumerate(facts.flights)
     ]
 
 
@@ -206,15 +210,15 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick parts; times, masses and energies in the units of the history.",
     row(
         keys.WARNINGS,
-        Field("history", _HISTORY, get=lambda found: found.files),
-        Field("deck", maybe(_DECK), get=lambda found: found.inventory),
+        Field("history", _HISTORY, get=lambda answer: answer.files),
+        Field("deck", maybe(_DECK), get=lambda answer: answer.inventory),
         Field("weights", maybe(_WEIGHTS)),
-        Field("step_ratio", "number", get=lambda found: found.settings.step_ratio),
+        Field("step_ratio", "number", get=lambda answer: answer.settings.step_ratio),
         Field("flights", many(_FLIGHT), get=_flights),
         Field(
             "parts",
             many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))),
-            get=lambda found: found.rows,
+            get=lambda answer: answer.rows,
         ),
         Field("sets", many(SET)),
         Field(
@@ -226,42 +230,42 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(found: Parts, shown: Shown) -> str:
+def as_table(answer: Parts, display: Shown) -> str:
     """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
-    lines = tables.in_line(verdict_on_set(found))
-    if found.sets:
-        lines += ["", tables.as_text(*set_table(found, SETS), shown.width, _SPARE)]
+    lines = tables.in_line(verdict_on_set(answer))
+    if answer.sets:
+        lines += ["", tables.as_text(*set_table(answer, SETS), display.width, _SPARE)]
     for names in TABLES.values():
-        head, body = tables.known(*table(found, names))
+        head, body = tables.known(*table(answer, names))
         if body and {*head} - {"", "part", "title"}:
-            lines += ["", tables.as_text(head, body, shown.width, _SPARE)]
-    below = [*outlook(found), *heading(found)]
+            lines += ["", tables.as_text(head, body, display.width, _SPARE)]
+    below = [*outlook(answer), *heading(answer)]
     return "\n".join([*lines, "", *tables.in_line(below)])
 
 
-def as_markdown(found: Parts, _: Shown) -> str:
+def as_markdown(answer: Parts, _: Shown) -> str:
     """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
-    sets = [tables.as_markdown(*set_table(found))] if found.sets else []
-    above = tables.listed(verdict_on_set(found))
-    below = tables.listed(outlook(found))
-    return "\n\n".join([*above, *sets, tables.as_markdown(*table(found)), *below])
+    sets = [tables.as_markdown(*set_table(answer))] if answer.sets else []
+    above = tables.listed(verdict_on_set(answer))
+    below = tables.listed(outlook(answer))
+    return "\n\n".join([*above, *sets, tables.as_markdown(*table(answer)), *below])
 
 
-def as_csv(found: Parts, _: Shown) -> str:
+def as_csv(answer: Parts, _: Shown) -> str:
     """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
-    return csv_of(PART.keys, map(PART.plain, found.rows), ";")
+    return csv_of(PART.keys, map(PART.plain, answer.rows), ";")
 
 
-def as_value(found: Parts, _: Shown) -> str:
+def as_value(answer: Parts, _: Shown) -> str:
     """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
-    return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
+    return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
-def heading(found: Parts) -> list[tuple[str, str]]:
+def heading(answer: Parts) -> list[tuple[str, str]]:
     """Return what was read, as pairs of a name and a description."""
-    run = found.files
-    deck = found.inventory
-    formats = " + ".join(one.format for one in run.databases)
+    run = answer.files
+    deck = answer.inventory
+    formats = " + ".join(database.format for database in run.databases)
     lines = [
         (
             "history",
@@ -278,48 +282,49 @@ def heading(found: Parts) -> list[tuple[str, str]]:
                 f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}",
             )
         )
-    longest = found.facts.longest
+    longest = answer.facts.longest
     if longest is not None:
-        start, end = found.facts.flights[longest]
+        start, end = answer.facts.flights[longest]
         lines.append(
             (
                 "flight",
-                f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}",
+                f"{start:.6g} to {end:.6g}, the longest of {len(answer.facts.flights)}",
             )
         )
     return [(name, make_printable(text)) for name, text in lines]
 
 
 def table(
-    found: Parts, names: Iterable[str] = ()
+    answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the names and cells of all or some columns of the parts, with a star for parts of the recommended set."""
-    best = set(found.recommended.parts) if found.recommended else set()
+    best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.filled(
-        {"": lambda row: "*" if row.id in best else " ", **columns}, found.rows
+        {"": lambda row: "*" if row.id in best else " ", **columns}, answer.rows
     )
 
 
 def set_table(
-    found: Parts, names: Iterable[str] = ()
+    answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the names and cells of all or some columns of the sets, with a star for the recommended set."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
     return tables.filled(
-        {"": lambda one: "*" if one.recommended else " ", **columns}, found.sets
+        {"": lambda part_set: "*" if part_set.recommended else " ", **columns},
+        answer.sets,
     )
 
 
-def _position(one: PartSet) -> str | None:
+def _position(part_set: PartSet) -> str | None:
     """Return the position error of a set, and the assumption behind it."""
-    found = _least(one, one.position_error)
-    return f"{found} if one body" if one.position_assumes else found
+    error = _least(part_set, part_set.position_error)
+    return f"{error} if one body" if part_set.position_assumes else error
 
 
-def _least(one: PartSet, value: float | None) -> str | None:
+def _least(part_set: PartSet, value: float | None) -> str | None:
     """Return an error, with a sign if it is only a lower limit."""
-    if one.position_is_lower_bound and value is not None:
+    if part_set.position_is_lower_bound and value is not None:
         return f">= {value:.3g}"
     return _short(value)
 
@@ -331,12 +336,12 @@ def verdict(row: PartRow) -> str:
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
-def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
+def verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
-    best = found.recommended
+    best = answer.recommended
     if best is None:
         why = next(
-            (one.reasons[0] for one in found.sets if one.reasons),
+            (part_set.reasons[0] for part_set in answer.sets if part_set.reasons),
             "no part can be switched",
         )
         return [
@@ -347,7 +352,7 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
         bodies = "one rigid body"
     else:
         bodies = f"{len(best.bodies)} rigid bodies"
-    flights = len(found.facts.flights)
+    flights = len(answer.facts.flights)
     if flights > 1:
         where = f", if rigid in the longest of {flights} flights only"
     else:
@@ -361,15 +366,15 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
     ]
 
 
-def set_name(one: PartSet) -> str:
+def set_name(part_set: PartSet) -> str:
     """Return the name of a set for people."""
-    return _SET_NAMES.get(one.name, one.name)
+    return _SET_NAMES.get(part_set.name, part_set.name)
 
 
-def outlook(found: Parts) -> list[tuple[str, str]]:
+def outlook(answer: Parts) -> list[tuple[str, str]]:
     """Return remarks on the recommended set, and why other sets are not compared, as pairs of a name and a sentence."""
     lines: list[tuple[str, str]] = []
-    best = found.recommended
+    best = answer.recommended
     if best and best.step_growth is not None and best.step_growth > 1:
         if isinf(best.step_growth):
             much = "without limit"
@@ -378,12 +383,16 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
         grows = f"may grow {much} while these parts are rigid"
         cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
         lines.append(("time step", f"{grows}: {cures}"))
-    lines += [(set_name(one), reason) for one in found.sets for reason in one.reasons]
+    lines += [
+        (set_name(part_set), reason)
+        for part_set in answer.sets
+        for reason in part_set.reasons
+    ]
     return lines
 
 
-def _number(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def _counted(row: PartRow) -> str | None:
@@ -436,17 +445,17 @@ COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
 }
 SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "set": set_name,
-    "parts": lambda one: ranges(one.parts),
-    "elements": lambda one: one.elements,
-    "mass": lambda one: _percent(one.mass_fraction),
-    "saves of a step": lambda one: _percent(one.cost_share),
-    "step grows": lambda one: (
-        "free" if _free(one) else tables.shown(one.step_growth, ".2g")
+    "parts": lambda part_set: ranges(part_set.parts),
+    "elements": lambda part_set: part_set.elements,
+    "mass": lambda part_set: _percent(part_set.mass_fraction),
+    "saves of a step": lambda part_set: _percent(part_set.cost_share),
+    "step grows": lambda part_set: (
+        "free" if _free(part_set) else tables.shown(part_set.step_growth, ".2g")
     ),
-    "tr": lambda one: one.window[0] if one.window else None,
-    "td": lambda one: one.window[1] if one.window else None,
-    "processor time": lambda one: _percent(one.run_time_share),
-    "saves": lambda one: _percent(one.saving),
+    "tr": lambda part_set: part_set.window[0] if part_set.window else None,
+    "td": lambda part_set: part_set.window[1] if part_set.window else None,
+    "processor time": lambda part_set: _percent(part_set.run_time_share),
+    "saves": lambda part_set: _percent(part_set.saving),
     "out of place": _position,
-    "turned [deg]": lambda one: _least(one, one.angle_error),
+    "turned [deg]": lambda part_set: _least(part_set, part_set.angle_error),
 }

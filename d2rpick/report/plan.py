@@ -107,18 +107,18 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 ))  # fmt: skip
 
 
-def as_table(plan: Plan, shown: Shown) -> str:
+def as_table(plan: Plan, display: Shown) -> str:
     """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
     if plan.flights:
-        rows = tables.as_text(*table(plan), shown.width, _SPARE)
+        rows = tables.as_text(*table(plan), display.width, _SPARE)
     else:
         rows = "no flight"
     below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
-    said = [(name, make_printable(text)) for name, text in below]
+    printable = [(name, make_printable(text)) for name, text in below]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
     steps = tables.in_line(next_steps(plan), 4)
     return "\n".join(
-        [sentence(plan), *steps, "", rows, "", *tables.in_line(said, 9), *above]
+        [sentence(plan), *steps, "", rows, "", *tables.in_line(printable, 9), *above]
     )
 
 
@@ -133,11 +133,11 @@ def sentence(plan: Plan) -> str:
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    found = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    text = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
-        found += f"; saves {saved(plan.run_time_share)}"
-    more = "1 more needs" if waiting == 1 else f"{waiting} more need"
-    return f"{found}; {more} a new run first" if waiting else found
+        text += f"; saves {saved(plan.run_time_share)}"
+    waiting_text = "1 more needs" if waiting == 1 else f"{waiting} more need"
+    return f"{text}; {waiting_text} a new run first" if waiting else text
 
 
 def _how_to_use(plan: Plan) -> str:
@@ -147,7 +147,7 @@ def _how_to_use(plan: Plan) -> str:
         number, decision = decisions[0]
         which = f"flight {number}: " if len(plan.flights) > 1 else ""
         return f"{which}{decision.verdict}"
-    careful = [str(number) for number, one in decisions if one.verdict != USE]
+    careful = [str(number) for number, decision in decisions if decision.verdict != USE]
     flights = f"flight{'s' * (len(careful) > 1)} {', '.join(careful)}"
     which = f" ({flights} with care)" if careful else ""
     open_ones = sum(row.status != "done" for row in plan.flights)
@@ -195,13 +195,13 @@ def as_csv(plan: Plan, _: Shown) -> str:
     return csv_of(WINDOW.keys, map(WINDOW.plain, plan.flights))
 
 
-def as_value(plan: Plan, shown: Shown) -> str:
+def as_value(plan: Plan, display: Shown) -> str:
     """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
     These are the windows that are done, and the supported new ones or, if asked for, all new ones.  Nothing is returned
     if there is no new window.
     """
-    new = plan.all_windows if shown.every else plan.windows
+    new = plan.all_windows if display.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
@@ -209,11 +209,11 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
     supported = plan.supported
     lines = []
-    found = [(row.number, row.answer) for row in supported if row.answer]
+    pairs = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
-        (f"flight {number}", given_up(one.longer, one.recommended))
-        for number, one in found
-        if one.longer and one.recommended
+        (f"flight {number}", given_up(pair.longer, pair.recommended))
+        for number, pair in pairs
+        if pair.longer and pair.recommended
     ]
     assumed = [
         row
@@ -221,12 +221,12 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
         if row.candidate and row.candidate.position_error_assumes
     ]
     if assumed:
-        told = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        deck_hint = "; `deck` tells which do" if plan.settings.bodies is None else ""
         listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
         lines.append(
             (
                 "place",
-                f"out of place at td if the parts become one rigid body: {listed}{told}",
+                f"out of place at td if the parts become one rigid body: {listed}{deck_hint}",
             )
         )
     return lines
@@ -256,10 +256,10 @@ def error(row: Planned) -> str | None:
     if best.kind == "start":
         return "nothing vibrates"
     if best.residual is None:
-        name, off = ("level error", best.level_error)
+        name, size = ("level error", best.level_error)
     else:
-        name, off = ("residual", best.residual)
-    return f"{name} {tables.measure(off)}"
+        name, size = ("residual", best.residual)
+    return f"{name} {tables.measure(size)}"
 
 
 def _place(row: Planned) -> str | None:
@@ -267,8 +267,8 @@ def _place(row: Planned) -> str | None:
     best = row.candidate
     if best is None or best.position_error is None:
         return None
-    least = ">= " if best.position_error_is_lower_bound else ""
-    return f"{least}{best.position_error:.2g}"
+    bound_sign = ">= " if best.position_error_is_lower_bound else ""
+    return f"{bound_sign}{best.position_error:.2g}"
 
 
 _COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {

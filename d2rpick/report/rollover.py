@@ -45,7 +45,7 @@ class Scan(NamedTuple):
     cautions: Sequence[Caution]
 
 
-def as_table(scan: Scan, shown: Shown) -> str:
+def as_table(scan: Scan, display: Shown) -> str:
     """Return what happened in the reference run, a row for each tr, and the error of the tr that d2rpick recommends."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
@@ -58,21 +58,27 @@ def as_table(scan: Scan, shown: Shown) -> str:
         ("td", f"{td:.6g} s: energy of the box {_energy(reference, td):.6g} J"),
         ("units", "s, J, m, rad/s; roll_error in degrees"),
     ]
-    rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
-    told = "none"
-    if chosen := next((one for one in outcomes if one.tr == recommended), None):
+    rows = [
+        ["*" if outcome.tr == recommended else "", *_short(outcome)]
+        for outcome in outcomes
+    ]
+    recommendation = "none"
+    if chosen := next(
+        (outcome for outcome in outcomes if outcome.tr == recommended), None
+    ):
         error = abs(chosen.roll_error)
-        worst = max(abs(one.roll_error) for one in outcomes)
-        told = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {error / worst:.2g} of the largest"
-    shown_rows = tables.as_text(("", *RUN.keys), rows, shown.width)
+        largest_error = max(abs(outcome.roll_error) for outcome in outcomes)
+        share = error / largest_error
+        recommendation = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {share:.2g} of the largest"
+    shown_rows = tables.as_text(("", *RUN.keys), rows, display.width)
     return "\n".join(
-        [*tables.in_line(above), "", shown_rows, "", f"recommended  {told}"]
+        [*tables.in_line(above), "", shown_rows, "", f"recommended  {recommendation}"]
     )
 
 
 def as_markdown(scan: Scan, _: Shown) -> str:
     """Return a Markdown table with one row for each tr."""
-    return tables.as_markdown(RUN.keys, [_short(one) for one in scan.outcomes])
+    return tables.as_markdown(RUN.keys, [_short(outcome) for outcome in scan.outcomes])
 
 
 def as_csv(scan: Scan, _: Shown) -> str:
@@ -84,9 +90,9 @@ def _recommended(answer: Suggestion) -> float | None:
     return answer.recommended.tr if answer.recommended else None
 
 
-def _short(one: Outcome) -> list[tables.Cell]:
+def _short(outcome: Outcome) -> list[tables.Cell]:
     """Return the cells of a run with four digits: runs already differ in the second."""
-    return [float(f"{value:.4g}") for value in RUN.plain(one).values()]
+    return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 
 def _time(time: float | None) -> str:

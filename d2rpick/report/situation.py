@@ -23,9 +23,11 @@ _NAMED = 5
 def what_was_read(history: History) -> str:
     """Return files, format, energy and time span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    what = f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
+    description = (
+        f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
+    )
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
-    return make_printable(f"{what}, {history.time.size} states, {span}")
+    return make_printable(f"{description}, {history.time.size} states, {span}")
 
 
 def energy_name(history: History) -> str:
@@ -41,13 +43,13 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
-    known = "" if share is None else f", kinetic share {measure(share)}"
+    kinetic = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", what_was_read(situation.history)),
         (
             "td",
-            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
+            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{kinetic}{estimate}",
         ),
         ("basis", f"{_basis(situation)}{f': {why}' if why else ''}"),
     ]
@@ -58,9 +60,12 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
         parts = [
             part.name if part.title else str(part.id) for part in flight.parts or ()
         ]
-        who = f" of {list_names(parts, most=_NAMED)}" if parts else ""
+        names = f" of {list_names(parts, most=_NAMED)}" if parts else ""
         lines.append(
-            ("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
+            (
+                "flight",
+                f"from {flight.start:.6g} ({spoken(flight.source)}{names}), {end}",
+            )
         )
     return [(name, make_printable(text)) for name, text in lines]
 
@@ -75,13 +80,13 @@ def _basis(situation: Situation) -> str:
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
-    told = vibration.told
+    summary = vibration.told
     if not (mode and fit):
         if vibration.signed:
             kinetic = "; kinetic energy from the modes of each part"
         else:
             kinetic = ""
-        return f"{told}{kinetic}" if told else _level_alone(situation)
+        return f"{summary}{kinetic}" if summary else _level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
@@ -91,7 +96,7 @@ def _basis(situation: Situation) -> str:
         else f"misfit {fit.misfit:.1e}"
     )
     source = "given" if situation.settings.oscillator else "identified"
-    front = f"{told}; " if told else ""
+    front = f"{summary}; " if summary else ""
     return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
 
 
@@ -129,7 +134,7 @@ def measures_of(health: Health) -> list[Measure]:
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)
     part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
-    found = [
+    measures = [
         _share("hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS),
         _share(part, health.part_hourglass_share, limits.MOST_HOURGLASS),
         Measure(
@@ -147,7 +152,7 @@ def measures_of(health: Health) -> list[Measure]:
         _share("energy of deleted elements", health.eroded_share, MOST_WORK),
     ]
     if health.window:
-        found += [
+        measures += [
             _share(
                 "change of contact energy in the window",
                 health.window_sliding,
@@ -158,14 +163,14 @@ def measures_of(health: Health) -> list[Measure]:
             ),
             _share("energy deleted there", health.window_eroded, 0.0),
         ]
-    return found
+    return measures
 
 
-def _share(what: str, share: float | None, most: float) -> Measure:
-    limit = f"at most {most:.0%}" if most else "none"
+def _share(name: str, share: float | None, limit_share: float) -> Measure:
+    limit = f"at most {limit_share:.0%}" if limit_share else "none"
     return Measure(
-        what,
+        name,
         None if share is None else f"{share:.2%}",
         limit,
-        None if share is None else share <= most,
+        None if share is None else share <= limit_share,
     )

@@ -63,10 +63,12 @@ _ERROR: Final = Field(
     "common_error", "number?",
     "error at the common tr: the residual, on basis energy the level error, 0 where nothing vibrates; in -f ndjson "
     "common_errors of the last line",
-    lambda one: one[1],
+    lambda run_and_error: run_and_error[1],
 )  # fmt: skip
 # A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
-RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
+RUN: Final = row(
+    *PLAIN.of_part(lambda run_and_error: run_and_error[0]), _ERROR, **_JUDGED
+)
 _RUN: Final = row(
     *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
 )
@@ -120,7 +122,7 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Study, shown: Shown) -> str:
+def as_table(answer: Study, display: Shown) -> str:
     """Return what the runs have in common, and one line per run with its shortened name."""
     head, rows = tables.known(*table(answer))
     rows = [
@@ -129,14 +131,16 @@ def as_table(answer: Study, shown: Shown) -> str:
             short_names([row.source for row in answer.runs]), rows, strict=True
         )
     ]
-    said = tables.in_line([*outcome(answer), *reasons(answer)])
-    return "\n".join([*said, "", tables.as_text(head, rows, shown.width, _SPARE)])
+    outcome_lines = tables.in_line([*outcome(answer), *reasons(answer)])
+    return "\n".join(
+        [*outcome_lines, "", tables.as_text(head, rows, display.width, _SPARE)]
+    )
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
     """Return what the runs have in common, and the runs as a Markdown table."""
-    said = tables.listed([*outcome(answer), *reasons(answer)])
-    listed = "\n".join(f"* {line}" for line in said)
+    outcome_lines = tables.listed([*outcome(answer), *reasons(answer)])
+    listed = "\n".join(f"* {line}" for line in outcome_lines)
     return f"{listed}\n\n{tables.as_markdown(*table(answer))}"
 
 
@@ -145,9 +149,9 @@ def as_csv(answer: Study, _: Shown) -> str:
     return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
 
 
-def as_ndjson(answer: Study, shown: Shown) -> str:
+def as_ndjson(answer: Study, display: Shown) -> str:
     """Return the lines of the runs that are not written yet, and what the runs have in common."""
-    return "\n".join([*shown.lines, LAST.as_json(answer, shown.command, None)])
+    return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
@@ -161,21 +165,25 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of the runs."""
     cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.runs)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
-        "run": lambda one: one[0].source,
-        "tr": lambda one: one[0].tr,
-        "+-": lambda one: tables.half(one[0].tr_low, one[0].tr_high),
-        "td": lambda one: one[0].td,
-        "E(td)": lambda one: one[0].energy_td,
-        "residual": lambda one: tables.measure(one[0].residual),
-        "error at common tr": lambda one: tables.measure(one[1]),
-        "verdict": lambda one: one[0].verdict,
-        "basis": lambda one: one[0].basis,
-        "status": lambda one: None if one[0].status == OK else one[0].status,
-        "why": lambda one: (
-            cut.get(one[0].source, "")
-            + (one[0].message or ", ".join(one[0].warnings)).removeprefix(
-                f"{one[0].source.rstrip('/')}: "
-            )
+        "run": lambda run_and_error: run_and_error[0].source,
+        "tr": lambda run_and_error: run_and_error[0].tr,
+        "+-": lambda run_and_error: tables.half(
+            run_and_error[0].tr_low, run_and_error[0].tr_high
+        ),
+        "td": lambda run_and_error: run_and_error[0].td,
+        "E(td)": lambda run_and_error: run_and_error[0].energy_td,
+        "residual": lambda run_and_error: tables.measure(run_and_error[0].residual),
+        "error at common tr": lambda run_and_error: tables.measure(run_and_error[1]),
+        "verdict": lambda run_and_error: run_and_error[0].verdict,
+        "basis": lambda run_and_error: run_and_error[0].basis,
+        "status": lambda run_and_error: (
+            None if run_and_error[0].status == OK else run_and_error[0].status
+        ),
+        "why": lambda run_and_error: (
+            cut.get(run_and_error[0].source, "")
+            + (
+                run_and_error[0].message or ", ".join(run_and_error[0].warnings)
+            ).removeprefix(f"{run_and_error[0].source.rstrip('/')}: ")
         ),
     }
     return tables.filled(columns, with_errors(answer))
@@ -185,10 +193,10 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     """Return what the runs have in common, as pairs of a name and a text."""
     spread = answer.spread
     common = answer.common
-    found = "none"
+    own_tr = "none"
     if spread:
-        found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        found += (
+        own_tr = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
+        own_tr += (
             "the intervals overlap" if answer.agree else "the intervals do not overlap"
         )
     heading = "common tr"
@@ -203,7 +211,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         (heading, shared),
         ("each run", _verdicts(answer)),
         ("td", td_of(answer)),
-        ("own tr", found),
+        ("own tr", own_tr),
     ]
 
 
@@ -222,8 +230,10 @@ def _verdicts(answer: Study) -> str:
         for word in VERDICTS.values()
         if counts[word]
     ]
-    left = sum(row.verdict is None for row in answer.runs)
-    return ", ".join([*counted, *[f"no pair in {runs_of(left)}"] * (left > 0)])
+    undecided_count = sum(row.verdict is None for row in answer.runs)
+    return ", ".join(
+        [*counted, *[f"no pair in {runs_of(undecided_count)}"] * (undecided_count > 0)]
+    )
 
 
 def reasons(answer: Study) -> list[tuple[str, str]]:
@@ -267,8 +277,8 @@ def short_names(sources: Sequence[str]) -> tuple[str, ...]:
     last = next(
         (i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1
     )
-    kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
+    distinct_paths = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
     return tuple(
-        "/".join(part.strip("/") for part in one) or source
-        for one, source in zip(kept, sources, strict=True)
+        "/".join(part.strip("/") for part in distinct_path) or source
+        for distinct_path, source in zip(distinct_paths, sources, strict=True)
     )

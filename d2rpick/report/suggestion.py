@@ -34,9 +34,14 @@ _WINDOW: Final = row(
 )
 # a candidate and the decision on it
 CANDIDATE: Final = row(
-    *keys.CANDIDATE.of_part(lambda one: one[0]),
-    keys.MATCHES._replace(get=lambda one: one[0].parts),
-    *keys.DECIDED.of_part(lambda one: one[1], ("verdict", "verdict_reason", "cure")),
+    *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
+    keys.MATCHES._replace(
+        get=lambda candidate_and_decision: candidate_and_decision[0].parts
+    ),
+    *keys.DECIDED.of_part(
+        lambda candidate_and_decision: candidate_and_decision[1],
+        ("verdict", "verdict_reason", "cure"),
+    ),
     name="candidate",
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
@@ -48,7 +53,9 @@ _IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
 def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
     """Return each candidate with the decision on it."""
-    return [(one, answer.decision_on(one)) for one in answer.candidates]
+    return [
+        (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
+    ]
 
 
 def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
@@ -57,7 +64,9 @@ def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
     windows = answer.windows
     if windows is None:
         return None
-    return [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
+    return [
+        {**window._asdict(), "recommended": holds(window, tr)} for window in windows
+    ]
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -83,39 +92,43 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 ))  # fmt: skip
 
 
-def as_table(answer: Suggestion, shown: Shown) -> str:
+def as_table(answer: Suggestion, display: Shown) -> str:
     """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
 
     If nothing is recommended, candidates are listed only if all details are asked for.
     """
-    above = heading(answer.situation, verbose=shown.verbose)
+    above = heading(answer.situation, verbose=display.verbose)
     lines = [
         *tables.in_line((*verdict(answer), *next_step(answer))),
         "",
         *tables.in_line((*facts(answer), *outlook(answer), *above)),
     ]
-    if answer.candidates and (answer.recommended or shown.verbose):
-        lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]
-        left = len(answer.candidates) - shown.limit
-        lines += [f"... and {left} more (--limit)"] * (left > 0)
+    if answer.candidates and (answer.recommended or display.verbose):
+        lines += ["", tables.as_text(*_some(answer, display), display.width, _SPARE)]
+        hidden_count = len(answer.candidates) - display.limit
+        lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
     return "\n".join(lines)
 
 
-def as_markdown(answer: Suggestion, shown: Shown) -> str:
+def as_markdown(answer: Suggestion, display: Shown) -> str:
     """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
     above = tables.listed((*verdict(answer), *next_step(answer)))
     below = tables.listed((*facts(answer), *outlook(answer)))
-    table = tables.as_markdown(*_some(answer, shown))
+    table = tables.as_markdown(*_some(answer, display))
     return "\n\n".join([*above, table, *below])
 
 
 def _some(
-    answer: Suggestion, shown: Shown
+    answer: Suggestion, display: Shown
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the first candidates, without empty columns."""
-    head, rows = tables.known(*table(answer, shown.limit))
-    kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
-    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    head, rows = tables.known(*table(answer, display.limit))
+    shown_columns = [
+        i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
+    ]
+    return [head[i] for i in shown_columns], [
+        [row[i] for i in shown_columns] for row in rows
+    ]
 
 
 def as_csv(answer: Suggestion, _: Shown) -> str:
@@ -124,7 +137,8 @@ def as_csv(answer: Suggestion, _: Shown) -> str:
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
     return csv_of(
-        columns, ({**CANDIDATE.plain(one), "td": td} for one in _decided(answer))
+        columns,
+        ({**CANDIDATE.plain(candidate), "td": td} for candidate in _decided(answer)),
     )
 
 
@@ -174,14 +188,14 @@ def next_step(answer: Suggestion) -> list[tuple[str, str]]:
 
 def better_about(answer: Suggestion, better: Pair) -> str:
     """Return in which respect the better pair is better."""
-    own = answer.recommended
-    if own is None:
+    recommended = answer.recommended
+    if recommended is None:
         return "there an acceptable tr exists"
-    if better.residual is not None and own.residual is not None:
-        return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
+    if better.residual is not None and recommended.residual is not None:
+        return f"residual {tables.measure(better.residual)} instead of {tables.measure(recommended.residual)}"
     level = answer.situation.vibration.whole.energy(better.td)
-    here = answer.situation.energy_td
-    return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
+    own_level = answer.situation.energy_td
+    return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
@@ -213,38 +227,39 @@ def position(best: Candidate, *, deck: bool) -> str:
         return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
-    least = "at least " if best.position_error_is_lower_bound else ""
-    return f"off by {least}{best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    bound_text = "at least " if best.position_error_is_lower_bound else ""
+    size = f"{bound_text}{best.position_error:.2g}"
+    return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
 def given_up(longer: Pair, chosen: Pair) -> str:
     """Return how much rigid time was given up for a better level or residual, and how much better it is."""
     if longer.residual is None:
-        what = "a lower level at td"
+        better_quality = "a lower level at td"
     else:
-        what = f"residual {tables.measure(longer.residual)}"
+        better_quality = f"residual {tables.measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
+    return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
 def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
-    share = sum(one.share for one in windows)
+    share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[
-        :_NAMED
-    ]
-    shown = [
+    named_windows = sorted(
+        windows, key=lambda window: (not holds(window, tr), window.start - window.end)
+    )[:_NAMED]
+    window_texts = [
         f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
-        for w in named
+        for w in named_windows
     ]
-    if len(windows) > len(named):
-        more = f" and {len(windows) - len(named)} shorter windows"
+    if len(windows) > len(named_windows):
+        shorter_text = f" and {len(windows) - len(named_windows)} shorter windows"
     else:
-        more = ""
-    return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
+        shorter_text = ""
+    return f"every tr from {'; '.join(window_texts)}{shorter_text}; in all {share:.0%} of the flight up to td"
 
 
 def holds(window: AcceptableWindow, tr: float | None) -> bool:

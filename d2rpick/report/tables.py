@@ -73,12 +73,14 @@ def known(
     >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
     (['tr'], [[0.5], [0.7]])
     """
-    kept = [
+    known_columns = [
         i
         for i in range(len(head))
         if any(row[i] not in (None, "", "-") for row in rows)
     ]
-    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    return [head[i] for i in known_columns], [
+        [row[i] for i in known_columns] for row in rows
+    ]
 
 
 def filled(
@@ -105,16 +107,16 @@ def unstarred(
     ]
 
 
-def in_line(said: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
+def in_line(named_texts: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
     """Return aligned lines of a name and its text; names take ``width`` letters, by default as many as the longest."""
-    lines = list(said)
+    lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
     return [f"{name.ljust(width)}  {short(value)}" for name, value in lines]
 
 
-def listed(said: Iterable[tuple[str, str]]) -> list[str]:
+def listed(named_texts: Iterable[tuple[str, str]]) -> list[str]:
     """Return pairs of a name and a text as paragraphs of Markdown."""
-    return [f"{name}: {in_markdown(text)}" for name, text in said]
+    return [f"{name}: {in_markdown(text)}" for name, text in named_texts]
 
 
 def as_text(
@@ -150,7 +152,7 @@ def as_text(
             and sum(min(_TEXT, w) + 2 for w in widths.values()) - 2 > width
         ):
             del widths[name], texts[name]
-    right = [
+    is_number = [
         all(cell is None or isinstance(cell, (int, float)) for cell in columns[name])
         for name in texts
     ]
@@ -158,7 +160,7 @@ def as_text(
     lines = (
         "  ".join(
             t.rjust(w) if r else t.ljust(w)
-            for t, w, r in zip(line, narrow, right, strict=True)
+            for t, w, r in zip(line, narrow, is_number, strict=True)
         )
         for row in zip(*texts.values(), strict=True)
         for line in _broken(row, narrow)
@@ -224,7 +226,7 @@ def _narrowed(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
     """Reduce the widest columns until a table fits: first wrap names, then cells, and split words last."""
-    found = list(widths)
+    narrowed = list(widths)
     names, *cells = (
         [min(_WORD, max(map(len, text.split()), default=1)) for text in row]
         for row in texts
@@ -234,15 +236,15 @@ def _narrowed(
     ]
     words = [max(column) for column in zip(names, *cells, strict=True)]
     excess = sum(widths) + 2 * (len(widths) - 1) - width
-    for least in (whole, words, [min(_LEAST, word) for word in words]):
-        while excess > 0 and any(map(gt, found, least)):
+    for floor_widths in (whole, words, [min(_LEAST, word) for word in words]):
+        while excess > 0 and any(map(gt, narrowed, floor_widths)):
             widest = max(
-                (i for i in range(len(found)) if found[i] > least[i]),
-                key=lambda i: found[i],
+                (i for i in range(len(narrowed)) if narrowed[i] > floor_widths[i]),
+                key=lambda i: narrowed[i],
             )
-            found[widest] -= 1
+            narrowed[widest] -= 1
             excess -= 1
-    return found
+    return narrowed
 
 
 def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
@@ -338,10 +340,10 @@ def as_json(result: Any, indent: int | None = 2) -> str:
     import json
     import unicodedata
 
-    def seen(found: re.Match[str]) -> str:
-        if unicodedata.category(found[0]) in UNSEEN:
-            return json.dumps(found[0])[1:-1]
-        return found[0]
+    def seen(match: re.Match[str]) -> str:
+        if unicodedata.category(match[0]) in UNSEEN:
+            return json.dumps(match[0])[1:-1]
+        return match[0]
 
     return re.sub(
         r"[^\n -~]",

@@ -59,18 +59,18 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
 COMPARED = ("", "switched", "reference")
 
 
-def as_table(answer: Verdict, shown: Shown) -> str:
+def as_table(answer: Verdict, display: Shown) -> str:
     """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
     decided = answer.decision.reason
-    remarks = [("note", what) for what in answer.reasons if what not in decided]
-    above = heading(answer.situation, verbose=shown.verbose)
+    remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
+    above = heading(answer.situation, verbose=display.verbose)
     lines = tables.in_line(verdict(answer))
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     listed = [*facts(answer), *above, *remarks]
-    said = [(name, make_printable(text)) for name, text in listed]
+    printable = [(name, make_printable(text)) for name, text in listed]
     return "\n".join(
-        [*lines, "", *tables.in_line(said), "", *tables.in_line(measured(answer))]
+        [*lines, "", *tables.in_line(printable), "", *tables.in_line(measured(answer))]
     )
 
 
@@ -94,7 +94,7 @@ def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
     """Return the known measures of the pair with their names for people."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
-    found: list[tuple[str, tables.Cell]] = [
+    rows: list[tuple[str, tables.Cell]] = [
         ("energy at tr", best.energy),
         ("energy at td", answer.energy_td),
         ("energy at tr / at td", best.level_ratio),
@@ -109,12 +109,12 @@ def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
         ("timing tolerance", best.timing_tolerance),
         ("position error", best.position_error),
     ]
-    return [one for one in found if one[1] is not None]
+    return [row for row in rows if row[1] is not None]
 
 
 def as_markdown(answer: Verdict, _: Shown) -> str:
     """Return the verdict, and the measures as a Markdown table of two columns."""
-    said = tables.listed((*verdict(answer), *facts(answer)))
+    paragraphs = tables.listed((*verdict(answer), *facts(answer)))
     table = tables.as_markdown(("measure", "value"), measured(answer))
     switched = answer.switched
     if switched:
@@ -125,7 +125,7 @@ def as_markdown(answer: Verdict, _: Shown) -> str:
     else:
         compared = []
     reasons = [f"* {tables.in_markdown(reason)}" for reason in answer.reasons]
-    return "\n\n".join([*said, table, *compared, *reasons])
+    return "\n\n".join([*paragraphs, table, *compared, *reasons])
 
 
 def measures(answer: Verdict) -> dict[str, Any]:
@@ -148,8 +148,8 @@ def measures(answer: Verdict) -> dict[str, Any]:
 
 def as_csv(answer: Verdict, _: Shown) -> str:
     """Return one row of CSV with a column for each key of `measures`."""
-    found = measures(answer)
-    return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
+    values = measures(answer)
+    return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
@@ -170,14 +170,14 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
     error = switched.momentum_error
     displacement = switched.displacement
     if error is None:
-        off = []
+        rows = []
     else:
-        off = [
+        rows = [
             ("largest error of the momentum after td", f"{error:.2g} of its maximum")
         ]
     if displacement is None:
-        return off
-    return [*off, ("largest displacement after td", f"{displacement:.3g}")]
+        return rows
+    return [*rows, ("largest displacement after td", f"{displacement:.3g}")]
 
 
 def _comparison(switched: Comparison) -> list[str]:
@@ -192,13 +192,13 @@ def _comparison(switched: Comparison) -> list[str]:
 
 def _of_switched(answer: Verdict) -> dict[str, Any]:
     """Return the measures of the switched run under their own names, empty without a switched run."""
-    found = SWITCHED.plain(answer.switched) if answer.switched else {}
-    found = {
+    values = SWITCHED.plain(answer.switched) if answer.switched else {}
+    values = {
         name: "; ".join(value) if name == "objections" else value
-        for name, value in found.items()
+        for name, value in values.items()
     }
     return {
         f"switched_{name}": value
-        for name, value in found.items()
+        for name, value in values.items()
         if name not in ("source", "notes")
     }

@@ -88,7 +88,7 @@ def scale_of(low: float, high: float, level: float) -> Scale:
     return Scale(low - room, high + room, logarithmic=False)
 
 
-def scale_in(situation: Situation, seen: View, levels: Sequence[float]) -> Scale:
+def scale_in(situation: Situation, view: View, levels: Sequence[float]) -> Scale:
     """Return the scale for a flight and its levels; if nothing vibrates, for the energy of the whole run [energy]."""
     if situation.at_rest:
         return scale_of(
@@ -96,18 +96,21 @@ def scale_in(situation: Situation, seen: View, levels: Sequence[float]) -> Scale
             max(float(situation.history.energy.max()), round_off(situation.history)),
             0.0,
         )
-    return scale_of(min(seen.low, *levels), max(seen.high, *levels), median(levels))
+    return scale_of(min(view.low, *levels), max(view.high, *levels), median(levels))
 
 
 def view_of(situation: Situation, *times: float) -> View:
     """Return the view of the flight of a situation, its td and other ``times`` [time]."""
     span = situation.evidence.span
-    known = max(span.end, situation.td) if span else None
-    return view(situation.history, situation.flight, [situation.td, *times], known)
+    last_known = max(span.end, situation.td) if span else None
+    return view(situation.history, situation.flight, [situation.td, *times], last_known)
 
 
 def view(
-    history: History, flight: Flight, times: list[float], known: float | None = None
+    history: History,
+    flight: Flight,
+    times: list[float],
+    last_known: float | None = None,
 ) -> View:
     """Return the view of a flight and ``times`` [time]; a flight of unknown end lasts to ``known`` or the last time.
 
@@ -121,7 +124,7 @@ def view(
         if flight.end is not None:
             end = flight.end
         else:
-            end = known if known is not None else last
+            end = last_known if last_known is not None else last
         inner = max(first, min(flight.start, *times)), min(last, max(end, *times))
         inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
@@ -135,15 +138,15 @@ def view(
     middle = min(max(start, (begin + stop) / 2), end)
     sides = (("load", start, middle), ("landing", middle, end))
     highest = [
-        (what, float(history.between(*side)[1].max(initial=high)))
-        for what, *side in sides
+        (peak_name, float(history.between(*side)[1].max(initial=high)))
+        for peak_name, *side in sides
     ]
     return View(
         start,
         end,
         low,
         high,
-        tuple((what, energy) for what, energy in highest if energy > high),
+        tuple((peak_name, energy) for peak_name, energy in highest if energy > high),
     )
 
 
@@ -151,8 +154,8 @@ def _flown(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
     """Return the energies in the flight without its ends, or the adjacent states if the flight contains none."""
-    off = _UNSURE * (end - start)
-    flown = history.between(start + off, end - off)[1]
+    margin = _UNSURE * (end - start)
+    flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))
 
 
