@@ -1,6 +1,6 @@
-"""Arguments of the library, checked before any file is opened: a wrong one is named in a TypeError or ValueError.
+"""Check the arguments of Python functions before any file is opened; read windows from a file.
 
-And windows as a file gives them.
+A wrong argument raises a TypeError or ValueError that names it.
 """
 
 from __future__ import annotations
@@ -22,28 +22,27 @@ if TYPE_CHECKING:
     Path = str | os.PathLike[str]
     Deck = (
         Path | Literal[False]
-    )  # False: none, also where one lies in the folder of the run
+    )  # False means no deck, even if one lies in the folder of the run
     Parts = str | int | Iterable[str | int]
 
-_LONGEST_SHOWN: Final = 60  # of a wrong value in a message
+_LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut off in a message
 
 
 class Choosing(TypedDict, total=False):
-    """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
+    """How to choose and judge, like the options of ``d2rpick suggest``; times in the unit of the history.
 
     None stands for the default.
 
-    ``after``: the load ends here, ``landing``: the next contact comes here (default: found from the record).
-    ``margin``: kept clear after the load and before the next contact (0; where td is chosen or the landing is given,
-    derived).
-    ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
-    identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
-    is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
-    energy alone shows when the load is over.  ``keep_vibration``: grade the vibration by itself, however little its
-    error is worth in the next contact.  ``min_quality``: "poor", "fair" or "good", the least grade of a pair that
-    `plan` plans and `check` passes ("fair").  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
-    step, and of the step while rigid to that while deformable, 1 or more.
+    ``after``: end of the load, ``landing``: the next contact (default: determined from the record).  ``margin``: time
+    kept free after the load and before the next contact (default 0; if td is chosen or the landing is given, it is
+    derived).  ``tolerance``: largest lock-in error, or level error if no oscillator is known (0.2).
+    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: used instead of
+    the identified one, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the only
+    window in which the oscillator is identified.  ``replay`` False: judge by the energy level alone.  ``strict``:
+    accept no tr if only the energy shows the end of the load.  ``keep_vibration``: grade the vibration by itself, even
+    if its error hardly matters in the next contact.  ``min_quality``: "poor", "fair" or "good", the lowest grade of a
+    pair that `plan` plans and `check` passes ("fair").  ``cost_share``: share of the switched parts in the cost of a
+    step.  ``step_ratio``: time step while rigid over that while deformable, 1 or more.
     """
 
     after: float | None
@@ -64,7 +63,7 @@ class Choosing(TypedDict, total=False):
 
 
 def number(name: str, value: object, limits: Number = TIME) -> float:
-    """Give a finite number within its limits.
+    """Return a finite number within its limits, or raise TypeError or ValueError.
 
     Examples
     --------
@@ -87,7 +86,7 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Return True for a number of Python or numpy, also in an array without axes; not for True, text or complex."""
+    """Return True for a number of Python or numpy, also in a 0-dimensional array; False for True, text or complex."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if (
         isinstance(value, bool | str | bytes)
@@ -99,7 +98,7 @@ def is_number(value: object) -> bool:
 
 
 def is_whole_number(value: object) -> bool:
-    """Return True for a whole number of Python or numpy; not for True, text or a float."""
+    """Return True for a whole number of Python or numpy; False for True, text or a float."""
     return (
         is_number(value)
         and hasattr(value, "__index__")
@@ -108,7 +107,7 @@ def is_whole_number(value: object) -> bool:
 
 
 def _shown(value: object) -> str:
-    """Write a wrong value in one line, cut where it is long."""
+    """Return a wrong value as one line of limited length."""
     text = " ".join(repr(value).split())
     if len(text) <= _LONGEST_SHOWN:
         return text
@@ -153,7 +152,7 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def with_point(value: object) -> str:
-    """Say how a number with a decimal comma is given, or nothing.
+    """Return a hint how to write a number that has a decimal comma, empty for other texts.
 
     Examples
     --------
@@ -172,7 +171,7 @@ def with_point(value: object) -> str:
 
 
 def without_unit(value: object) -> str:
-    """Say how a time with a unit is given, or nothing."""
+    """Return a hint how to write a time that has a unit, empty for other texts."""
     from d2rpick.histories.names import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -182,12 +181,12 @@ def without_unit(value: object) -> str:
 
 
 def optional(name: str, value: object, limits: Number = TIME) -> float | None:
-    """Give a finite number within its limits, None where none is given."""
+    """Return a finite number within its limits, or None if none is given."""
     return None if value is None else number(name, value, limits)
 
 
 def window(name: str, value: object) -> tuple[float, float] | None:
-    """Give a window of time, the lower time first; None where none is given.
+    """Return a window of time, the lower time first, or None if none is given.
 
     Examples
     --------
@@ -213,7 +212,7 @@ def window(name: str, value: object) -> tuple[float, float] | None:
 
 
 def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
-    """Give parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
+    """Return parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
 
     Examples
     --------
@@ -226,7 +225,7 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
 
     single = isinstance(value, str | int | Part) or is_whole_number(
         value
-    )  # a Part holds its number and its title
+    )  # a Part has a number and a title
     if single:
         listed = [value]
     else:
@@ -242,7 +241,7 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
 
 
 def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Give ids of rules or their beginnings; a string is one of them.
+    """Return the ids of rules or their prefixes; a string is a single id.
 
     Examples
     --------
@@ -262,7 +261,7 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
 
 
 def whole(name: str, value: object, low: int) -> int:
-    """Give a whole number of at least ``low``.
+    """Return a whole number of at least ``low``.
 
     Examples
     --------
@@ -276,7 +275,7 @@ def whole(name: str, value: object, low: int) -> int:
 
 
 def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
-    """Give the names of files; a string is one of them.
+    """Return the names of files; a string is a single name.
 
     Examples
     --------
@@ -302,12 +301,12 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
 
 
 def check_run(name: str, run: object) -> None:
-    """Raise TypeError for what is not a run that was read."""
+    """Raise TypeError unless the argument is a run as `read` returns it."""
     from d2rpick.api.tables import is_table
 
     if not (
         hasattr(run, "files") and hasattr(run, "overview")
-    ):  # its class imports this module
+    ):  # imported here since its class imports this module
         if isinstance(run, str | os.PathLike):
             found = repr(run)
         else:
@@ -319,7 +318,7 @@ def check_run(name: str, run: object) -> None:
 def refuse_unknown(
     name: str, known: Iterable[str], others: Iterable[str] = ()
 ) -> NoReturn:
-    """Raise the TypeError of an argument that does not exist, with the one of all that may be meant."""
+    """Raise the TypeError of an unknown argument, and suggest the most similar of all names."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, {*known, *others} - {name}, 1)
@@ -328,7 +327,7 @@ def refuse_unknown(
 
 
 def chosen(choosing: Choosing) -> dict[str, Any]:
-    """Give the fields of a request that say how to choose."""
+    """Return the fields of a request that contain how to choose."""
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:
         refuse_unknown(
@@ -361,7 +360,7 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
 
 
 def check_grade(value: object) -> None:
-    """Refuse what is no grade of a pair.
+    """Raise ValueError unless the value is a grade of a pair.
 
     Examples
     --------
@@ -381,7 +380,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
         return None
     from d2rpick.vibration.oscillator import (
         Oscillator,
-    )  # not above: mostly none is given
+    )  # imported here since an oscillator is rarely given
 
     if not isinstance(value, Oscillator):
         raise TypeError(
@@ -391,12 +390,14 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
 
 def file_or_weights(value: object) -> Any:
-    """Return weights, or the name of the file that holds them; None where none are given."""
+    """Return weights, or the name of the file that contains them, or None if none are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
         return one_path("weights", value)
-    from d2rpick.choice.cost import Weights  # not above: mostly none are given
+    from d2rpick.choice.cost import (
+        Weights,
+    )  # imported here since weights are rarely given
 
     if not isinstance(value, Weights):
         raise TypeError(
@@ -417,7 +418,7 @@ def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
 
 
 def one_path(name: str, value: Path) -> str:
-    """Give the name of one file."""
+    """Return the name of a single file."""
     found = paths(name, value)
     if len(found) > 1:
         raise ValueError(f"{name} names {len(found)} files, one was expected")
@@ -425,14 +426,14 @@ def one_path(name: str, value: Path) -> str:
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
-    """Read windows as ``d2rpick plan -f value`` prints them: a line ``tr td`` for each; or the journal of a driven run.
+    """Read windows as ``d2rpick plan -f value`` prints them, a line ``tr td`` for each, or the journal of a driven run.
 
-    Empty lines and those that begin with ``#`` are passed over.
+    Empty lines and lines that begin with ``#`` are skipped.
 
     Raises
     ------
     DeckError
-        For any other line, with its number, and when there is no window at all.
+        For any other line, with its number, and if there is no window at all.
     """
     windows: list[tuple[float, float]] = []
     if text.lstrip().startswith("{"):
@@ -457,12 +458,10 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _of_journal(text: str) -> list[tuple[float, float]]:
-    """Windows of the rigid legs that a run has kept: a leg takes the place of an earlier one of its number."""
-    import json  # not above: start-up
+    """Return the windows of the rigid restart segments in a journal; of segments with one number, the last counts."""
+    import json  # imported here to keep the start fast
 
-    legs: list[
-        tuple[int, bool, float, float]
-    ] = []  # number, whether it is rigid, start, end
+    legs: list[tuple[int, bool, float, float]] = []  # number, True if rigid, start, end
     for line in text.splitlines():
         try:
             record = json.loads(line)
@@ -479,7 +478,7 @@ def _of_journal(text: str) -> list[tuple[float, float]]:
                     )
                 )
         except (ValueError, KeyError, TypeError):
-            continue  # cut, or of another kind
+            continue  # an incomplete line, or one of another kind
     latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
     windows: list[tuple[float, float]] = []
     rigid_before = False

@@ -1,4 +1,4 @@
-"""What ``check`` says of a card in the deck of its run, before anybody pastes it."""
+"""Check a card in the deck of its run before the user pastes it there."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ UNJOINED: Final = "parts-not-joined"
 def collect_objections(
     card: PrintedCard, asked: Asked, parts: int
 ) -> Iterator[Caution]:
-    """Say what ``check`` has against a deck with the card in it; without a deck, what nobody knows of its parts.
+    """Yield the findings of ``check`` in a deck with the card; without a deck, what is unknown about its parts.
 
-    ``parts`` is how many the card switches by their ids.
+    ``parts`` is the number of parts that the card switches by their ids.
     """
     if asked.deck is None:
         if parts > 1:

@@ -1,4 +1,4 @@
-"""What is asked of a card beside its times, and the card of an answer."""
+"""Define the options of a card, and print the card of an answer."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ _ONLY_JUDGED: Final = (
 
 
 class CardOptions(TypedDict, total=False):
-    """How a card is printed.
+    """Options of a card.
 
-    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history); with
-    ``contact`` or ``wall``, the number of what pushes, ``"ls-dyna-contact"`` or ``"radioss-contact"``.
-    ``step_cap``: the largest time step while rigid.  LS-DYNA: ``merge``, the lead part that all others are merged into,
-    ``swset``, ids of the two switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies,
-    ``end`` of the run and its ``name``.
+    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the solver that wrote the history); with
+    the id of a ``contact`` or ``wall``, ``"ls-dyna-contact"`` or ``"radioss-contact"``.  ``step_cap``: the largest time
+    step while rigid.  LS-DYNA: ``merge``, the lead part into which all others are merged, ``swset``, the ids of the two
+    switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies, ``end`` of the run and its
+    ``name``.
     """
 
     solver: str | None
@@ -63,7 +63,7 @@ class CardOptions(TypedDict, total=False):
 
 
 class Judging(CardOptions, total=False):
-    """The same, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
+    """Options of a card, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
 
     after: float | None
     landing: float | None
@@ -72,7 +72,7 @@ class Judging(CardOptions, total=False):
 
 
 def _checked(name: str, value: Any, option: Option) -> Any:
-    """Give a value in its kind."""
+    """Return a value converted to the kind of its option."""
     from d2rpick.api import arguments
 
     kind = option.kind
@@ -101,15 +101,15 @@ def _checked(name: str, value: Any, option: Option) -> Any:
 
 
 def solvers() -> Sequence[str]:
-    """Names of the solvers whose input can be printed."""
-    from d2rpick.deck.printing import SOLVERS  # not above: start-up
+    """Return the names of the solvers whose input can be printed."""
+    from d2rpick.deck.printing import SOLVERS  # imported here to keep the start fast
 
     return tuple(SOLVERS)
 
 
 @dataclass(eq=False, repr=False)
 class Cards:
-    """How a card is printed: the options of every command that prints one."""
+    """Options of a card, shared by all commands that print one."""
 
     solver: str | None = option(
         "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
@@ -144,15 +144,17 @@ class Cards:
     wall: int | None = option(
         "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
     )
-    starter: str = ""  # cards that the starter deck lacks
-    sensor: int = 901  # first id of sensors that is free
-    delete_nodal_bodies: bool = False  # as those of Printing
+    starter: str = ""  # cards to be added to the starter deck
+    sensor: int = 901  # first free id of sensors
+    delete_nodal_bodies: bool = False  # see Printing
     delete_node_sets: bool = False
-    replaced: tuple[int, ...] = ()  # main nodes of bodies that leave the starter deck
+    replaced: tuple[
+        int, ...
+    ] = ()  # main nodes of bodies to be removed from the starter deck
 
     @classmethod
     def of(cls, given: CardOptions) -> Cards:
-        """Take the arguments of Python; TypeError or ValueError for one that is not of its kind."""
+        """Check the arguments of Python; raise TypeError or ValueError for a wrong one."""
         from d2rpick.api import arguments
 
         known = options_of(Cards)
@@ -168,7 +170,7 @@ class Cards:
 
     @property
     def given(self) -> list[str]:
-        """Names of the options that were given, the solver aside."""
+        """Names of the given options, without the solver."""
         return [
             name
             for name in options_of(Cards)
@@ -176,7 +178,7 @@ class Cards:
         ]
 
     def printing(self, parts: Sequence[int] = ()) -> Printing:
-        """Say what a card says besides its times and its solver."""
+        """Return the content of a card besides its times and its solver."""
         from d2rpick.deck.printed_card import Printing
 
         given = {name: getattr(self, name) for name in self.given}
@@ -193,7 +195,7 @@ class Cards:
         )
 
     def check_solver(self, solver: str) -> None:
-        """Refuse an option that says what the input of ``solver`` has no place for."""
+        """Refuse options that have no place in the input of ``solver``."""
         from d2rpick.deck.printing import SOLVERS
 
         places = {name: {one.switches, *one.takes} for name, one in SOLVERS.items()}
@@ -207,7 +209,7 @@ class Cards:
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
-        """Complete a card by the deck of the run, unless its options say otherwise.
+        """Complete the options of a card from the deck of the run, unless they are given.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.  Notes say which bodies it lacks.
@@ -250,7 +252,7 @@ class Cards:
         return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
     def request(self, asked: Asked) -> CardRequest:
-        """Say how the card of a run is printed."""
+        """Return how the card of a run is printed."""
         from d2rpick.choice.judged_card import CardRequest
 
         request = CardRequest(
@@ -260,12 +262,12 @@ class Cards:
         return request
 
 
-# Keys of the settings that are for all commands; further ones are for the rules of check, or for one command.
+# Keys in the settings that apply to all commands; other keys apply to the rules of check, or to one command.
 SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 
 def needed(solver: Module) -> str:
-    """Say which argument names whom the card of ``solver`` switches."""
+    """Return the argument that names what the card of ``solver`` switches."""
     what = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
@@ -274,7 +276,7 @@ def needed(solver: Module) -> str:
 
 
 def numbers(name: str, texts: Sequence[str]) -> list[int]:
-    """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
+    """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         found = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -297,10 +299,10 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, with what was found of each of its new windows as printed; ``str`` gives its text.
+    """A card with the verdict on each of its new windows as printed; ``str`` returns its text.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
-    ``cautions`` are what `check` has against the card in the deck of the run, and what is not known without a deck.
+    ``cautions`` are the findings of `check` with the card in the deck of the run, and without a deck what is unknown.
     """
 
     card: PrintedCard
@@ -312,12 +314,12 @@ class JudgedCard(NamedTuple):
 
     @property
     def verified(self) -> bool:
-        """Whether all windows are."""
+        """True if all windows are verified."""
         return all(verdict.verified for verdict in self.verdicts)
 
     @property
     def passed(self) -> bool:
-        """Whether all windows are admissible, and as good as ``min_quality`` asks for."""
+        """True if all windows are admissible and have at least the grade ``min_quality``."""
         return all(
             verdict.decision.reaches(verdict.situation.settings.min_quality)
             for verdict in self.verdicts
@@ -331,7 +333,7 @@ def judged(
     judge: Callable[[float, float], Verdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card of windows that are judged as printed, as `verify` does it or by ``judge``.
+    """Print the card of windows, judged as printed like in `verify`, or by ``judge``.
 
     Raises
     ------
@@ -361,7 +363,7 @@ def judged(
 
 
 def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Cautions of a card and of its verdicts, each once, and the verdicts themselves where they are objections."""
+    """Return the cautions of a card and of its verdicts, each once, and a caution for each failed verdict."""
     of_verdicts = (
         caution for verdict in card.verdicts for caution in _cautions(verdict)
     )
@@ -383,7 +385,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; where there is a run they are judged by it.
+    """Print solver input for switching windows, as ``d2rpick card`` does; with a run they are judged by it.
 
     Parameters
     ----------
@@ -435,14 +437,16 @@ def card(
 def card_of(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card of windows, judged as printed where there is a run."""
+    """Print the card of windows, judged as printed if there is a run."""
     from d2rpick.deck.printing import DEFAULT, SOLVERS, print_cards
 
     if run is None:
         request.without_history()
         solver = cards.solver or DEFAULT
         return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
-    from d2rpick.api.asked import ask  # not above: a card alone does without numpy
+    from d2rpick.api.asked import (
+        ask,
+    )  # imported here since a card alone does not need numpy
 
     asked = ask(run, request, card_alone=True)
     wanted = cards.request(asked)
@@ -453,7 +457,7 @@ def card_of(
 
 
 def _alone(request: Request, cards: Cards, solver: str) -> Printing:
-    """Say what the card needs where no history says anything; ArgumentError where something is missing."""
+    """Return the content of a card without a history; raise ArgumentError if something is missing."""
     from d2rpick.deck.printing import SOLVERS
 
     cards.check_solver(solver)

@@ -1,4 +1,4 @@
-"""The deck check."""
+"""Check decks by the rules and, with a history, by the verdict on their windows."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Findings(Answer, Checks):
-    """Answer of `check`; nothing of it changes.
+    """Answer of `check`; it is immutable.
 
-    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
-    which parts are rigid; ``notes`` say what the readers of the history left out or assumed, and which settings are
-    not used.
+    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``.  ``windows`` are the
+    windows in which parts are rigid.  ``notes`` report what the readers of the history left out or assumed, and unused
+    settings.
     """
 
     command: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class Findings(Answer, Checks):
 
     @property
     def passed(self) -> bool:
-        """Whether all decks were checked, and nothing weighs as much as ``fail_on``."""
+        """True if all decks were checked, and no finding is as severe as ``fail_on``."""
         return not self.failed and all(
             one.severity.rank > self.fail_on.rank for one in self.findings
         )
@@ -62,16 +62,16 @@ class Findings(Answer, Checks):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the rules have against the cards of all decks."""
+        """Findings of the rules in all decks."""
         return tuple(finding for one in self.results for finding in one.findings)
 
     @property
     def windows(self) -> tuple[CheckedWindow, ...]:
-        """Windows in which parts are rigid, of all decks."""
+        """Windows of all decks in which parts are rigid."""
         return tuple(window for one in self.results for window in one.windows)
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per finding, a column per key of ``findings`` in the JSON.
+        """Return a table with a row per finding and a column per key of ``findings`` in the JSON.
 
         Examples
         --------
@@ -128,7 +128,7 @@ def check(
     """
     from d2rpick.api.asked import (
         request_of,
-    )  # not above: without a history nothing is computed
+    )  # imported here since nothing is computed without a history
 
     names = arguments.paths("decks", decks)
     if history is not None:
@@ -161,12 +161,14 @@ def findings_of(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check decks as they are named, by a run where there is one."""
+    """Check the named decks, by a run if there is one."""
     judge = None
     if run is None:
         request.without_history()
     else:
-        from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
+        from d2rpick.rules.judgement import (
+            HistoryJudge,
+        )  # imported here since it loads numpy
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
@@ -190,7 +192,7 @@ def findings_of(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that was written here by the configuration nearest to it."""
+    """Check a deck that d2rpick wrote, by the configuration nearest to it."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -202,9 +204,11 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _each(
     named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
+    """Yield the result of each deck once, for a run by its first file; a folder stands for its main decks."""
     seen: set[str] = set()
-    real_folder = cache(os.path.realpath)  # which asks the system for each folder above
+    real_folder = cache(
+        os.path.realpath
+    )  # cached since it asks the system for each parent folder
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
@@ -238,7 +242,7 @@ def _each(
 
 
 def _decks(name: str) -> list[str] | DeckError:
-    """Give the main decks in a folder, or the deck itself; an error for a folder without any."""
+    """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
     try:
         return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
     except DeckError as error:
@@ -246,7 +250,7 @@ def _decks(name: str) -> list[str] | DeckError:
 
 
 def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
-    """Give the small restarts that go on with the run of a deck of LS-DYNA, the only other deck in their folder."""
+    """Return for each deck of LS-DYNA its small restarts: the only other decks in its folder."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
@@ -268,7 +272,7 @@ def _found(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
+    """Check a deck by the configuration nearest to it; return an error in either, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)
@@ -282,5 +286,5 @@ def _found(
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # about the history, by which all are judged
+            raise  # the error concerns the history, by which all decks are judged
         return Unreadable(name, error, (source,))

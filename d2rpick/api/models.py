@@ -1,4 +1,4 @@
-"""Runs that are computed here: what is asked of the floating oscillator and of the rollover box, and their answers."""
+"""Compute the sample models: the requests for the floating oscillator and the rollover box, and their answers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HISTORIES = (
     "hdf5",
     "glstat",
     "matsum",
-)  # of d2rpick.report.history_files, which --help does without
+)  # formats of d2rpick.report.history_files, which --help does not import
 
 MOST_STATES = 1_000_000
 PARAMETERS = (
@@ -44,20 +44,23 @@ PARAMETERS = (
     "tilt",
     "ground_stiffness",
 )
-TD = 0.37  # of the published study, 10 ms before the ground comes
-TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
-T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
-BALANCED = 0.01  # so well the energy of a run must be balanced [-]
+TD = 0.37  # td of the published study, 10 ms before the ground contact [s]
+TILT = 30.0  # a falling box lands on an edge, so that it tumbles [degrees]
+T_END = {
+    False: 0.42,
+    True: 1.2,
+}  # by whether the box is dropped: time for some bounces [s]
+BALANCED = 0.01  # largest imbalance of the energy of a run [-]
 
 
 def _same(name: str, **changes: Any) -> Any:
-    """Take an option of a request."""
+    """Return an option of a request, changed for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is computed: the oscillator, its start, and when it is rigid."""
+    """Request for a motion of the oscillator: its parameters, its start, and when it is rigid."""
 
     stiffness: float = _same("stiffness")
     mass: float = _same("mass")
@@ -92,7 +95,7 @@ class Motion:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
+        """Refuse contradictory arguments."""
         given = [
             name
             for name in ("z0", "y0", "v0", "vz0", "vy0")
@@ -126,17 +129,17 @@ class Motion:
 
     @property
     def oscillator(self) -> Oscillator:
-        """The oscillator that moves; ArgumentError for half of one."""
+        """The oscillator that moves; raise ArgumentError if it is incomplete."""
         named = {
             name: getattr(self, name)
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**named, v0=0.0).oscillator
-        assert oscillator is not None  # its options are required
+        assert oscillator is not None  # the options that define it are required
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
-        """Give the motion, and how it is switched where it is."""
+        """Return the motion, and its replay with switching if windows are given."""
         from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
         start = self.start
@@ -151,7 +154,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Box:
-    """What is computed, in SI units: the box, its windows and the scan."""
+    """Request for the rollover box in SI units: the box, its windows and the scan."""
 
     tr: tuple[float, ...] = option(
         "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
@@ -203,7 +206,7 @@ class Box:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
+        """Refuse contradictory arguments."""
         if self.scan:
             lost = [name for name in ("tr", "write_as") if getattr(self, name)] + [
                 "drop"
@@ -229,12 +232,12 @@ class Box:
 
     @property
     def end(self) -> float:
-        """Last time [s]."""
+        """End of the simulation [s]."""
         return self.t_end or T_END[self.drop is not None]
 
     @property
     def parameters(self) -> Parameters:
-        """The model that is meant."""
+        """The parameters of the model."""
         from d2rpick.models.box_model import Parameters
 
         given = {
@@ -252,7 +255,7 @@ class Box:
 
     @property
     def windows(self) -> tuple[RigidWindow, ...]:
-        """In which it is rigid."""
+        """The windows in which the box is rigid."""
         from d2rpick.models.box_run import RigidWindow
 
         return tuple(map(RigidWindow, self.tr, self.td))
@@ -267,7 +270,7 @@ class Box:
 def _check_windows(
     starts: Sequence[float], ends: Sequence[float], t_end: float
 ) -> None:
-    """ArgumentError unless the times are pairs in order, within the run."""
+    """Raise ArgumentError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
         raise ArgumentError(
             "--tr and --td need each other, as many of the one as of the other"
@@ -288,7 +291,7 @@ def _check_windows(
 
 
 class Scanning:
-    """A scan that is about to be computed: the run without switching, what is recommended from it, and other tr."""
+    """A scan to be computed: the reference run, the recommendation from it, and the other tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -309,7 +312,7 @@ class Scanning:
             self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs; ``told`` is called with the number of those that are there."""
+        """Compute the runs; ``told`` is called with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 
@@ -324,7 +327,7 @@ class Scanning:
 
 
 def unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
+    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
     off = float(abs(record.imbalance).max())
     if off <= BALANCED:
         return ()

@@ -1,4 +1,4 @@
-"""What each td of a flight costs, and the plan of the rigid windows of all flights."""
+"""Find what each td of a flight costs, and plan the rigid windows of all flights."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
 
-_STEPS: Final = 200  # td that are explored
+_STEPS: Final = 200  # number of td that are explored
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Exploration(RunAnswer, trade_off.TradeOff):
-    """Answer of `explore`; nothing of it changes.
+    """Answer of `explore`; it is immutable.
 
-    ``offers`` are by ascending td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its
-    measures in ``best``; ``recommended`` is the one that `suggest` chooses, ``step`` the nearest unbeaten td with
-    half the error of ``start``, the td asked for or else the one that saves most.  ``answer`` says it in a sentence.
+    ``offers`` are sorted by td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its measures
+    in ``best``.  ``recommended`` is the offer that `suggest` chooses.  ``step`` is the nearest unbeaten td with half
+    the error of ``start``; ``start`` is the requested td or else the one that saves most.  ``answer`` is the result in
+    a sentence.
     """
 
     kind = "trade_off"
@@ -41,13 +42,13 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
     @property
     def answer(self) -> str:
-        """The shortest sensible answer."""
+        """The result in one sentence."""
         from d2rpick.report.trade_off import answer
 
         return answer(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per td, a column per single value of ``offers`` in the JSON; what is not known is NaN.
+        """Return a row per td and a column per single value of ``offers`` in the JSON; unknown values are NaN.
 
         Examples
         --------
@@ -70,7 +71,7 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the recommended pair."""
+        """Return the page, with the card of the recommended pair."""
         from d2rpick.report.pages import trade_off_page
 
         found = self.suggestion
@@ -136,7 +137,7 @@ def explore(
 def explored(
     asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
 ) -> Exploration:
-    """Find what each td in a window costs, or in the longest flight."""
+    """Find what each td costs in a window, or in the longest flight."""
     check_window("td_window", td_window)
     found = trade_off.explore_of(
         asked.reference, asked.settings, td_window, td=td, steps=steps
@@ -148,18 +149,18 @@ def explored(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Plan(RunAnswer, planning.Plan):
-    """Answer of `plan`; nothing of it changes.
+    """Answer of `plan`; it is immutable.
 
-    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
-    run supports, ``all_windows`` also those that wait for a switched run, ``next_run`` those that are done and
-    ``windows``: what the next run is switched in, none where no window is new; ``rigid_fraction`` is the share of the
-    record in which the parts are rigid by ``windows``.  Times in the unit of the run.
+    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``.  ``windows`` are the (tr, td) that this
+    run supports, ``all_windows`` also those that need a switched run first.  ``next_run`` are the windows of the next
+    run: those that are done and ``windows``, none if no window is new.  ``rigid_fraction`` is the share of the record
+    in which ``windows`` make the parts rigid.  Times in the unit of the run.
     """
 
     kind = name = "plan"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
+        """Return a row per flight and a column per key of ``windows`` in the JSON; unknown values are NaN.
 
         Examples
         --------
@@ -176,13 +177,13 @@ class Plan(RunAnswer, planning.Plan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""
+        """Print the card of the next run, judged as printed, with ``every`` new window or only the supported ones."""
         return self.printed(
             Cards.of(options), every=arguments.flag("every", every, False)
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card of the next run, its new windows judged; None where none is new."""
+        """Print the card of the next run, with its new windows judged; return None if no window is new."""
         new = self.all_windows if every else self.windows
         asked = self.question
         asked = asked._replace(reference=asked.reference._replace(history=self.history))
@@ -194,7 +195,7 @@ class Plan(RunAnswer, planning.Plan):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the cards of the next run."""
+        """Return the page, with the cards of the next run."""
         from d2rpick.report.pages import plan_page
 
         card = self._card_of_windows(cards or Cards())
@@ -210,7 +211,7 @@ class Plan(RunAnswer, planning.Plan):
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
-        """Give the card of the next run; None if nobody says whom it switches, or the bodies of the deck cannot."""
+        """Return the card of the next run; None if no parts are named, or the bodies of the deck cannot be switched."""
         try:
             suited, _ = cards.by_deck(self.question)
         except DeckError:
@@ -286,7 +287,7 @@ def planned(
     if done:
         from d2rpick.deck.printed_card import (
             check_windows,
-        )  # a plan alone does without decks
+        )  # imported here since a plan alone needs no decks
 
         windows = check_windows(done)
     earlier = asked.reference.like(before.files, asked.selection) if before else None
@@ -300,7 +301,7 @@ def planned(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # on its standard input, a line for each
+    )  # as on its standard input, a line for each
     times += [
         text
         for name in (before.sources if before else ())
@@ -312,16 +313,16 @@ def planned(
 def written(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
-    """Write a copy of the deck of a plan with a card of it, and check the copy by the history.
+    """Write a copy of a plan's deck with the card of the plan, and check the copy by the history.
 
-    Gives the names of the files, the main one first, and what is found in it.
+    Returns the names of the files, the main one first, and the findings in it.
     """
     from d2rpick.api.checking import check_written
     from d2rpick.deck.writing import write_deck
     from d2rpick.rules.judgement import HistoryJudge
 
     asked = plan.question
-    done = card.card.windows[: len(plan.done)]  # as printed
+    done = card.card.windows[: len(plan.done)]  # the times as printed
     names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
     judge = HistoryJudge(
         asked.reference.run, asked.request.selection(parts=False), plan.settings, done

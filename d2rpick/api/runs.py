@@ -1,4 +1,4 @@
-"""A run in the hands of a script: read from files, from memory, or taken from a table in pandas."""
+"""Give scripts a run: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """One run: its files, opened, and which columns of a table were named; nothing of it changes.
+    """One run: its opened files, and the named columns of a table; it is immutable.
 
-    It can be pickled: a copy, also in another process, holds the same bytes, or opens the same big files again.  Two
+    It can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.  Two
     runs are equal if the same bytes were read under the same names, in the same way.
 
-    ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
-    their content decided.  ``folder`` is the one that was named, in which the main deck is looked for.  Energies are
-    read when they are asked for.
+    ``files`` are the opened files, ``chosen`` the columns, ``input_format`` the format as which the files were read,
+    ``"auto"`` if their content decided.  ``folder`` is the folder that was named; the main deck is searched there.
+    Energies are read only when they are needed.
     """
 
     files: histories.Run
@@ -84,16 +84,16 @@ class Run:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that have histories of their own: ``id`` and ``title``."""
+        """Parts with their own histories: ``id`` and ``title``."""
         return self.files.parts
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out or assumed in reading."""
+        """What was left out or assumed while reading."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
-        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
+        """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
 
         The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
         folder that was read; False for none.
@@ -116,7 +116,7 @@ class Run:
         return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
-        """Give energies over time as a table, at full precision.
+        """Return energies over time as a table, at full precision.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Run:
             columns = {
                 part.name: energies[:, at] for at, part in enumerate(history.parts)
             }
-            # parts and the energy of their sum stand at the same times
+            # the parts and the energy of their sum have the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
             "source": list(history.source),
@@ -226,7 +226,7 @@ def read(
 
 
 def folder_of(names: Sequence[str]) -> str | None:
-    """Give the folder that names a run; None if files name it."""
+    """Return the folder that names a run; None if files name it."""
     import os
 
     return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
@@ -242,7 +242,8 @@ def from_frame(
 ) -> Run:
     """Take the energies of a run from a table of pandas, polars, pyarrow, xarray or numpy.
 
-    It is checked as the csv file is that ``frame.to_csv()`` writes: its times must rise, its values be finite numbers.
+    The table is checked like the CSV file that ``frame.to_csv()`` writes: times must rise, values must be finite
+    numbers.
 
     Parameters
     ----------
@@ -288,7 +289,7 @@ def from_frame(
 
 
 def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Make the index a column where it is the time; ValueError where nothing is."""
+    """Make the index a column if it is the time; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
@@ -313,7 +314,7 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
 
 
 def _seconds(column: pd.Series[Any]) -> pd.Series[Any]:
-    """Give timedeltas in seconds, other values as they are."""
+    """Convert timedeltas to seconds, and return other values unchanged."""
     return column.dt.total_seconds() if column.dtype.kind == "m" else column
 
 
@@ -336,7 +337,7 @@ def _opened(sources: list[Source], chosen: Selection, input_format: str | None) 
 
 
 def known_format(input_format: str | None) -> str:
-    """Give the name of a format, or ``"auto"``; ValueError for any other."""
+    """Return the name of a format, or ``"auto"``; raise ValueError for any other name."""
     from d2rpick.histories.formats import READERS
 
     if input_format is None:
@@ -355,7 +356,7 @@ def selection_of(
     energy: str | int | Iterable[str | int] | None,
     channels: Mapping[str, str | int] | None = None,
 ) -> Selection:
-    """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
+    """Return the selected columns; raise TypeError for other types, ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
     single = (
@@ -397,10 +398,10 @@ def selection_of(
 def extracted(
     run: histories.Run, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Give the columns of what is selected of a run, with all that is known at its times, and the notes on it.
+    """Return the selected columns of a run with all that is known at its times, and the notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
-    the momentum by which the flight is seen, each of shape (n,).
+    the momentum that shows the flight, each of shape (n,).
     """
     from d2rpick.choice.flights import momentum_of_flight
     from d2rpick.choice.question import Reference
@@ -419,9 +420,9 @@ def extracted(
 
 
 def _of_model(history: History) -> dict[str, Samples]:
-    """Columns of the whole model as its balance takes them, where they are written at the times of the energy.
+    """Return the columns of the whole model's energy balance that are written at the times of the energy.
 
-    The kinetic energy is that with rotation; the internal one is there where the chosen one is that of some parts.
+    The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The choice of switch times, and the verdict on a pair."""
+"""Choose switch times, and judge a pair of them."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Suggestion(RunAnswer, answers.Suggestion):
-    """Answer of `suggest`; nothing of it changes.
+    """Answer of `suggest`; it is immutable.
 
-    ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
-    are None, with the reason in ``warnings``; a better pair also where it is the recommended one; ``quality`` of the
+    ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
+    are None, with the reason in ``warnings``; the better pair may be the recommended pair.  ``quality`` of the
     recommended pair has ``grade`` good, fair or poor and ``reasons``.
     """
 
@@ -39,7 +39,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
     name = "suggest"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the candidates as a table at full precision.
+        """Return the candidates as a table at full precision.
 
         Returns
         -------
@@ -63,11 +63,11 @@ class Suggestion(RunAnswer, answers.Suggestion):
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
         return self.printed(Cards.of(options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
         pair = self.recommended
         asked = self.question
         judge = partial(
@@ -84,7 +84,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the recommended pair."""
+        """Return the page, with the card of the recommended pair."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import suggestion_page
 
@@ -99,10 +99,11 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verdict(RunAnswer, answers.Verdict):
-    """Answer of `verify`; nothing of it changes.
+    """Answer of `verify`; it is immutable.
 
-    ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where
-    the record does not tell; ``candidate`` has the measures of the pair; ``quality`` is None where it does not verify.
+    ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
+    None if the record does not show it.  ``candidate`` has the measures of the pair; ``quality`` is None if the pair is
+    not verified.
     """
 
     compared: Run | None = None
@@ -115,7 +116,7 @@ class Verdict(RunAnswer, answers.Verdict):
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
+        """Return the measures of the pair as a table of one row with the columns of the CSV; unknown values are NaN.
 
         Examples
         --------
@@ -140,7 +141,7 @@ class Verdict(RunAnswer, answers.Verdict):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the pair where it is good."""
+        """Return the page, with the card of the pair if it is good."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import verdict_page
 
@@ -296,7 +297,7 @@ def verify(
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse to judge no pair: without a switched run both times are needed."""
+    """Refuse an incomplete pair: without a switched run both times are needed."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
@@ -310,7 +311,7 @@ def judged(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, of which its times are read where they are not given."""
+    """Judge a pair, also by a finished switched run, from which times that are not given are read."""
     check_pair(tr, td, switched)
     other = switched and asked.reference.like(switched.files, asked.selection)
     if other and (tr is None or td is None):

@@ -1,4 +1,4 @@
-"""The commands ``card``, ``check`` and ``rule``: what stands in decks about the switches."""
+"""Define the commands ``card``, ``check`` and ``rule`` for the switching cards in decks."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def card(
 def _windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
-    """Pair the times, or read them from the file; UsageError where they do not say windows."""
+    """Return the windows from pairs of times or from the file; raise UsageError if neither gives windows."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")

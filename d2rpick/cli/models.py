@@ -1,4 +1,4 @@
-"""The commands ``replay``, ``rollover`` and ``reproduce``: runs that are computed here."""
+"""Define the commands ``replay``, ``rollover`` and ``reproduce``, which compute sample runs."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """One run; for a plot also the one without switching."""
+    """Compute one run; for a plot also the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, format_of
 
     form = box.write_as or format_of(output.output_file, HISTORIES)
@@ -125,7 +125,7 @@ def _run(box: Box, output: Output) -> None:
 
 
 def _scan(box: Box, output: Output) -> None:
-    """Many switched runs, the tr that the tool recommends among them."""
+    """Compute many switched runs, among them that with the recommended tr."""
     output = output.beside()
     scanning = Scanning(box)
     plot = output.plot

@@ -1,4 +1,4 @@
-"""The commands about one run: ``info``, ``extract``, ``suggest``, ``explore``, ``verify``, ``parts`` and ``plan``."""
+"""Define the commands for one run: ``info``, ``extract``, ``suggest``, ``explore``, ``verify``, ``parts``, ``plan``."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def suggest(
     with opened(request, output) as (run, output):
         asked = ask(run, request, merge=cards.merge)
     answer = suggested(asked, wanted)
-    # a td that was given is answered, however poor it is
+    # a given td is answered, however poor it is
     least = request.min_quality or ("poor" if td is not None else "fair")
     passed = answer.decision is not None and answer.decision.reaches(least)
     told = [
@@ -452,7 +452,7 @@ def plan(
 
 
 def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Cautions of the card that the plan has not: those of windows that do not verify, and those of the card itself."""
+    """Return the cautions of the card that the plan lacks: of unverified windows, and of the card itself."""
     if card is None:
         return []
     failed = tuple(
@@ -468,7 +468,7 @@ def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Refuse to copy no deck, and a card that switches nobody, before a file is opened."""
+    """Refuse to copy a deck that is not given, or to write a card without parts, before a file is opened."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -480,14 +480,14 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy, and check it by the history.
+    """Write the copy of the deck, and check it by the history.
 
     Returns
     -------
     text : str
-        The files written, and below them what ``check --history`` prints of the deck.
+        The written files, and below them the output of ``check --history`` for the deck.
     passed : bool
-        Whether no finding is an error.
+        True if no finding is an error.
     """
     from d2rpick.api.plans import written
 

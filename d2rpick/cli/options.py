@@ -1,4 +1,4 @@
-"""Options of the commands, made from the tables of what can be asked; ``--show-settings``, and the line to repeat."""
+"""Make the options of the commands from the tables of requests; write ``--show-settings`` and the line to repeat."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # a command function; click's decorators do not say more
+Decorated = Any  # a command function; click's decorators have no closer type
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
-HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
+HISTORY: Final = "HISTORY"  # stands for the argument, not for the option of that name
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
@@ -48,7 +48,7 @@ DECK: Final = (
 DECK_OF_PARTS: Final = (
     f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
 )
-# Sections of the help, behind the options of a command that are in none.
+# Sections of the help, after the options of a command that belong to no section.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
         *(
@@ -88,7 +88,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
 }
-# Options that write files, which the same command would find the next time.
+# Options that write files, which would already exist when the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -98,10 +98,10 @@ _SOURCES: Final = {
 
 
 class Command(Documented):
-    """A command that can show its settings instead of running, and names options where arguments make no sense."""
+    """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line; what neither it nor the environment gives, the settings may."""
+        """Read the command line; the settings file fills in what neither it nor the environment gives."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
@@ -120,7 +120,7 @@ class Command(Documented):
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the options in groups, each where it is looked for."""
+        """Write the options in groups by their subject."""
         shown = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
         records = {
             spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown
@@ -135,18 +135,18 @@ class Command(Documented):
                     formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; UsageError for what makes no sense together."""
+        """Run the command; raise UsageError for contradictory options."""
         if not ctx.params.get("quiet"):
             for note in ctx.meta["d2rpick.unused"]:
                 tell(f"note: {note}")
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(text_bytes("\n".join(_settings(ctx))))
         if (words := words_of(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # not above: start-up
+            import shlex  # imported here to keep the start fast
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
-        # Numpy before the modules of a run: its import makes many calls, and as deep as theirs each may meet the end of
-        # a piece of the stack of Python 3.11, which maps memory for it and unmaps it again.
+        # Import numpy before the modules of a run: its import makes many nested calls, and each may meet the end of a
+        # piece of the stack of Python 3.11, which then maps memory for it and unmaps it again.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401
         try:
@@ -156,7 +156,7 @@ class Command(Documented):
 
 
 class Either(click.Option):
-    """An option that excludes others: what the environment says of it gives way to those on the command line."""
+    """An option that excludes others: its environment variable is ignored if the command line has one of those."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -165,7 +165,7 @@ class Either(click.Option):
     def consume_value(
         self, ctx: click.Context, opts: Any
     ) -> tuple[Any, ParameterSource]:
-        """Find the value and its source; click has done so before for all that is on the command line."""
+        """Return the value and its source; click has already done so for all options on the command line."""
         value, source = super().consume_value(ctx, opts)
         typed = (
             ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
@@ -184,18 +184,18 @@ def command(function: Decorated) -> click.Command:
 def takes(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **other: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command options of tables, passed on as one object for each, by the name of its class in small letters.
+    """Give a command the options of tables; it gets one object per table, named like its class in lower case.
 
     Parameters
     ----------
     *names : str
-        Of options, in the order of the help.
+        Names of options, in the order of the help.
     of : sequence of classes
         The tables.
     forms : str
         Forms of the result, the first by default.
     **other : str or dict
-        Of an option by its name: the help of this command, or what click is told otherwise.
+        For an option by its name: the help text for this command, or other arguments of click.
     """
     tables = {table: [one for one in names if one in options_of(table)] for table in of}
     if HISTORY in names:
@@ -249,7 +249,7 @@ def takes(
 def _shared(
     decorate: Callable[[Decorated], Decorated],
 ) -> Callable[[Decorated], Decorated]:
-    """Give all commands the same object of an option: a module has commands, of which one is called."""
+    """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
     made = decorate(lambda: None).__click_params__[0]
     again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
     return click.option(cls=again)
@@ -281,7 +281,7 @@ def _decorator(
 
 
 def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
-    """Make click's option of an entry of a table."""
+    """Make click's option from an entry of a table."""
     about: dict[str, Any] = {"help": one.help, "metavar": one.metavar}
     if one.kind == "flag":
         about["is_flag"] = True
@@ -318,7 +318,7 @@ def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
 def file(
     name: str, text: str, metavar: str = "FILE", **more: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file, or ``many`` of them, one each time.
+    """Make an option of one command that names a file, or ``many`` files, by repeating the option.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
@@ -340,12 +340,12 @@ def windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; None without one."""
+    """Open the history by which cards are judged; return None without one."""
     if not request.history:
         return None
     from d2rpick.api.asked import (
         open_run,
-    )  # not above: without a history nothing is computed
+    )  # imported here since nothing is computed without a history
 
     return open_run(request)
 
@@ -354,7 +354,7 @@ def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
     ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
 
 
-# What every command can be told and none asks for itself: it is kept in the context.
+# Options that every command accepts but none uses itself: they are kept in the context.
 _FLAGS: Final = [
     _shared(
         click.option(
@@ -376,9 +376,9 @@ _FLAGS: Final = [
 
 
 def repeat() -> list[str]:
-    """Give the command line that was typed, and before it the environment variables that set options.
+    """Return the typed command line, preceded by the environment variables that set options.
 
-    It may replace the files that it has written, so that it can be typed again.
+    The line may overwrite the files that it has written, so that it can be run again.
     """
     context = click.get_current_context()
     names = [
@@ -396,7 +396,7 @@ def repeat() -> list[str]:
 
 
 def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
-    """Add options to a command line, before the names that are behind ``--``.
+    """Add options to a command line, before the names that follow ``--``.
 
     Examples
     --------
@@ -408,7 +408,7 @@ def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
 
 
 def _settings(ctx: click.Context) -> Iterator[str]:
-    """Write every option with its value, and where that comes from."""
+    """Yield a line for every option with its value and the source of the value."""
     from d2rpick.report.tables import as_json
 
     for one in ctx.command.get_params(ctx):
@@ -430,5 +430,5 @@ def _source(ctx: click.Context, name: str) -> str:
 
 
 def _variable(ctx: click.Context, name: str) -> str:
-    """Name of the environment variable that sets an option."""
+    """Return the name of the environment variable that sets an option."""
     return f"{ctx.auto_envvar_prefix}_{name.upper()}"

@@ -1,4 +1,4 @@
-"""The commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
+"""Define the commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How options get their values: the kinds there are, how the shell completes them, and defaults from a file."""
+"""Define the kinds of option values, their completion by the shell, and their defaults from a settings file."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # generic from click 8.4 on
+    FloatType = click.ParamType  # generic since click 8.4
 
 CARDS: Final = tuple(options_of(Cards))
-# What counts only beside one of other options: settings are for all commands, and not all of them are asked for it.
+# Options that apply only together with one of others: settings are for all commands, even those that lack these.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -35,7 +35,7 @@ _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
 
 
 class NumberType(FloatType):
-    """A finite number with a point within its limits."""
+    """A finite number with a decimal point, within its limits."""
 
     name = "number"
 
@@ -45,7 +45,7 @@ class NumberType(FloatType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read a number or fail with what was found and what was expected."""
+        """Read a number, or fail with the value found and the values allowed."""
         try:
             number = float(value)
         except ValueError:
@@ -61,14 +61,14 @@ class NumberType(FloatType):
 
 
 class File(click.types.StringParamType):
-    """Name of a file or folder, for the shell to complete."""
+    """Name of a file or folder, completed by the shell."""
 
     envvar_list_splitter = ";"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Take a name; one with a NUL byte, which only a program can give, is none of a file."""
+        """Return a name; a NUL byte, which only a program can pass, is refused."""
         name = super().convert(value, param, ctx)
         if "\0" in name:
             self.fail(
@@ -84,28 +84,28 @@ class File(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Leave it to the shell."""
+        """Leave the completion to the shell."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
 
 
 class OutputFile(File):
-    """Name of a file or folder to write, which no settings file may choose."""
+    """Name of a file or folder to be written, which a settings file must not set."""
 
 
 class Program(click.types.StringParamType):
-    """Command that is started, or the address of a cluster that computes: no settings file may choose either."""
+    """A command to be started, or the address of a computing cluster: a settings file must not set either."""
 
 
 class Names(click.types.StringParamType):
-    """Names that are separated by semicolons in an environment variable, since labels hold blanks."""
+    """Names, separated by semicolons in an environment variable, since labels may contain blanks."""
 
     envvar_list_splitter = ";"
 
 
 class PartNames(Names):
-    """Numbers and titles of parts, for the shell to complete from the history that was typed before."""
+    """Ids and titles of parts, completed from the history on the command line."""
 
     def shell_complete(
         self,
@@ -113,7 +113,7 @@ class PartNames(Names):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the parts of the files that were typed before, and the words for several."""
+        """Offer the parts of the files on the command line, and the words for several parts."""
         run = _typed_run(ctx)
         parts = run.parts if run else ()
         words = [
@@ -137,7 +137,7 @@ class RuleIds(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the rules that begin so, with what they say."""
+        """Offer the rules with this prefix and their summaries."""
         from d2rpick.report.findings import as_list
 
         rows = (line.split(maxsplit=2) for line in as_list().split("\n"))
@@ -147,7 +147,7 @@ class RuleIds(click.types.StringParamType):
 
 
 class ChannelNames(Names):
-    """Names of channels, for the shell to complete from the history that was typed before."""
+    """Names of channels, completed from the history on the command line."""
 
     def shell_complete(
         self,
@@ -155,7 +155,7 @@ class ChannelNames(Names):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the channels of the files that were typed before; underscores stand for blanks, as they may."""
+        """Offer the channels of the files on the command line, with underscores for blanks, which are equivalent."""
         run = _typed_run(ctx)
         return _completed(
             [(name.replace(" ", "_"), "") for name in (run.channels if run else ())],
@@ -164,7 +164,7 @@ class ChannelNames(Names):
 
 
 def _typed_run(ctx: click.Context) -> Run | None:
-    """Open the files that were typed before; None where they are none of a run."""
+    """Open the files on the command line; return None if they are no run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -172,7 +172,7 @@ def _typed_run(ctx: click.Context) -> Run | None:
 
     words = ctx.meta.get("d2rpick.command", ())[
         1:
-    ]  # click has read no argument yet when an option is completed
+    ]  # click has not read any argument yet when an option is completed
     try:
         return read([word for word in words if Path(word).exists()])
     except (D2RPickError, OSError, ValueError):
@@ -182,7 +182,7 @@ def _typed_run(ctx: click.Context) -> Run | None:
 def _completed(
     offered: Iterable[tuple[str, str]], incomplete: str
 ) -> list[CompletionItem]:
-    """Give the names that begin with what was typed; what a shell would take apart is left out."""
+    """Return the names with this prefix, without those that a shell would split."""
     import re
 
     from click.shell_completion import CompletionItem
@@ -196,14 +196,14 @@ def _completed(
 
 
 class SolverName(click.types.StringParamType):
-    """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
+    """Name of a solver whose input can be printed; the table of solvers is imported only when it is needed."""
 
     name = "solver"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str:
-        """Take a name or fail with those there are."""
+        """Return the name, or fail with the allowed names."""
         if value not in solvers():
             self.fail(
                 f"{value!r} was found, one of {', '.join(solvers())} was expected",
@@ -213,7 +213,7 @@ class SolverName(click.types.StringParamType):
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Show the names in the help."""
+        """Return the names for the help."""
         return f"[{'|'.join(solvers())}]"
 
     def shell_complete(
@@ -222,7 +222,7 @@ class SolverName(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the names that begin so."""
+        """Offer the names with this prefix."""
         return _completed([(name, "") for name in solvers()], incomplete)
 
 
@@ -240,7 +240,7 @@ _NAMED: Final = {
 
 
 def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
-    """Give the type by which click reads a kind of value."""
+    """Return the type by which click reads a kind of value."""
     if isinstance(kind, str):
         return _NAMED[kind]
     if isinstance(kind, range):
@@ -253,15 +253,15 @@ def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
 def settings_of(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Values of options by name, as the ``table`` of settings gives them that was read from ``source``.
+    """Return the values of options by name from the ``table`` of settings that was read from ``source``.
 
-    Keys of all commands stand above, those of one command in a table of its name.  ``without`` holds what the command
-    line and the environment give: what they exclude counts for nothing.
+    Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
+    context with the command line and the environment: settings that these exclude are ignored.
 
     Raises
     ------
     ConfigurationError
-        For a key that is no option, or a value that is none of it.
+        For a key that is no option, or a value that its option does not allow.
     """
     own = {
         option: _value(ctx, option, value, place)
@@ -283,7 +283,7 @@ def settings_of(
 def _given(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
-    """Options of a command that the settings name, with what stands there and where; unknown keys are refused."""
+    """Yield the options of a command in the settings, with value and position; unknown keys are refused."""
     tables = {name: one for name, one in table.items() if isinstance(one, Mapping)}
     shared = {
         name: one for name, one in table.items() if name not in (*tables, *RULE_KEYS)
@@ -306,7 +306,7 @@ def _given(
 
 
 def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> Any:
-    """Read the value of an option; files lie where the settings do."""
+    """Read the value of an option; relative file names start from the folder of the settings."""
     _refuse_dangerous(option, place)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
@@ -323,7 +323,7 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
         raise ConfigurationError(f"{place}: {error.message}") from None
     if not isinstance(option.type, File):
         return found
-    from pathlib import Path  # mostly no file is among the settings
+    from pathlib import Path  # imported here since settings rarely contain a file
 
     folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
     if has_list:
@@ -332,10 +332,12 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
 
 
 def _refuse_dangerous(option: click.Option, place: str) -> None:
-    """Refuse what would start a program, write a file or replace one: the settings may be those of somebody else."""
+    """Refuse to start a program or write a file from settings, which another person may have written."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
         what = "programs, output files and overwrite are never taken from a file"
-    elif not option.expose_value:  # --help, --debug and others that are about one call
+    elif (
+        not option.expose_value
+    ):  # --help, --debug and others that concern a single call
         what = "this is never taken from a file"
     else:
         return
@@ -345,7 +347,7 @@ def _refuse_dangerous(option: click.Option, place: str) -> None:
 
 
 def _fits(option: click.Option, value: object) -> bool:
-    """Return whether a single value from a TOML file is of the kind that an option takes."""
+    """Return True if a single value from a TOML file has the kind of the option."""
     if option.is_flag or isinstance(value, bool):
         return option.is_flag and isinstance(value, bool)
     if isinstance(option.type, File):
@@ -358,7 +360,7 @@ def _fits(option: click.Option, value: object) -> bool:
 
 
 def _expected_kind(option: click.Option) -> str:
-    """Say which kind of value an option takes."""
+    """Return the name of the kind of value that an option takes."""
     if option.is_flag:
         return "true or false"
     if isinstance(option.type, File):
@@ -374,7 +376,7 @@ def _counts(
     given: Mapping[str, Any],
     asked: Mapping[Any, Any],
 ) -> bool:
-    """Whether a setting counts, beside the options that are ``given``, and with all that is ``asked``."""
+    """Return True if a setting applies, with the ``given`` options and all options in ``asked``."""
     if any(name in given for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (
@@ -391,7 +393,7 @@ def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
 
 
 def words_of(ctx: click.Context) -> Sequence[str]:
-    """Write the options that settings gave as they are typed."""
+    """Return the options from the settings as they are typed."""
     of_settings = (
         one
         for one in ctx.command.params
@@ -406,5 +408,5 @@ def words_of(ctx: click.Context) -> Sequence[str]:
 
 
 def spelled(option: click.Option) -> str:
-    """Spell an option in full, as in the settings."""
+    """Return the long name of an option, as in the settings."""
     return max(option.opts, key=len)[2:]
