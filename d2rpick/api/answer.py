@@ -48,11 +48,11 @@ class Answer:
     said: ClassVar[tuple[str, ...]] = ()  # attributes that a short form shows
 
     @classmethod
-    def of(cls, found: Any, **more: Any) -> Self:
+    def of(cls, result: Any, **further_fields: Any) -> Self:
         """Make the public answer from a result of the core; ``cautions`` are added after those of the result."""
-        known = {one.name: getattr(found, one.name) for one in fields(found)}
-        known["cautions"] = (*known["cautions"], *more.pop("cautions", ()))
-        return cls(**known, **more)
+        values = {field.name: getattr(result, field.name) for field in fields(result)}
+        values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
+        return cls(**values, **further_fields)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Answer) or type(other) is not type(self):
@@ -63,21 +63,21 @@ class Answer:
         return hash((self.kind, *self.command))
 
     def __repr__(self) -> str:
-        shown = ", ".join(
+        contents = ", ".join(
             f"{name}={getattr(self, name)!r}" for name in (*self.said, "warnings")
         )
-        return f"{type(self).__name__}({shown})"
+        return f"{type(self).__name__}({contents})"
 
     @property
     def warnings(self) -> tuple[Caution, ...]:
         """All warnings, each with ``code`` and ``message``."""
         return self.cautions
 
-    def text(self, form: str, shown: Shown) -> str:
+    def text(self, form: str, display: Shown) -> str:
         """Return the answer in a form of the command line."""
         from d2rpick.report.formats import write
 
-        return write(self.kind, form, self, shown)
+        return write(self.kind, form, self, display)
 
     def to_json(self) -> str:
         """Return the JSON document of the command line; it names its schema."""
@@ -89,8 +89,8 @@ class Answer:
         """Return the JSON document of the command line as a dictionary."""
         import json
 
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
+        document: dict[str, Any] = json.loads(self.to_json())
+        return document
 
 
 class Paged(Answer):
@@ -119,9 +119,7 @@ class Paged(Answer):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,  # noqa: ARG002
     ) -> str:
-        """Return the page; ``command`` repeats the answer, ``judging`` are the options with which ``card`` judges
-        alike.
-        """
+        """Return the page; ``command`` repeats it, ``judging`` are the options with which ``card`` judges alike."""
         from d2rpick.report import pages
 
         written: str = getattr(pages, f"{self.kind}_page")(self, command)
@@ -154,10 +152,16 @@ class RunAnswer(Paged):
         return (self.name, *self.times, *self.question.options)
 
     @classmethod
-    def about(cls, asked: Asked, found: Any, *times: str, **more: Any) -> Self:
+    def about(
+        cls, question: Asked, result: Any, *times: str, **further_fields: Any
+    ) -> Self:
         """Make the public answer from a question and the result of the core, with the cautions of the question."""
         return cls.of(
-            found, cautions=asked.cautions, question=asked, times=times, **more
+            result,
+            cautions=question.cautions,
+            question=question,
+            times=times,
+            **further_fields,
         )
 
     def _context(
@@ -194,11 +198,11 @@ class RunAnswer(Paged):
             self.question.reference, situation, tr, suited.request(self.question)
         )
 
-    def _explorer(self, found: Iterable[TradeOff | None]) -> Any:
+    def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
         """Return what can be explored on a page, and the command line that asks for each td."""
         from d2rpick.report.page import Explorer
 
-        trade_offs = tuple(one for one in found if one)
+        trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
         if trade_offs:
             return Explorer(
                 trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)
@@ -212,9 +216,9 @@ def written(path: arguments.Path, page: str) -> Path:
 
     from d2rpick.api import arguments
 
-    place = Path(*arguments.paths("path", path))
-    write_as_a_whole(place, page.encode())
-    return place
+    target = Path(*arguments.paths("path", path))
+    write_as_a_whole(target, page.encode())
+    return target
 
 
 def frame_of(

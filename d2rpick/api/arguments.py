@@ -77,12 +77,12 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
         raise TypeError(
             f"{name} is {_shown(value)}, a number was expected{without_unit(value)}"
         )
-    found = float(value)  # type: ignore[arg-type]
-    if not math.isfinite(found):
-        raise ValueError(f"{name} is {found}, a finite number was expected")
-    if limit := limits.missed(found):
-        raise ValueError(f"{name} is {found:g}, a number {limit} was expected")
-    return found
+    converted = float(value)  # type: ignore[arg-type]
+    if not math.isfinite(converted):
+        raise ValueError(f"{name} is {converted}, a finite number was expected")
+    if limit := limits.missed(converted):
+        raise ValueError(f"{name} is {converted:g}, a number {limit} was expected")
+    return converted
 
 
 def is_number(value: object) -> bool:
@@ -140,15 +140,15 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
     """
     if value is None:
         return []
-    found = []
+    windows = []
     for number_of_pair, pair in enumerate(_each(name, value, "pairs of times")):
         times = window(f"{name}[{number_of_pair}]", pair)
         if times is None:
             raise TypeError(
                 f"{name}[{number_of_pair}] is None, a pair of times was expected"
             )
-        found.append(times)
-    return found
+        windows.append(times)
+    return windows
 
 
 def with_point(value: object) -> str:
@@ -203,12 +203,12 @@ def window(name: str, value: object) -> tuple[float, float] | None:
     if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
         raise TypeError(f"{name} is {_shown(value)}, a pair of times was expected")
     first, last = list(value)  # type: ignore[call-overload]
-    found = number(f"{name}[0]", first), number(f"{name}[1]", last)
-    if not found[0] < found[1]:
+    times = number(f"{name}[0]", first), number(f"{name}[1]", last)
+    if not times[0] < times[1]:
         raise ValueError(
-            f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first"
+            f"{name} is {times[0]:g} to {times[1]:g}, which is empty; the lower time comes first"
         )
-    return found
+    return times
 
 
 def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
@@ -230,14 +230,14 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         listed = [value]
     else:
         listed = list(_each(name, value, "a number, a title or several"))
-    for one in listed:
-        if not (isinstance(one, str) or is_whole_number(one)):
+    for part in listed:
+        if not (isinstance(part, str) or is_whole_number(part)):
             raise TypeError(
-                f"{name} holds {_shown(one)}; numbers and titles of parts were expected"
+                f"{name} holds {_shown(part)}; numbers and titles of parts were expected"
             )
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
-    return tuple(str(one) for one in listed)
+    return tuple(str(part) for part in listed)
 
 
 def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
@@ -254,9 +254,9 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
         listed = [value]
     else:
         listed = list(_each(name, value, "ids of rules"))
-    for one in listed:
-        if not isinstance(one, str):
-            raise TypeError(f"{name} holds {one!r}; ids of rules were expected")
+    for rule in listed:
+        if not isinstance(rule, str):
+            raise TypeError(f"{name} holds {rule!r}; ids of rules were expected")
     return tuple(listed)
 
 
@@ -286,18 +286,18 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
         listed = [value]
     else:
         listed = list(_each(name, value, "a path or several"))
-    for one in listed:
-        if not isinstance(one, str | os.PathLike):
-            raise TypeError(f"{name} holds {_shown(one)}; paths were expected")
+    for path in listed:
+        if not isinstance(path, str | os.PathLike):
+            raise TypeError(f"{name} holds {_shown(path)}; paths were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a file or folder")
-    found = tuple(os.fsdecode(one) for one in listed)
-    for one in found:
-        if "\0" in one:
+    names = tuple(os.fsdecode(path) for path in listed)
+    for path in names:
+        if "\0" in path:
             raise ValueError(
-                f"{name} holds {one!r} with a NUL byte, which no name of a file has"
+                f"{name} holds {path!r} with a NUL byte, which no name of a file has"
             )
-    return found
+    return names
 
 
 def check_run(name: str, run: object) -> None:
@@ -308,51 +308,59 @@ def check_run(name: str, run: object) -> None:
         hasattr(run, "files") and hasattr(run, "overview")
     ):  # imported here since its class imports this module
         if isinstance(run, str | os.PathLike):
-            found = repr(run)
+            description = repr(run)
         else:
-            found = f"of type {type(run).__name__}"
-        made = "from_frame(...)" if is_table(run) else "read(...)"
-        raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
+            description = f"of type {type(run).__name__}"
+        function = "from_frame(...)" if is_table(run) else "read(...)"
+        raise TypeError(
+            f"{name} is {description}; give what d2rpick.{function} makes of it"
+        )
 
 
 def refuse_unknown(
-    name: str, known: Iterable[str], others: Iterable[str] = ()
+    name: str, known_names: Iterable[str], other_names: Iterable[str] = ()
 ) -> NoReturn:
     """Raise the TypeError of an unknown argument, and suggest the most similar of all names."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, {*known, *others} - {name}, 1)
-    meant = f"is {near[0]!r} meant?" if near else f"expected one of {', '.join(known)}"
+    near = get_close_matches(name, {*known_names, *other_names} - {name}, 1)
+    meant = (
+        f"is {near[0]!r} meant?"
+        if near
+        else f"expected one of {', '.join(known_names)}"
+    )
     raise TypeError(f"there is no argument {name!r}; {meant}")
 
 
 def chosen(choosing: Choosing) -> dict[str, Any]:
     """Return the fields of a request that contain how to choose."""
-    known = Choosing.__annotations__
-    if unknown := [name for name in choosing if name not in known]:
+    annotations = Choosing.__annotations__
+    if unknown := [name for name in choosing if name not in annotations]:
         refuse_unknown(
-            unknown[0], known, ("parts", "flying", "deck", "weights", "td_window")
+            unknown[0], annotations, ("parts", "flying", "deck", "weights", "td_window")
         )
-    given: dict[str, Any] = dict(choosing)
-    oscillator = _check_oscillator(given.pop("oscillator", None))
-    if (oscillator is None) != (given.get("v0") is None):
+    arguments: dict[str, Any] = dict(choosing)
+    oscillator = _check_oscillator(arguments.pop("oscillator", None))
+    if (oscillator is None) != (arguments.get("v0") is None):
         raise ValueError(
             "oscillator and v0 go together: the one vibrates because of the other"
         )
-    if given.get("tolerance", 0.0) is None:
-        del given["tolerance"]
-    check_grade(given.get("min_quality"))
+    if arguments.get("tolerance", 0.0) is None:
+        del arguments["tolerance"]
+    check_grade(arguments.get("min_quality"))
     of_other_kinds = {"replay", "strict", "keep_vibration", "fit_window", "min_quality"}
-    for name in given.keys() - of_other_kinds:
+    for name in arguments.keys() - of_other_kinds:
         limits: Any = OPTIONS[name].kind
-        if given[name] is not None:
-            given[name] = number(name, given[name], limits)
-    given["fit_window"] = window("fit_window", given.get("fit_window"))
-    given["no_verify"] = not flag("replay", given.pop("replay", None), True)
-    given["strict"] = flag("strict", given.get("strict"), False)
-    given["keep_vibration"] = flag("keep_vibration", given.get("keep_vibration"), False)
+        if arguments[name] is not None:
+            arguments[name] = number(name, arguments[name], limits)
+    arguments["fit_window"] = window("fit_window", arguments.get("fit_window"))
+    arguments["no_verify"] = not flag("replay", arguments.pop("replay", None), True)
+    arguments["strict"] = flag("strict", arguments.get("strict"), False)
+    arguments["keep_vibration"] = flag(
+        "keep_vibration", arguments.get("keep_vibration"), False
+    )
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
-    return given | {
+    return arguments | {
         name: float(getattr(oscillator, name))
         for name in of_oscillator
         if oscillator is not None
@@ -413,16 +421,16 @@ def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
         or getattr(value, "ndim", 1) == 0
     ):
         raise TypeError(f"{name} is {_shown(value)}; {expected} were expected")
-    found: Iterable[Any] = value
-    return found
+    values: Iterable[Any] = value
+    return values
 
 
 def one_path(name: str, value: Path) -> str:
     """Return the name of a single file."""
-    found = paths(name, value)
-    if len(found) > 1:
-        raise ValueError(f"{name} names {len(found)} files, one was expected")
-    return found[0]
+    names = paths(name, value)
+    if len(names) > 1:
+        raise ValueError(f"{name} names {len(names)} files, one was expected")
+    return names[0]
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:

@@ -159,7 +159,7 @@ def ask(
 
         settings, cautions = with_deck(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
-    asked = Asked(
+    question = Asked(
         run,
         request,
         reference,
@@ -170,7 +170,7 @@ def ask(
         cautions,
         of_this_run=not foreign,
     )
-    return asked if merge is None else _merged(asked, merge)
+    return question if merge is None else _merged(question, merge)
 
 
 def model_of(request: Request) -> CostModel | None:
@@ -236,23 +236,23 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
             )
 
 
-def _merged(asked: Asked, merge: int) -> Asked:
+def _merged(question: Asked, merge: int) -> Asked:
     """Make the parts one rigid body, with a caution if nothing connects them."""
     from d2rpick.choice.deck_of_run import merged
 
-    parts = asked.reference.history.parts
+    parts = question.reference.history.parts
     if not parts:
-        return asked
-    cautions = asked.cautions
-    bodies = asked.settings.bodies or ()
+        return question
+    cautions = question.cautions
+    bodies = question.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
-        found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        message = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
         cautions = (
             *cautions,
-            Caution("merged-apart", f"{found}; leave it out to keep them apart"),
+            Caution("merged-apart", f"{message}; leave it out to keep them apart"),
         )
     body = merged({part.id for part in parts} | {merge}, bodies)
-    return asked._replace(
-        settings=replace(asked.settings, bodies=(body,)), cautions=cautions
+    return question._replace(
+        settings=replace(question.settings, bodies=(body,)), cautions=cautions
     )

@@ -86,7 +86,7 @@ def _checked(name: str, value: Any, option: Option) -> Any:
         )
         if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
             raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
-        return tuple(arguments.whole(name, one, _IDS.start) for one in value)
+        return tuple(arguments.whole(name, number, _IDS.start) for number in value)
     if isinstance(kind, range):
         return arguments.whole(name, value, kind.start)
     if isinstance(kind, Number):
@@ -153,18 +153,18 @@ class Cards:
     ] = ()  # main nodes of bodies to be removed from the starter deck
 
     @classmethod
-    def of(cls, given: CardOptions) -> Cards:
+    def of(cls, arguments_of_card: CardOptions) -> Cards:
         """Check the arguments of Python; raise TypeError or ValueError for a wrong one."""
         from d2rpick.api import arguments
 
-        known = options_of(Cards)
-        if unknown := [name for name in given if name not in known]:
-            arguments.refuse_unknown(unknown[0], known)
+        known_options = options_of(Cards)
+        if unknown := [name for name in arguments_of_card if name not in known_options]:
+            arguments.refuse_unknown(unknown[0], known_options)
         return cls(
             **{
-                name: _checked(name, one, known[name])
-                for name, one in given.items()
-                if one is not None
+                name: _checked(name, option_value, known_options[name])
+                for name, option_value in arguments_of_card.items()
+                if option_value is not None
             }
         )
 
@@ -181,9 +181,9 @@ class Cards:
         """Return the content of a card besides its times and its solver."""
         from d2rpick.deck.printed_card import Printing
 
-        given = {name: getattr(self, name) for name in self.given}
+        values = {name: getattr(self, name) for name in self.given}
         if self.node:
-            given["node"] = tuple(numbers("--node", self.node))
+            values["node"] = tuple(numbers("--node", self.node))
         return Printing(
             part=tuple(parts),
             starter=self.starter,
@@ -191,24 +191,31 @@ class Cards:
             replaced=self.replaced,
             delete_nodal_bodies=self.delete_nodal_bodies,
             delete_node_sets=self.delete_node_sets,
-            **given,
+            **values,
         )
 
     def check_solver(self, solver: str) -> None:
         """Refuse options that have no place in the input of ``solver``."""
         from d2rpick.deck.printing import SOLVERS
 
-        places = {name: {one.switches, *one.takes} for name, one in SOLVERS.items()}
+        options_by_solver = {
+            name: {solver_or_input.switches, *solver_or_input.takes}
+            for name, solver_or_input in SOLVERS.items()
+        }
         for name in self.given:
-            if name not in places[solver]:
-                owner = next(one for one, takes in places.items() if name in takes)
+            if name not in options_by_solver[solver]:
+                owner = next(
+                    solver_or_input
+                    for solver_or_input, takes in options_by_solver.items()
+                    if name in takes
+                )
                 if self.solver:
                     hint = ""
                 else:
                     hint = f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
-    def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
+    def by_deck(self, question: Asked) -> tuple[Cards, tuple[str, ...]]:
         """Complete the options of a card from the deck of the run, unless they are given.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
@@ -219,28 +226,28 @@ class Cards:
         DeckError
             If the deck cannot be read, or rigid bodies of it cannot switch the parts.
         """
-        deck = asked.deck
-        parts = [part.id for part in asked.reference.history.parts or ()]
+        deck = question.deck
+        parts = [part.id for part in question.reference.history.parts or ()]
         if deck is None:
             return self, ()
         from d2rpick.deck.suiting import find_suiting
 
-        found = find_suiting(deck, parts)
-        cards = replace(self, solver=self.solver or found.solver)
-        if found.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
+        suiting = find_suiting(deck, parts)
+        cards = replace(self, solver=self.solver or suiting.solver)
+        if suiting.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
             cards = replace(
                 cards,
-                swset=cards.swset or found.swset,
-                delete_nodal_bodies=found.delete_nodal_bodies,
-                delete_node_sets=found.delete_node_sets,
+                swset=cards.swset or suiting.swset,
+                delete_nodal_bodies=suiting.delete_nodal_bodies,
+                delete_node_sets=suiting.delete_node_sets,
             )
             return cards, ()
         from d2rpick.deck.printing import SOLVERS
 
-        if SOLVERS[cards.solver or ""].title != SOLVERS[found.solver].title:
+        if SOLVERS[cards.solver or ""].title != SOLVERS[suiting.solver].title:
             return cards, ()
-        end = found.end if cards.end is None else cards.end
-        cards = replace(cards, name=cards.name or found.name, end=end)
+        end = suiting.end if cards.end is None else cards.end
+        cards = replace(cards, name=cards.name or suiting.name, end=end)
         if not parts or cards.node:
             return cards, ()
         from d2rpick.deck.radioss_bodies import find_bodies
@@ -251,14 +258,14 @@ class Cards:
         )
         return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
-    def request(self, asked: Asked) -> CardRequest:
+    def request(self, question: Asked) -> CardRequest:
         """Return how the card of a run is printed."""
         from d2rpick.choice.judged_card import CardRequest
 
         request = CardRequest(
-            self.solver, self.printing(numbers("--part", asked.on_card))
+            self.solver, self.printing(numbers("--part", question.on_card))
         )
-        self.check_solver(request.of(asked.reference.history)[0])
+        self.check_solver(request.of(question.reference.history)[0])
         return request
 
 
@@ -268,19 +275,19 @@ SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 def needed(solver: Module) -> str:
     """Return the argument that names what the card of ``solver`` switches."""
-    what = {
+    arguments_by_kind = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
     }
-    return f"a card for {solver.title} needs {what[solver.switches]}"
+    return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
 def numbers(name: str, texts: Sequence[str]) -> list[int]:
     """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
-        found = re.fullmatch(_RANGE, piece, re.ASCII)
-        if not found:
+        match = re.fullmatch(_RANGE, piece, re.ASCII)
+        if not match:
             if name == "--part":
                 hint = "; titles need a --history that has parts"
             else:
@@ -288,8 +295,8 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
             raise ArgumentError(
                 f"{name}: {piece!r} is not a number (7) or range (10-19){hint}"
             )
-        low = int(found[1])
-        high = int(found[2] or found[1])
+        low = int(match[1])
+        high = int(match[2] or match[1])
         if not low <= high < low + _MOST_IDS:
             raise ArgumentError(
                 f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
@@ -327,7 +334,7 @@ class JudgedCard(NamedTuple):
 
 
 def judged(
-    asked: Asked,
+    question: Asked,
     cards: Cards,
     windows: Sequence[Times],
     judge: Callable[[float, float], Verdict] | None = None,
@@ -345,21 +352,21 @@ def judged(
     from d2rpick.choice.judged_card import judged_card
     from d2rpick.deck.printing import SOLVERS
 
-    cards, notes = cards.by_deck(asked)
-    reference = asked.reference
-    request = cards.request(asked).by(asked.settings)
-    judge = judge or partial(verify_of, reference, settings=asked.settings)
-    found = judged_card(windows, reference.history, judge, request, done)
+    cards, notes = cards.by_deck(question)
+    reference = question.reference
+    request = cards.request(question).by(question.settings)
+    judge = judge or partial(verify_of, reference, settings=question.settings)
+    result = judged_card(windows, reference.history, judge, request, done)
     solver, printing = request.of(reference.history)
-    if found is None:
+    if result is None:
         raise ArgumentError(needed(SOLVERS[solver]))
-    card, verdicts = found
+    card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
     if printing.merge or SOLVERS[solver].switches != "part":
         apart = 0
     else:
         apart = len(printing.part)
-    return JudgedCard(card, verdicts, tuple(collect_objections(card, asked, apart)))
+    return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
 
 
 def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
@@ -374,8 +381,10 @@ def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
     decision = verdict.decision
     if not decision.reaches(verdict.situation.settings.min_quality):
-        told = f"{decision.verdict}: {decision.reason}"
-        yield Caution("not-verified", f"the times as printed: {told}; {decision.cure}")
+        message = f"{decision.verdict}: {decision.reason}"
+        yield Caution(
+            "not-verified", f"the times as printed: {message}; {decision.cure}"
+        )
 
 
 def card(
@@ -420,17 +429,17 @@ def card(
     from d2rpick.api.asked import request_of
 
     times = arguments.pairs("windows", windows)
-    given: dict[str, Any] = dict(options)
+    arguments_of_card: dict[str, Any] = dict(options)
     judging: Any = {
-        name: given.pop(name)
+        name: arguments_of_card.pop(name)
         for name in ("after", "landing", "margin", "tolerance")
-        if name in given
+        if name in arguments_of_card
     }
     return card_of(
         times,
         run,
         request_of(run, parts, None, None, None, judging),
-        Cards.of(given),  # type: ignore[arg-type]
+        Cards.of(arguments_of_card),  # type: ignore[arg-type]
     )
 
 
@@ -448,12 +457,12 @@ def card_of(
         ask,
     )  # imported here since a card alone does not need numpy
 
-    asked = ask(run, request, card_alone=True)
-    wanted = cards.request(asked)
-    module = SOLVERS[wanted.of(asked.reference.history)[0]]
+    question = ask(run, request, card_alone=True)
+    wanted = cards.request(question)
+    module = SOLVERS[wanted.of(question.reference.history)[0]]
     if wanted.printing.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
-    return judged(asked, cards, windows)
+    return judged(question, cards, windows)
 
 
 def _alone(request: Request, cards: Cards, solver: str) -> Printing:

@@ -52,23 +52,23 @@ class Findings(Answer, Checks):
     def passed(self) -> bool:
         """True if all decks were checked, and no finding is as severe as ``fail_on``."""
         return not self.failed and all(
-            one.severity.rank > self.fail_on.rank for one in self.findings
+            finding.severity.rank > self.fail_on.rank for finding in self.findings
         )
 
     @property
     def decks(self) -> tuple[str, ...]:
         """Names of the main decks."""
-        return tuple(one.deck for one in self.results)
+        return tuple(result.deck for result in self.results)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Findings of the rules in all decks."""
-        return tuple(finding for one in self.results for finding in one.findings)
+        return tuple(finding for result in self.results for finding in result.findings)
 
     @property
     def windows(self) -> tuple[CheckedWindow, ...]:
         """Windows of all decks in which parts are rigid."""
-        return tuple(window for one in self.results for window in one.windows)
+        return tuple(window for result in self.results for window in result.windows)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per finding and a column per key of ``findings`` in the JSON.
@@ -137,18 +137,16 @@ def check(
     rules = Configuration(
         arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore)
     )
-    named = [
-        text
-        for name in ("select", "ignore")
-        for one in getattr(rules, name)
-        for text in (f"--{name}", one)
-    ]
+    rule_options: list[str] = []
+    for name in ("select", "ignore"):
+        for rule in getattr(rules, name):
+            rule_options += [f"--{name}", rule]
     files = [text for name in request.history for text in ("--history", name)]
-    command = ("check", *files, *request.asking(), *named, *positional(names))
-    found = findings_of(names, history, request, *rules[:2], command=command)
-    for one in found.failed:
-        raise one.error
-    return found
+    command = ("check", *files, *request.asking(), *rule_options, *positional(names))
+    findings = findings_of(names, history, request, *rules[:2], command=command)
+    for failed_deck in findings.failed:
+        raise failed_deck.error
+    return findings
 
 
 def findings_of(
@@ -173,13 +171,15 @@ def findings_of(
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
     rules.verify(RULES)
-    found = list(_each(decks, rules, judge))
-    results = tuple(one for one in found if isinstance(one, Checked))
+    outcomes = list(_each(decks, rules, judge))
+    results = tuple(outcome for outcome in outcomes if isinstance(outcome, Checked))
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     unused_settings = dict.fromkeys(note for result in results for note in result.notes)
     return Findings(
         results=results,
-        failed=tuple(one for one in found if isinstance(one, Unreadable)),
+        failed=tuple(
+            outcome for outcome in outcomes if isinstance(outcome, Unreadable)
+        ),
         cautions=(
             *(judge.cautions if judge else ()),
             *(Caution("unknown-rule", remark) for remark in remarks),
@@ -202,17 +202,17 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 
 
 def _each(
-    named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
+    deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
     """Yield the result of each deck once, for a run by its first file; a folder stands for its main decks."""
-    seen: set[str] = set()
+    visited: set[str] = set()
     real_folder = cache(
         os.path.realpath
     )  # cached since it asks the system for each parent folder
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
-    found_by_name = {name: _decks(name) for name in dict.fromkeys(named)}
+    found_by_name = {name: _decks(name) for name in dict.fromkeys(deck_names)}
     listed = [
         deck
         for decks in found_by_name.values()
@@ -231,14 +231,18 @@ def _each(
                 if os.path.islink(deck)  # noqa: PTH114
                 else os.path.join(real_folder(folder), file)  # noqa: PTH118
             )
-            if real not in seen and not any(deck in legs for legs in restarts.values()):
-                found = _found(deck, configured, judge, folder, restarts.get(deck, ()))
-                if isinstance(found, Checked) and found.solver == LS_DYNA:
-                    others = []
+            if real not in visited and not any(
+                deck in legs for legs in restarts.values()
+            ):
+                outcome = _found(
+                    deck, configured, judge, folder, restarts.get(deck, ())
+                )
+                if isinstance(outcome, Checked) and outcome.solver == LS_DYNA:
+                    other_files = []
                 else:
-                    others = list_run_files(deck)
-                seen.update([real, *map(os.path.realpath, others)])
-                yield found
+                    other_files = list_run_files(deck)
+                visited.update([real, *map(os.path.realpath, other_files)])
+                yield outcome
 
 
 def _decks(name: str) -> list[str] | DeckError:
@@ -255,13 +259,13 @@ def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     legs: dict[str, list[str]] = {}
     for restart in small:
         folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
-        beside = [
+        neighbours = [
             deck
             for deck in decks
             if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
         ]
-        if len(beside) == 1 and not list_run_files(beside[0]):
-            legs.setdefault(beside[0], []).append(restart)
+        if len(neighbours) == 1 and not list_run_files(neighbours[0]):
+            legs.setdefault(neighbours[0], []).append(restart)
     return legs
 
 
@@ -280,8 +284,8 @@ def _found(
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:
             judge.beside(name)
-        found = check_deck(name, configuration, judge, content, restarts)
-        return found._replace(files=(source, *found.files), notes=configuration.notes)
+        result = check_deck(name, configuration, judge, content, restarts)
+        return result._replace(files=(source, *result.files), notes=configuration.notes)
     except Exception as error:
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError

@@ -126,10 +126,10 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     """Determine which parts may be switched; compare sets of them from tr to td, or up to td."""
     times = check_times(tr, td)
     model = model_of(request)
-    beside = [request.deck] if request.deck else []
+    deck_names = [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
-    found = sets_of_parts.parts_of(
-        run.files, request.settings, model, given=ids, times=times, beside=beside
+    table = sets_of_parts.parts_of(
+        run.files, request.settings, model, given=ids, times=times, beside=deck_names
     )
     window = [
         text
@@ -138,7 +138,7 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
         for text in (f"--{name}", repr(time))
     ]
     command = ("parts", *window, *request.asking(), *positional(request.history))
-    return PartTable.of(found, run=run, command=command, cautions=name_deck(request))
+    return PartTable.of(table, run=run, command=command, cautions=name_deck(request))
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
@@ -175,7 +175,7 @@ class Calibration(Answer, calibration.Calibration):
         from d2rpick.report.calibration import COLUMNS, plain_rows
 
         rows = [dict(zip(COLUMNS, row, strict=True)) for row in plain_rows(self)]
-        return frame_of(rows, COLUMNS, source=[one.name for one in self.legs])
+        return frame_of(rows, COLUMNS, source=[leg.name for leg in self.legs])
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""

@@ -81,9 +81,9 @@ class Driving:
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(deck, numbers("--part", part) if part else ())
         self.inventory = read_inventory(deck)
-        known = wait_of_deck(self.inventory)
+        deck_wait = wait_of_deck(self.inventory)
         if wait is not None:
-            check_wait(wait, known, deck)
+            check_wait(wait, deck_wait, deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         share = CostModel(self.inventory).saved(self.deck.parts).value
         self.limits = Limits(
@@ -94,7 +94,7 @@ class Driving:
             _UNKNOWN if share is None else 1 - share,
         )
         check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
-        self.observer = Observer(self.deck.parts, self.inventory, wait, known)
+        self.observer = Observer(self.deck.parts, self.inventory, wait, deck_wait)
         self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(
             doubts_of_solver(self.deck.parts, self.inventory)
@@ -127,7 +127,7 @@ class Driving:
                     f"{folder}: begun with another deck than {self.name} is now; name that one"
                 )
             if not begun and any(
-                not one.name.startswith(".") for one in folder.iterdir()
+                not file.name.startswith(".") for file in folder.iterdir()
             ):
                 raise D2RPickError(
                     f"{folder}: the folder is not empty; choose another one"
@@ -178,9 +178,9 @@ class Driving:
         share = CostModel(self.inventory).saved(self.deck.parts).value
         steps = [
             [
-                one.length / one.cycles
-                for one in legs
-                if one.cycles and one.length > 0 and one.order.rigid is rigid
+                leg.length / leg.cycles
+                for leg in legs
+                if leg.cycles and leg.length > 0 and leg.order.rigid is rigid
             ]
             for rigid in (False, True)
         ]
@@ -188,20 +188,20 @@ class Driving:
             return None
         ratio = max(steps[1]) / min(steps[0])
         took = sum(
-            one.length * ((1 - share) / ratio if one.order.rigid else 1.0)
-            for one in legs
+            leg.length * ((1 - share) / ratio if leg.order.rigid else 1.0)
+            for leg in legs
         )
         return 1 - took / self.deck.end
 
 
 def _by_time(legs: Sequence[Leg], end: float) -> float | None:
     """Return the saved share if a deformable run takes as long per time as the deformable segments do on average."""
-    if any(one.cpu is None for one in legs):
+    if any(leg.cpu is None for leg in legs):
         return None
-    deformable = [one for one in legs if not one.order.rigid]
+    deformable = [leg for leg in legs if not leg.order.rigid]
     whole = (
-        sum(one.cpu or 0.0 for one in deformable)
-        / sum(one.length for one in deformable)
+        sum(leg.cpu or 0.0 for leg in deformable)
+        / sum(leg.length for leg in deformable)
         * end
     )
-    return 1 - sum(one.cpu or 0.0 for one in legs) / whole if whole else None
+    return 1 - sum(leg.cpu or 0.0 for leg in legs) / whole if whole else None

@@ -96,16 +96,16 @@ class Motion:
 
     def __post_init__(self) -> None:
         """Refuse contradictory arguments."""
-        given = [
+        given_names = [
             name
             for name in ("z0", "y0", "v0", "vz0", "vy0")
             if getattr(self, name) is not None
         ]
-        if {"v0", "vz0"} <= {*given}:
+        if {"v0", "vz0"} <= {*given_names}:
             raise ArgumentError(
                 "--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0"
             )
-        if not given:
+        if not given_names:
             raise ArgumentError(
                 "the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0"
             )
@@ -124,17 +124,17 @@ class Motion:
         """The state at time 0."""
         from d2rpick.vibration.oscillator import State
 
-        given = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
-        return State.of(*(value or 0.0 for value in given))
+        values = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
+        return State.of(*(value or 0.0 for value in values))
 
     @property
     def oscillator(self) -> Oscillator:
         """The oscillator that moves; raise ArgumentError if it is incomplete."""
-        named = {
+        parameters = {
             name: getattr(self, name)
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
-        oscillator = Request(**named, v0=0.0).oscillator
+        oscillator = Request(**parameters, v0=0.0).oscillator
         assert oscillator is not None  # the options that define it are required
         return oscillator
 
@@ -240,16 +240,16 @@ class Box:
         """The parameters of the model."""
         from d2rpick.models.box_model import Parameters
 
-        given = {
+        values = {
             name: getattr(self, name)
             for name in PARAMETERS
             if getattr(self, name) is not None
         }
         return Parameters(
             **(
-                {"speed": 0.0, "tilt": TILT, **given}
+                {"speed": 0.0, "tilt": TILT, **values}
                 if self.drop is not None
-                else given
+                else values
             )
         )
 
@@ -275,19 +275,19 @@ def _check_windows(
         raise ArgumentError(
             "--tr and --td need each other, as many of the one as of the other"
         )
-    before = None
+    previous_end = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:
             raise ArgumentError(f"--tr {tr:g} is not before --td {td:g}")
-        if before is not None and not before < tr:
+        if previous_end is not None and not previous_end < tr:
             raise ArgumentError(
-                f"--tr {tr:g} is not after --td {before:g} of the window before it"
+                f"--tr {tr:g} is not after --td {previous_end:g} of the window before it"
             )
         if td > t_end:
             raise ArgumentError(
                 f"--td {td:g} lies after the end of the run, --t-end {t_end:g}"
             )
-        before = td
+        previous_end = td
 
 
 class Scanning:
@@ -328,13 +328,13 @@ class Scanning:
 
 def unbalanced(record: Record) -> tuple[Caution, ...]:
     """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
-    off = float(abs(record.imbalance).max())
-    if off <= BALANCED:
+    imbalance = float(abs(record.imbalance).max())
+    if imbalance <= BALANCED:
         return ()
-    found = f"the energy is balanced within {off:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",
-            f"{found}; these parameters are beyond what the model can do",
+            f"{message}; these parameters are beyond what the model can do",
         ),
     )

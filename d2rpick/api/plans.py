@@ -74,8 +74,12 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         """Return the page, with the card of the recommended pair."""
         from d2rpick.report.pages import trade_off_page
 
-        found = self.suggestion
-        chosen = (found.situation, found.recommended.tr) if found.recommended else None
+        suggestion = self.suggestion
+        chosen = (
+            (suggestion.situation, suggestion.recommended.tr)
+            if suggestion.recommended
+            else None
+        )
         return trade_off_page(
             self, self._context(command, judging, cards, chosen, self)
         )
@@ -130,21 +134,21 @@ def explore(
     wanted = arguments.optional("td", td)
     window = arguments.window("td_window", td_window)
     count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return explored(asked, wanted, window, count)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return explored(question, wanted, window, count)
 
 
 def explored(
-    asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
+    question: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
 ) -> Exploration:
     """Find what each td costs in a window, or in the longest flight."""
     check_window("td_window", td_window)
-    found = trade_off.explore_of(
-        asked.reference, asked.settings, td_window, td=td, steps=steps
+    result = trade_off.explore_of(
+        question.reference, question.settings, td_window, td=td, steps=steps
     )
     times = [] if td is None else ["--td", repr(td)]
     times += ["--td-window", *map(repr, td_window)] if td_window else []
-    return Exploration.about(asked, found, *times, "--steps", str(steps))
+    return Exploration.about(question, result, *times, "--steps", str(steps))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -185,9 +189,11 @@ class Plan(RunAnswer, planning.Plan):
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, with its new windows judged; return None if no window is new."""
         new = self.all_windows if every else self.windows
-        asked = self.question
-        asked = asked._replace(reference=asked.reference._replace(history=self.history))
-        return judged(asked, cards, new, done=self.done) if new else None
+        question = self.question
+        question = question._replace(
+            reference=question.reference._replace(history=self.history)
+        )
+        return judged(question, cards, new, done=self.done) if new else None
 
     def page(
         self,
@@ -271,12 +277,12 @@ def plan(
     windows = arguments.pairs("done", done)
     if before is not None:
         arguments.check_run("before", before)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return planned(asked, shortest, windows, before)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return planned(question, shortest, windows, before)
 
 
 def planned(
-    asked: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
+    question: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
 ) -> Plan:
     """Plan the rigid windows of a run, or those after the windows that are ``done``."""
     if before is not None and not done:
@@ -290,10 +296,12 @@ def planned(
         )  # imported here since a plan alone needs no decks
 
         windows = check_windows(done)
-    earlier = asked.reference.like(before.files, asked.selection) if before else None
-    found = planning.plan_of(
-        asked.reference,
-        asked.settings,
+    earlier = (
+        question.reference.like(before.files, question.selection) if before else None
+    )
+    result = planning.plan_of(
+        question.reference,
+        question.settings,
         min_rigid=min_rigid,
         done=windows,
         before=earlier,
@@ -307,7 +315,7 @@ def planned(
         for name in (before.sources if before else ())
         for text in ("--before", name)
     ]
-    return Plan.about(asked, found, *times)
+    return Plan.about(question, result, *times)
 
 
 def written(
@@ -321,10 +329,15 @@ def written(
     from d2rpick.deck.writing import write_deck
     from d2rpick.rules.judgement import HistoryJudge
 
-    asked = plan.question
+    question = plan.question
     done = card.card.windows[: len(plan.done)]  # the times as printed
-    names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
+    names = write_deck(
+        question.request.deck or "", card.card, folder, overwrite=overwrite
+    )
     judge = HistoryJudge(
-        asked.reference.run, asked.request.selection(parts=False), plan.settings, done
+        question.reference.run,
+        question.request.selection(parts=False),
+        plan.settings,
+        done,
     )
     return names, check_written(names[0], judge)

@@ -107,12 +107,12 @@ def option(
     metavar: str | None = None,
     *,
     default: Any = None,
-    **more: Any,
+    **keywords: Any,
 ) -> Any:
     """Return a field of a table of options; one that can be repeated is an empty tuple by default."""
-    default = () if more.get("many") else default
+    default = () if keywords.get("many") else default
     return field(
-        default=default, metadata={"option": Option(text, kind, metavar, **more)}
+        default=default, metadata={"option": Option(text, kind, metavar, **keywords)}
     )
 
 
@@ -124,9 +124,9 @@ def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
 def options_of(table: Any) -> dict[str, Option]:
     """Return the options of a table by the names of their fields."""
     return {
-        one.name: one.metadata["option"]
-        for one in fields(table)
-        if "option" in one.metadata
+        field.name: field.metadata["option"]
+        for field in fields(table)
+        if "option" in field.metadata
     }
 
 
@@ -285,8 +285,8 @@ class Request:
 
         if self.deck is not None or self.no_deck:
             return None
-        named = self.history[0] if len(self.history) == 1 else ""
-        return self.run_folder or (named if os.path.isdir(named) else None)  # noqa: PTH112  odd names
+        name = self.history[0] if len(self.history) == 1 else ""
+        return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  odd names
 
     def check_deck(self) -> None:
         """Refuse options that need a deck if there is none."""
@@ -303,20 +303,20 @@ class Request:
     def _oscillator_given(self) -> bool:
         """Return True if an oscillator is given; raise ArgumentError if it is incomplete."""
         names = ("stiffness", "mass", "alpha", "v0")
-        given = [
+        given_names = [
             name
             for name in (*names, "frame_mass", "beta")
             if getattr(self, name) is not None
         ]
-        if given and (
+        if given_names and (
             missing := [name for name in names if getattr(self, name) is None]
         ):
             raise ArgumentError(
-                f"`{given[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
+                f"`{given_names[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
             )
-        if given and (self.frame_mass is None) == (self.beta is None):
+        if given_names and (self.frame_mass is None) == (self.beta is None):
             raise ArgumentError("the oscillator needs either `frame_mass` or `beta`")
-        return bool(given)
+        return bool(given_names)
 
     @property
     def oscillator(self) -> Oscillator | None:
@@ -346,9 +346,9 @@ class Request:
 
             mode = to_mode(oscillator, self.v0)
         same = {
-            one.name: getattr(self, one.name)
-            for one in fields(Settings)
-            if one.name in OPTIONS
+            field.name: getattr(self, field.name)
+            for field in fields(Settings)
+            if field.name in OPTIONS
         }
         return Settings(
             **{
@@ -386,8 +386,10 @@ class Request:
 
     def judging(self) -> tuple[str, ...]:
         """Return the options with which ``card`` and ``check`` judge by the same history."""
-        named = [text for name in self.history for text in ("--history", name)]
-        return (*named, *self.asking(JUDGING), *self.asking(("part",)))
+        history_options = [
+            text for name in self.history for text in ("--history", name)
+        ]
+        return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def without_history(self) -> None:
         """Refuse options for judging if there is no history to judge by."""
@@ -401,13 +403,13 @@ class Request:
             )
 
     def _given(self) -> Iterator[str]:
-        for one in fields(self):
+        for entry in fields(self):
             if self.given is None:
-                given = getattr(self, one.name) != one.default
+                is_given = getattr(self, entry.name) != entry.default
             else:
-                given = one.name in self.given
-            if given and one.name not in _NOT_TYPED:
-                yield one.name
+                is_given = entry.name in self.given
+            if is_given and entry.name not in _NOT_TYPED:
+                yield entry.name
 
 
 def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
@@ -415,8 +417,8 @@ def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
     if isinstance(value, bool):
         yield from (f"--{dashed(name)}",) * value
         return
-    for one in value if many else [value]:
-        words = one if isinstance(one, tuple) else (one,)
+    for single_value in value if many else [value]:
+        words = single_value if isinstance(single_value, tuple) else (single_value,)
         yield from (
             f"--{dashed(name)}",
             *(word if isinstance(word, str) else _word(word) for word in words),
@@ -427,17 +429,17 @@ def _word(value: Any) -> str:
     return repr(value) if isinstance(value, int | float) else _IN_MEMORY
 
 
-def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
+def channels_of(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     """Read ``QUANTITY=NAME``; raise ArgumentError for an unknown quantity, or one that is given twice."""
     from d2rpick.histories.names import QUANTITIES
 
-    split = (text.partition("=") for text in given)
+    split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
         if quantity not in QUANTITIES or not name:
-            known = ", ".join(QUANTITIES)
+            quantities = ", ".join(QUANTITIES)
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {known}"
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {quantities}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")

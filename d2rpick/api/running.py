@@ -86,14 +86,14 @@ def first(
     )
     main = arguments.one_path("deck", deck)
     folder = arguments.one_path("output_dir", output_dir)
-    found = first_card(main, numbers("parts", names), *times)
+    copies = first_card(main, numbers("parts", names), *times)
     files = write_deck(
         main,
-        found.card,
+        copies.card,
         folder,
         overwrite=arguments.flag("overwrite", overwrite, False),
     )
-    return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
+    return FirstRun(tuple(files), copies.wait.time, copies.wait.reason, copies.notes)
 
 
 def follow(

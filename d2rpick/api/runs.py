@@ -79,7 +79,9 @@ class Run:
     def channels(self) -> tuple[str, ...]:
         """Names of the histories of the whole model."""
         return tuple(
-            dict.fromkeys(name for one in self.files.databases for name in one.channels)
+            dict.fromkeys(
+                name for database in self.files.databases for name in database.channels
+            )
         )
 
     @property
@@ -100,9 +102,9 @@ class Run:
         """
         from d2rpick.choice.overview import survey
 
-        named = arguments.one_path("deck", deck) if deck else None
+        deck_name = arguments.one_path("deck", deck) if deck else None
         return survey(
-            self.files, self.chosen, self._deck_in_folder if deck is None else named
+            self.files, self.chosen, self._deck_in_folder if deck is None else deck_name
         )
 
     @property
@@ -146,8 +148,8 @@ class Run:
         """
         import pandas as pd
 
-        every = isinstance(parts, str) and parts == "all"
-        names = ("0-4294967295",) if every else arguments.part_names("parts", parts)
+        is_all = isinstance(parts, str) and parts == "all"
+        names = ("0-4294967295",) if is_all else arguments.part_names("parts", parts)
         history = self.files.history(
             self.chosen._replace(energy=(), parts=names) if names else self.chosen
         )
@@ -293,11 +295,11 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
-    known = list(map(str, frame.columns))
+    column_names = list(map(str, frame.columns))
     if (
-        time in known
+        time in column_names
         or (time is not None and time.isdecimal())
-        or any(map(is_time, known))
+        or any(map(is_time, column_names))
     ):
         return frame
     if (
@@ -306,10 +308,10 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
         or is_time(str(index.name))
     ):
         return frame.reset_index(names=time or "time")
-    named = "no name" if index.name is None else f"the name {index.name!r}"
+    index_name = "no name" if index.name is None else f"the name {index.name!r}"
     raise ValueError(
-        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {named}, its columns are "
-        f"{', '.join(map(repr, known))}; name it by frame.rename_axis('time'), or a column of these as `time`"
+        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {index_name}, its columns are "
+        f"{', '.join(map(repr, column_names))}; name it by frame.rename_axis('time'), or a column of these as `time`"
     )
 
 
@@ -370,11 +372,11 @@ def selection_of(
         raise TypeError(
             f"channels is {channels!r}, a mapping of quantities to columns was expected"
         )
-    named = dict(channels or {})
+    channel_names = dict(channels or {})
     for name, value in [
         ("time", time),
-        *(("energy", one) for one in listed),
-        *named.items(),
+        *(("energy", energy_name) for energy_name in listed),
+        *channel_names.items(),
     ]:
         if (
             value is not None
@@ -384,14 +386,14 @@ def selection_of(
             raise TypeError(
                 f"{name} is {value!r}, the name or number of a column was expected"
             )
-    if unknown := [name for name in named if name not in QUANTITIES]:
+    if unknown := [name for name in channel_names if name not in QUANTITIES]:
         raise ValueError(
             f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected"
         )
     return Selection(
         time=None if time is None else str(time),
-        energy=tuple(str(one) for one in listed),
-        channels=tuple((name, str(channel)) for name, channel in named.items()),
+        energy=tuple(str(energy_name) for energy_name in listed),
+        channels=tuple((name, str(channel)) for name, channel in channel_names.items()),
     )
 
 

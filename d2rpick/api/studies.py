@@ -111,7 +111,7 @@ def study(
     """
     from d2rpick.api.runs import known_format, selection_of
 
-    asked = time_or_window(
+    td_or_window = time_or_window(
         arguments.optional("td", td), arguments.window("td_window", td_window)
     )
     processes = arguments.whole("jobs", 1 if jobs is None else jobs, 1)
@@ -121,10 +121,10 @@ def study(
     request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
     request = replace(
-        request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(one) for one in chosen.channels),
+        request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(pair) for pair in chosen.channels),
         input_format=known_format(input_format),
     )  # fmt: skip
-    question = question_of(request, asked, curve=True)
+    question = question_of(request, td_or_window, curve=True)
     with choose_farm(min(processes, len(names)), "d2rpick.choice.study") as farm:
         return summary(request, question, names, list(rows_of(question, names, farm)))
 
@@ -133,11 +133,11 @@ def find_runs(names: Iterable[str]) -> tuple[str, ...]:
     """Replace patterns by the files and folders that they match, each a run; a name that matches nothing is kept."""
     from glob import glob
 
-    found: list[str] = []
+    runs: list[str] = []
     for name in names:
         pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        found += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
-    return tuple(found)
+        runs += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+    return tuple(runs)
 
 
 def _once(names: Iterable[str]) -> list[str]:
@@ -196,9 +196,9 @@ def rows_of(
     told : function, optional
         Called with the number of finished rows, first with those from the ledger.
     """
-    known = dict(ledger.known) if ledger else {}
-    new = [number for number in range(len(sources)) if number not in known]
-    done = len(known)
+    known_rows = dict(ledger.known) if ledger else {}
+    new = [number for number in range(len(sources)) if number not in known_rows]
+    done = len(known_rows)
     following = 0
     names = [sources[number] for number in new]
     if absolute:
@@ -210,24 +210,24 @@ def rows_of(
                 row = core.failed(sources[number], answer.error)
             else:
                 row = answer.result
-            known[number] = replace(row, source=sources[number])
+            known_rows[number] = replace(row, source=sources[number])
             done += 1
             if ledger:
-                ledger.add(known[number])
+                ledger.add(known_rows[number])
         if told:
             told(done)
-        while following in known:
-            yield known.pop(following)
+        while following in known_rows:
+            yield known_rows.pop(following)
             following += 1
 
 
 def fingerprint(question: Question) -> str:
     """Return a digest of all that a row depends on besides its files: options and version, not the drawn curves."""
-    asked = {**asdict(question), "curve": None}
-    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+    values = {**asdict(question), "curve": None}
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def line(row: StudyRow, asked: str) -> str:
+def line(row: StudyRow, question_digest: str) -> str:
     """Return a row as one line: its values, and what is needed to read it back later.
 
     ``asked`` is the ``fingerprint`` of the question.
@@ -236,7 +236,7 @@ def line(row: StudyRow, asked: str) -> str:
         "acceptable": [windows.tolist() for windows in (row.acceptable, row.alike)],
         "profile": None if row.profile is None else row.profile.tolist(),
         "files": [stamp._asdict() for stamp in row.files],
-        "asked": asked,
+        "asked": question_digest,
     }
     if row.curve is not None:
         record["curve"] = row.curve.tolist()

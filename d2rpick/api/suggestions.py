@@ -69,14 +69,16 @@ class Suggestion(RunAnswer, answers.Suggestion):
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
         pair = self.recommended
-        asked = self.question
+        question = self.question
         judge = partial(
             answers.verify_of,
-            asked.reference,
+            question.reference,
             settings=self.situation.settings,
             known=self.situation,
         )
-        return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
+        return (
+            card_judged(question, cards, [(pair.tr, pair.td)], judge) if pair else None
+        )
 
     def page(
         self,
@@ -127,10 +129,10 @@ class Verdict(RunAnswer, answers.Verdict):
         """
         from d2rpick.report.verdict import measures
 
-        found = measures(self)
+        values = measures(self)
         return frame_of(
-            [found],
-            list(found),
+            [values],
+            list(values),
             basis=self.basis,
             source=list(self.situation.history.source),
         )
@@ -218,20 +220,20 @@ def suggest(
     )
 
 
-def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
+def suggested(question: Asked, td: float | tuple[float, float] | None) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
-    found = answers.suggest_of(asked.reference, td, asked.settings)
+    result = answers.suggest_of(question.reference, td, question.settings)
     if (
-        found.better_pair
-        and found.recommended
-        and _read(found.better_pair) == _read(found.recommended)
+        result.better_pair
+        and result.recommended
+        and _read(result.better_pair) == _read(result.recommended)
     ):
-        found = replace(found, better_pair=None)
+        result = replace(result, better_pair=None)
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
     else:
         times = () if td is None else ("--td", repr(td))
-    return Suggestion.about(asked, found, *times)
+    return Suggestion.about(question, result, *times)
 
 
 def _read(pair: Pair) -> tuple[float, float]:
@@ -285,15 +287,15 @@ def verify(
     True
     """
     pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    least = arguments.number(
+    min_ratio = arguments.number(
         "min_mean_energy",
         MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,
         FRACTION,
     )
     if switched is not None:
         arguments.check_run("switched", switched)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return judged(asked, *pair, switched, least)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return judged(question, *pair, switched, min_ratio)
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
@@ -305,7 +307,7 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
 
 
 def judged(
-    asked: Asked,
+    question: Asked,
     tr: float | None,
     td: float | None,
     switched: Run | None = None,
@@ -313,21 +315,25 @@ def judged(
 ) -> Verdict:
     """Judge a pair, also by a finished switched run, from which times that are not given are read."""
     check_pair(tr, td, switched)
-    other = switched and asked.reference.like(switched.files, asked.selection)
-    if other and (tr is None or td is None):
+    switched_reference = switched and question.reference.like(
+        switched.files, question.selection
+    )
+    if switched_reference and (tr is None or td is None):
         from d2rpick.choice.comparison import times_of
 
-        read = times_of(other.history, asked.reference.history)
-        tr = read[0] if tr is None else tr
-        td = read[1] if td is None else td
+        switch_times = times_of(switched_reference.history, question.reference.history)
+        tr = switch_times[0] if tr is None else tr
+        td = switch_times[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found = answers.verify_of(asked.reference, tr, td, asked.settings)
+    result = answers.verify_of(question.reference, tr, td, question.settings)
     times = ["--tr", repr(tr), "--td", repr(td)]
-    if switched is not None and other:
-        found = answers.compare_with(found, asked.reference, other, min_mean_energy)
+    if switched is not None and switched_reference:
+        result = answers.compare_with(
+            result, question.reference, switched_reference, min_mean_energy
+        )
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (
             min_mean_energy != MIN_MEAN_ENERGY
         )
-    return Verdict.about(asked, found, *times, compared=switched)
+    return Verdict.about(question, result, *times, compared=switched)

@@ -84,10 +84,10 @@ def frame_of_table(table: Any) -> pd.DataFrame:
     kind = getattr(getattr(table, "dtype", None), "kind", "")
     if kind == "V" or (kind and kind in "iuf" and table.ndim == 2):
         return pd.DataFrame(table)
-    found = f"frame is of type {type(table).__name__}"
+    description = f"frame is of type {type(table).__name__}"
     if kind:
-        found = f"frame is an array of shape {table.shape}"
+        description = f"frame is an array of shape {table.shape}"
     raise TypeError(
-        f"{found}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
+        f"{description}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
         "or a mapping of columns"
     )

@@ -232,13 +232,13 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     """Make a command from a function; its docstring is the help text, with the examples at its end."""
 
     def made(function: Any) -> _Made:
-        told, _, examples = cleandoc(function.__doc__).partition(
+        help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
         lines = examples.replace("\\\n    ", "").split("\n")  # each command in one line
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(
-            function.__name__, cls=cls, help=told, epilog=epilog, **settings
+            function.__name__, cls=cls, help=help_text, epilog=epilog, **settings
         )(function)
 
     return made

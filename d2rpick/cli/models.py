@@ -60,16 +60,18 @@ def replay(motion: Motion, output: Output) -> None:
 
     form = motion.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()
-    found, switched = motion.computed()
+    trajectory, switched = motion.computed()
     if output.plot:
         from d2rpick.report import figures, figures_models
 
         output.write(
             output.plot,
-            figures.render(figures_models.draw_replay(found, switched), output.plot),
+            figures.render(
+                figures_models.draw_replay(trajectory, switched), output.plot
+            ),
         )
     if output.output_file or not output.plot:
-        output.content(OSCILLATOR_WRITERS[form](found, motion.oscillator))
+        output.content(OSCILLATOR_WRITERS[form](trajectory, motion.oscillator))
 
 
 @options.command
@@ -131,15 +133,15 @@ def _scan(box: Box, output: Output) -> None:
     plot = output.plot
     output.notes((), scanning.cautions)
     with counting(len(scanning.times), quiet=output.quiet) as count:
-        found = scanning.run(count.tell)
+        scan = scanning.run(count.tell)
     if plot:
         from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures_models.draw_scan(*found[:3]), plot))
+        output.write(plot, figures.render(figures_models.draw_scan(*scan[:3]), plot))
     output.result(
-        write("rollover", output.output_format or "table", found, output.shown())
+        write("rollover", output.output_format or "table", scan, output.shown())
     )
-    output.finish(objection=found.answer.recommended is None)
+    output.finish(objection=scan.answer.recommended is None)
 
 
 @options.command

@@ -112,22 +112,27 @@ class Command(Documented):
             )
             super().parse_args(without, list(args))
             ctx.default_map = settings_of(ctx, without, table, source)
-        rest = super().parse_args(ctx, args)
+        remaining = super().parse_args(ctx, args)
         if words := words_of(ctx):
             ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)
-        return rest
+        return remaining
 
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
         """Write the options in groups by their subject."""
-        shown = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
+        shown_options = (
+            parameter
+            for parameter in self.get_params(ctx)
+            if isinstance(parameter, click.Option)
+        )
         records = {
-            spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown
+            spelled(parameter).replace("-", "_"): parameter.get_help_record(ctx)
+            for parameter in shown_options
         }
         grouped = {name for names in GROUPS.values() for name in names}
         for title, names in {
-            "Options": [one for one in records if one not in grouped],
+            "Options": [parameter for parameter in records if parameter not in grouped],
             **GROUPS,
         }.items():
             if rows := [record for name in names if (record := records.get(name))]:
@@ -182,7 +187,7 @@ def command(function: Decorated) -> click.Command:
 
 
 def takes(
-    *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **other: Any
+    *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
     """Give a command the options of tables; it gets one object per table, named like its class in lower case.
 
@@ -197,7 +202,12 @@ def takes(
     **other : str or dict
         For an option by its name: the help text for this command, or other arguments of click.
     """
-    tables = {table: [one for one in names if one in options_of(table)] for table in of}
+    tables = {
+        table: [
+            option_name for option_name in names if option_name in options_of(table)
+        ]
+        for table in of
+    }
     if HISTORY in names:
         tables[Request].append("history")
     if choices := list(forms):
@@ -206,7 +216,7 @@ def takes(
             "default": choices[0],
             "show_default": True,
         }
-        other["output_format"] = about
+        overrides["output_format"] = about
 
     def decorate(function: Decorated) -> Decorated:
         @wraps(function)
@@ -214,16 +224,18 @@ def takes(
             ctx = click.get_current_context()
             if "history" in values:
                 ctx.meta["d2rpick.history"] = values["history"]
-            given = {
+            given_names = {
                 name
                 for name in values
                 if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
             }
             for table, taken in tables.items():
                 if taken:
-                    more = {"given": given & {*taken}} if table is Request else {}
+                    given_field = (
+                        {"given": given_names & {*taken}} if table is Request else {}
+                    )
                     values[table.__name__.lower()] = table(
-                        **{name: values.pop(name) for name in taken}, **more
+                        **{name: values.pop(name) for name in taken}, **given_field
                     )
             if "no_deck" in names:
                 from d2rpick.api.deck_in_folder import find_deck_in_folder
@@ -235,11 +247,11 @@ def takes(
             for flag in _FLAGS:
                 run = flag(run)
         for name in reversed(names):
-            as_in_table = of is TABLES and name not in other
+            as_in_table = of is TABLES and name not in overrides
             run = (
                 _as_in_table(name)
                 if as_in_table
-                else _decorator(of, name, other.get(name, {}))
+                else _decorator(of, name, overrides.get(name, {}))
             )(run)
         return run
 
@@ -250,8 +262,8 @@ def _shared(
     decorate: Callable[[Decorated], Decorated],
 ) -> Callable[[Decorated], Decorated]:
     """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
-    made = decorate(lambda: None).__click_params__[0]
-    again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
+    shared_option = decorate(lambda: None).__click_params__[0]
+    again: Any = lambda *_, **__: shared_option  # noqa: E731  click takes what makes an option for its class
     return click.option(cls=again)
 
 
@@ -261,7 +273,7 @@ def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
 
 
 def _decorator(
-    tables: Sequence[Any], name: str, other: Any
+    tables: Sequence[Any], name: str, override: Any
 ) -> Callable[[Decorated], Decorated]:
     if name == HISTORY:
         return click.argument(
@@ -271,24 +283,30 @@ def _decorator(
             required=True,
             type=click_type("file"),
         )
-    table = next(one for one in tables if name in options_of(one))
-    more = {"help": other} if isinstance(other, str) else other
+    table = next(
+        table_of_option
+        for table_of_option in tables
+        if name in options_of(table_of_option)
+    )
+    arguments = {"help": override} if isinstance(override, str) else override
     return option(
         name,
         options_of(table)[name],
-        **{"default": table.__dataclass_fields__[name].default, **more},
+        **{"default": table.__dataclass_fields__[name].default, **arguments},
     )
 
 
-def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
+def option(
+    name: str, entry: Option, **arguments: Any
+) -> Callable[[Decorated], Decorated]:
     """Make click's option from an entry of a table."""
-    about: dict[str, Any] = {"help": one.help, "metavar": one.metavar}
-    if one.kind == "flag":
+    about: dict[str, Any] = {"help": entry.help, "metavar": entry.metavar}
+    if entry.kind == "flag":
         about["is_flag"] = True
     else:
-        kind = click_type(one.kind)
-        about |= {"type": kind, "nargs": 2 if one.pair else 1, "multiple": one.many}
-    about |= {"instead_of": one.instead_of} | other
+        kind = click_type(entry.kind)
+        about |= {"type": kind, "nargs": 2 if entry.pair else 1, "multiple": entry.many}
+    about |= {"instead_of": entry.instead_of} | arguments
     if about["instead_of"]:
         about["cls"] = Either
     else:
@@ -301,32 +319,32 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
         about.pop("default", None)
     else:
         about.setdefault("show_default", True)
-    return click.option(*one.short, f"--{dashed(name)}", name, **about)
+    return click.option(*entry.short, f"--{dashed(name)}", name, **about)
 
 
-def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
+def time(name: str, text: str, **arguments: Any) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that is a time, or a window of time."""
-    pair = more.get("pair", False)
-    required = more.pop("required", False)
+    pair = arguments.get("pair", False)
+    required = arguments.pop("required", False)
     return option(
         name[2:].replace("-", "_"),
-        Option(text, TIME, "LO HI" if pair else "T", **more),
+        Option(text, TIME, "LO HI" if pair else "T", **arguments),
         required=required,
     )
 
 
 def file(
-    name: str, text: str, metavar: str = "FILE", **more: Any
+    name: str, text: str, metavar: str = "FILE", **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that names a file, or ``many`` files, by repeating the option.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
-    required = more.pop("required", False)
-    kind = more.pop("kind", "file")
+    required = arguments.pop("required", False)
+    kind = arguments.pop("kind", "file")
     return option(
         name[2:].replace("-", "_"),
-        Option(text, kind, metavar, **more),
+        Option(text, kind, metavar, **arguments),
         required=required,
     )
 
@@ -403,25 +421,29 @@ def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     >>> inserted(["info", "--", "-x.csv"], ["--quiet"])
     ('info', '--quiet', '--', '-x.csv')
     """
-    place = command.index("--") if "--" in command else len(command)
-    return (*command[:place], *words, *command[place:])
+    position = command.index("--") if "--" in command else len(command)
+    return (*command[:position], *words, *command[position:])
 
 
 def _settings(ctx: click.Context) -> Iterator[str]:
     """Yield a line for every option with its value and the source of the value."""
     from d2rpick.report.tables import as_json
 
-    for one in ctx.command.get_params(ctx):
-        if one.expose_value and one.name:
-            value = ctx.params[one.name]
-            source = _source(ctx, one.name)
-            named = {
-                "environment": f", {_variable(ctx, one.name)}",
+    for parameter in ctx.command.get_params(ctx):
+        if parameter.expose_value and parameter.name:
+            value = ctx.params[parameter.name]
+            source = _source(ctx, parameter.name)
+            origin_details = {
+                "environment": f", {_variable(ctx, parameter.name)}",
                 "settings": f", {ctx.meta['d2rpick.settings']}",
             }
-            name = spelled(one) if isinstance(one, click.Option) else one.name
-            shown = "none" if value in (None, ()) else as_json(value, None)
-            yield f"{name} = {shown}  # {source}{named.get(source, '')}"
+            name = (
+                spelled(parameter)
+                if isinstance(parameter, click.Option)
+                else parameter.name
+            )
+            written_value = "none" if value in (None, ()) else as_json(value, None)
+            yield f"{name} = {written_value}  # {source}{origin_details.get(source, '')}"
 
 
 def _source(ctx: click.Context, name: str) -> str:

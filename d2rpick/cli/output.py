@@ -131,13 +131,13 @@ class Output:
         claimed: dict[str, str] = {}
         for name in ("output_file", "plot", "report"):
             file = getattr(self, name)
-            named = f"--{dashed(name)}"
+            option_name = f"--{dashed(name)}"
             if file is not None:
                 output.claim(file)
-                other = claimed.setdefault(os.path.realpath(file), named)
-                if other != named:
+                other_option = claimed.setdefault(os.path.realpath(file), option_name)
+                if other_option != option_name:
                     raise D2RPickError(
-                        f"{file}: {named} and {other} are the same file; give two"
+                        f"{file}: {option_name} and {other_option} are the same file; give two"
                     )
         if self.file is not None and not self.quiet and (form := _meant(self.file)):
             tell(
@@ -154,22 +154,22 @@ class Output:
                 f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
             )
 
-    def shown(self, **more: Any) -> Shown:
+    def shown(self, **further: Any) -> Shown:
         """Return what a form shows besides the answer."""
         from d2rpick.report.formats import Shown
 
         meta = click.get_current_context().meta
-        shown = Shown(
+        display = Shown(
             meta["d2rpick.command"],
             self.limit,
             verbose=meta.get("d2rpick.verbose", False),
-            **more,
+            **further,
         )
-        return shown._replace(width=self.columns or shown.width)
+        return display._replace(width=self.columns or display.width)
 
-    def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
+    def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested form."""
-        now = self.shown(**shown)
+        now = self.shown(**display_options)
         text = in_words(
             answer.text(self.output_format, now), self.output_format, now.width
         )
@@ -244,14 +244,14 @@ class Output:
         else:
             click.echo(content, nl=False)
 
-    def card(self, found: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
+    def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
         """Write the card of an answer with its cautions; return False if there is none or a window fails."""
-        if found is None:
+        if judged_card is None:
             self.content(b"")
             return False
-        self.notes(found.card.notes, cautions)
-        self.content(found.card.text.encode())
-        return found.passed
+        self.notes(judged_card.card.notes, cautions)
+        self.content(judged_card.card.text.encode())
+        return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Print what a reader left out, and the warnings."""
@@ -289,25 +289,29 @@ def _check_report(name: str | None) -> None:
 def _meant(name: str) -> str | None:
     """Return the format that the file name of a result implies, if the command has it and no format was given."""
     ctx = click.get_current_context()
-    given = (
+    is_given = (
         ctx.get_parameter_source("output_format")
         is not click.core.ParameterSource.DEFAULT
     )
-    if given or "write_as" in ctx.params:  # the name of a history decides itself
+    if is_given or "write_as" in ctx.params:  # the name of a history decides itself
         return None
     form = next(
         (form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None
     )
-    (choice,) = [one.type for one in ctx.command.params if one.name == "output_format"]
+    (choice,) = [
+        format_type.type
+        for format_type in ctx.command.params
+        if format_type.name == "output_format"
+    ]
     return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
 
 def columns_of(stream: TextIO) -> int | None:
     """Return the width of the terminal behind a stream, limited to a readable width; None without a terminal."""
-    given = os.environ.get("COLUMNS", "")
+    columns_set = os.environ.get("COLUMNS", "")
     try:
-        if given.isdecimal():
-            columns = int(given)
+        if columns_set.isdecimal():
+            columns = int(columns_set)
         else:
             columns = os.get_terminal_size(stream.fileno()).columns
     except OSError:
@@ -359,10 +363,10 @@ def with_options(message: str) -> str:
     >>> with_options("give it as `after` where it is known")
     'give it as --after where it is known'
     """
-    named = "`" in message
-    if named:
+    has_names = "`" in message
+    if has_names:
         return re.sub(
-            r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message
+            r"`(\w+)`", lambda match: option_of(match[1]) or match[0], message
         )
     return message
 
@@ -393,12 +397,12 @@ def in_words(text: str, form: str, width: int = 0) -> str:
     return wrapped(text, width)
 
 
-def check_switched(what: str, request: Request, cards: Cards) -> None:
+def check_switched(purpose: str, request: Request, cards: Cards) -> None:
     """Refuse a card that switches no parts, before a file is opened."""
     if not (request.part or cards.node):
-        found = f"{what} needs --part, the parts to switch (Radioss: --node, their main nodes)"
-        way = "d2rpick card --tr T --td T --part IDS --history FILE"
-        raise ArgumentError(f"{found}; where the history has no parts: {way}")
+        problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
+        way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"
+        raise ArgumentError(f"{problem}; where the history has no parts: {way_to_pass}")
 
 
 @contextmanager

@@ -27,18 +27,20 @@ def reading(
     ``period`` is the time before the first line, and between two lines [s].  The remaining time is unknown: how much of
     a file must be read depends on the question.
     """
-    what = "standard input" if names[0] == "-" else make_printable(names[0])
-    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    input_name = "standard input" if names[0] == "-" else make_printable(names[0])
+    rest_text = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
     with telling(
-        lambda seconds: f"reading {what}{more} ... {seconds:.0f} s",
+        lambda seconds: f"reading {input_name}{rest_text} ... {seconds:.0f} s",
         quiet=quiet,
         period=period,
     ):
         yield
     context = click.get_current_context(silent=True)
     if context and context.meta.get("d2rpick.verbose"):
-        click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
+        click.echo(
+            f"read {input_name}{rest_text} in {perf_counter() - start:.2f} s", err=True
+        )
 
 
 class Count:
@@ -55,10 +57,12 @@ class Count:
         """Return the progress after ``seconds``, and the remaining time at this pace."""
         computed = self.done - max(self.taken, 0)
         if computed:
-            left = f", {_clock(seconds / computed * (self.total - self.done))} left"
+            remaining = (
+                f", {_clock(seconds / computed * (self.total - self.done))} left"
+            )
         else:
-            left = ""
-        return f"{self.done} of {self.total} runs{left}"
+            remaining = ""
+        return f"{self.done} of {self.total} runs{remaining}"
 
 
 @contextmanager
@@ -77,9 +81,13 @@ def _clock(seconds: float) -> str:
     >>> _clock(7), _clock(3725)
     ('0:07', '1:02:05')
     """
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, seconds_left = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    return (
+        f"{hours}:{minutes:02}:{seconds_left:02}"
+        if hours
+        else f"{minutes}:{seconds_left:02}"
+    )
 
 
 def on_terminal() -> bool:
@@ -116,9 +124,9 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
         room = (
             shutil.get_terminal_size().columns - 1
         )  # a line that wraps could not be erased
-        before = line
+        previous_line = line
         line = say(seconds)[-room:]
-        sys.stderr.write(f"\r{line.ljust(len(before))}")
+        sys.stderr.write(f"\r{line.ljust(len(previous_line))}")
         sys.stderr.flush()
     if line:
         sys.stderr.write(f"\r{' ' * len(line)}\r")

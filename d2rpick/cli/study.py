@@ -100,12 +100,14 @@ def study(
         raise click.UsageError(
             "--scheduler and --jobs exclude each other: the cluster has its own processes"
         )
-    asked = time_or_window(td, td_window)
+    td_or_window = time_or_window(td, td_window)
     sources = _sources(run, listed)
     output = output.beside(*sources)
     written = {"output-file": output.file, "plot": output.plot, "report": output.report}
     _check_ledger(resume, written)
-    question = question_of(request, asked, curve=bool(output.plot or output.report))
+    question = question_of(
+        request, td_or_window, curve=bool(output.plot or output.report)
+    )
     ledger = Ledger(resume, question) if resume is not None else None
     mark = fingerprint(question)
     rows = []
@@ -201,10 +203,10 @@ def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int
     """Return how many runs are known from an earlier study, and print it."""
     if ledger is None:
         return 0
-    known = ledger.taking(sources)
-    if (known or ledger.outdated or ledger.damaged) and not quiet:
+    known_count = ledger.taking(sources)
+    if (known_count or ledger.outdated or ledger.damaged) and not quiet:
         tell(f"note: {ledger.told(len(sources))}")
-    return known
+    return known_count
 
 
 def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -> Farm:

@@ -187,10 +187,14 @@ def _completed(
 
     from click.shell_completion import CompletionItem
 
-    words = [(name, told) for name, told in offered if re.fullmatch(r"[\w./-]+", name)]
+    words = [
+        (name, help_text)
+        for name, help_text in offered
+        if re.fullmatch(r"[\w./-]+", name)
+    ]
     return [
-        CompletionItem(name, help=told)
-        for name, told in words
+        CompletionItem(name, help=help_text)
+        for name, help_text in words
         if name.startswith(incomplete)
     ]
 
@@ -263,20 +267,23 @@ def settings_of(
     ConfigurationError
         For a key that is no option, or a value that its option does not allow.
     """
-    own = {
-        option: _value(ctx, option, value, place)
-        for option, value, place in _given(ctx.command, table, source)
+    values = {
+        option: _value(ctx, option, value, position)
+        for option, value, position in _given(ctx.command, table, source)
     }
-    given = {
-        name: one
-        for name, one in without.params.items()
+    given_values = {
+        name: value
+        for name, value in without.params.items()
         if _source(without, name) is not ParameterSource.DEFAULT
     }
-    asked = {**{option.name: value for option, value in own.items()}, **given}
+    all_values = {
+        **{option.name: value for option, value in values.items()},
+        **given_values,
+    }
     return {
         option.name or "": value
-        for option, value in own.items()
-        if _counts(ctx, option, given, asked)
+        for option, value in values.items()
+        if _counts(ctx, option, given_values, all_values)
     }
 
 
@@ -284,9 +291,13 @@ def _given(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
     """Yield the options of a command in the settings, with value and position; unknown keys are refused."""
-    tables = {name: one for name, one in table.items() if isinstance(one, Mapping)}
+    tables = {
+        name: entry for name, entry in table.items() if isinstance(entry, Mapping)
+    }
     shared = {
-        name: one for name, one in table.items() if name not in (*tables, *RULE_KEYS)
+        name: entry
+        for name, entry in table.items()
+        if name not in (*tables, *RULE_KEYS)
     }
     for name in COMMANDS:
         if name in shared:
@@ -296,18 +307,20 @@ def _given(
     refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown(tables, (*COMMANDS, "severity"), source)
     options = {
-        spelled(one): one for one in command.params if isinstance(one, click.Option)
+        spelled(entry): entry
+        for entry in command.params
+        if isinstance(entry, click.Option)
     }
-    own = tables.get(command.name or "", {})
-    refuse_unknown(own, options, f"{source}: {command.name}")
-    for name, value in {**shared, **own}.items():
+    own_table = tables.get(command.name or "", {})
+    refuse_unknown(own_table, options, f"{source}: {command.name}")
+    for name, value in {**shared, **own_table}.items():
         if name in options:
             yield options[name], value, f"{source}: {name}"
 
 
-def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> Any:
+def _value(ctx: click.Context, option: click.Option, value: Any, position: str) -> Any:
     """Read the value of an option; relative file names start from the folder of the settings."""
-    _refuse_dangerous(option, place)
+    _refuse_dangerous(option, position)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
     if (option.nargs > 1 and not isinstance(value, list)) or not all(
@@ -315,34 +328,34 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
     ):
         expected = "a list" if option.nargs > 1 else _expected_kind(option)
         raise ConfigurationError(
-            f"{place} is {format_toml_value(value)}, {expected} was expected"
+            f"{position} is {format_toml_value(value)}, {expected} was expected"
         )
     try:
-        found = option.type_cast_value(ctx, values if has_list else value)
+        converted = option.type_cast_value(ctx, values if has_list else value)
     except click.BadParameter as error:
-        raise ConfigurationError(f"{place}: {error.message}") from None
+        raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
-        return found
+        return converted
     from pathlib import Path  # imported here since settings rarely contain a file
 
-    folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
+    folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
     if has_list:
-        return [str(Path(folder, name)) for name in found]
-    return str(Path(folder, found))
+        return [str(Path(folder, name)) for name in converted]
+    return str(Path(folder, converted))
 
 
-def _refuse_dangerous(option: click.Option, place: str) -> None:
+def _refuse_dangerous(option: click.Option, position: str) -> None:
     """Refuse to start a program or write a file from settings, which another person may have written."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
-        what = "programs, output files and overwrite are never taken from a file"
+        reason = "programs, output files and overwrite are never taken from a file"
     elif (
         not option.expose_value
     ):  # --help, --debug and others that concern a single call
-        what = "this is never taken from a file"
+        reason = "this is never taken from a file"
     else:
         return
     raise ConfigurationError(
-        f"{place}: {what}; remove the key, and give the option on the command line"
+        f"{position}: {reason}; remove the key, and give the option on the command line"
     )
 
 
@@ -373,19 +386,19 @@ def _expected_kind(option: click.Option) -> str:
 def _counts(
     ctx: click.Context,
     option: click.Option,
-    given: Mapping[str, Any],
-    asked: Mapping[Any, Any],
+    given_values: Mapping[str, Any],
+    all_values: Mapping[Any, Any],
 ) -> bool:
     """Return True if a setting applies, with the ``given`` options and all options in ``asked``."""
-    if any(name in given for name in getattr(option, "instead_of", ())):
+    if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (
-        ctx.command.name == "card" or asked.get("output_format") == "card"
+        ctx.command.name == "card" or all_values.get("output_format") == "card"
     ):
         return True
     unjudged = option.name in JUDGING and ctx.command.name in ("card", "check")
-    beside = ("history",) if unjudged else _BESIDE.get(option.name, ())
-    return not beside or any(asked.get(name) for name in beside)
+    needed_options = ("history",) if unjudged else _BESIDE.get(option.name, ())
+    return not needed_options or any(all_values.get(name) for name in needed_options)
 
 
 def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
@@ -395,15 +408,21 @@ def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
 def words_of(ctx: click.Context) -> Sequence[str]:
     """Return the options from the settings as they are typed."""
     of_settings = (
-        one
-        for one in ctx.command.params
-        if _source(ctx, one.name) is ParameterSource.DEFAULT_MAP
+        parameter
+        for parameter in ctx.command.params
+        if _source(ctx, parameter.name) is ParameterSource.DEFAULT_MAP
     )
-    options = [one for one in of_settings if isinstance(one, click.Option)]
+    options = [
+        parameter for parameter in of_settings if isinstance(parameter, click.Option)
+    ]
     return [
         text
-        for one in options
-        for text in typed(spelled(one), ctx.params[one.name or ""], many=one.multiple)
+        for parameter in options
+        for text in typed(
+            spelled(parameter),
+            ctx.params[parameter.name or ""],
+            many=parameter.multiple,
+        )
     ]
 
 
