@@ -1,7 +1,7 @@
-"""The schemas that ship with the package, made from the fields of its results.
+"""JSON schemas of the results, generated from their fields.
 
-Each schema stands alone, so that a validator needs no other file.  ``python -m tests.generated_schemas`` writes them;
-read the difference before you commit it: keys are only added.
+Each schema is self-contained, so that a validator needs no other file.  ``python -m tests.generated_schemas`` writes
+them.  Check the difference before you commit it: keys may only be added.
 """
 
 import json
@@ -19,22 +19,25 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def documents() -> dict[str, Document]:
-    """Give the documents of all results by the names of their schemas, as ``suggest-1``."""
-    found = (
+    """Return the documents of all results by the names of their schemas, for example ``suggest-1``."""
+    document_types = (
         reproduction.DOCUMENT,
         *(import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS),
     )
-    return {one.name.removeprefix("d2rpick/").replace("/", "-"): one for one in found}
+    return {
+        document_type.name.removeprefix("d2rpick/").replace("/", "-"): document_type
+        for document_type in document_types
+    }
 
 
 def shipped(name: str) -> dict[str, Any]:
-    """Read a schema as it ships."""
-    found: dict[str, Any] = json.loads((SCHEMAS / f"{name}.json").read_text("utf-8"))
-    return found
+    """Read a schema of the package."""
+    schema: dict[str, Any] = json.loads((SCHEMAS / f"{name}.json").read_text("utf-8"))
+    return schema
 
 
 def schema_of(document: Document) -> dict[str, Any]:
-    """Write the schema of a document, with the definitions that it needs."""
+    """Generate the schema of a document, including the definitions it refers to."""
     defined: dict[str, Any] = {}
     whole = _plain(document.whole.schema, defined, document.closed)
     for kind in document.also:
@@ -48,14 +51,14 @@ def schema_of(document: Document) -> dict[str, Any]:
 
 
 def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
-    """Put schemas in the place of kinds and fields; what has a name is defined once and referred to."""
+    """Convert kinds and fields to JSON schema; put each named kind into ``defined`` and refer to it."""
     if isinstance(schema, Field):
-        found = _plain(kind_of(schema.kind), defined, closed)
+        plain = _plain(kind_of(schema.kind), defined, closed)
         described = (
-            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else found
+            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else plain
         )
         described.update({"description": schema.meaning} if schema.meaning else {})
-        return found
+        return plain
     if isinstance(schema, Kind):
         if not schema.name:
             return _plain(schema.schema, defined, closed)
@@ -65,14 +68,14 @@ def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
         }
         return {"$ref": f"#/$defs/{schema.name}"}
     if isinstance(schema, Mapping):
-        found = {key: _plain(value, defined, closed) for key, value in schema.items()}
+        plain = {key: _plain(value, defined, closed) for key, value in schema.items()}
         return (
-            {**found, "additionalProperties": False}
-            if closed and "properties" in found
-            else found
+            {**plain, "additionalProperties": False}
+            if closed and "properties" in plain
+            else plain
         )
     return (
-        [_plain(one, defined, closed) for one in schema]
+        [_plain(element, defined, closed) for element in schema]
         if isinstance(schema, (list, tuple))
         else schema
     )

@@ -1,4 +1,4 @@
-"""Answers held against the JSON schemas that ship, findings against those of others; each schema is read once."""
+"""Validate answers by the JSON schemas of the package, and findings by public schemas; each schema is read once."""
 
 import json
 from functools import cache
@@ -11,21 +11,21 @@ import jsonschema
 from tests.command import answer
 
 
-def check_by_schema(found: dict[str, Any]) -> None:
-    """Hold an answer against the schema that ships with the package under its name."""
-    _, command, version = found["schema"].split("/")
-    _holder(f"{command}-{version}").validate(found)
+def check_by_schema(document: dict[str, Any]) -> None:
+    """Validate an answer by the schema of the package that it names."""
+    _, command, version = document["schema"].split("/")
+    _holder(f"{command}-{version}").validate(document)
 
 
 def checked(*args: str) -> dict[str, Any]:
-    """Run a command as `answer` does, and hold what it says against its schema."""
-    check_by_schema(found := answer(*args))
-    return found
+    """Run a command as `answer` does, and validate the document."""
+    check_by_schema(document := answer(*args))
+    return document
 
 
-def check_by_definition(found: Any, schema: str, definition: str) -> None:
-    """Hold a part of an answer against a definition of the schema ``schema``."""
-    _holder(schema, definition).validate(found)
+def check_by_definition(document: Any, schema: str, definition: str) -> None:
+    """Validate a part of an answer by a definition of the schema ``schema``."""
+    _holder(schema, definition).validate(document)
 
 
 def junit_is_valid(text: str) -> None:
@@ -61,9 +61,9 @@ def _holder(
         (files("d2rpick") / "schemas" / f"{name}.json").read_text("utf-8")
     )
     jsonschema.Draft202012Validator.check_schema(schema)
-    asked = (
+    reference = (
         {"$ref": f"#/$defs/{definition}", "$defs": schema["$defs"]}
         if definition
         else schema
     )
-    return jsonschema.Draft202012Validator(asked)
+    return jsonschema.Draft202012Validator(reference)

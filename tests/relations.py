@@ -1,9 +1,9 @@
-"""Relations between answers: how a choice follows when its history is changed in a known way.
+"""Relations between answers: how a choice must follow a known change of its history.
 
-A history is made from a seed and a number: a load, then a flight in which one or two modes vibrate, then a landing.  A
-`Relation` writes it twice, as it is and changed.  Both are read and asked for the same choice.  The second answer must
-be the first one, moved and scaled as the change says: exactly if the reader gets the same numbers, else within the
-stated ``+-`` of both.
+A seed and a number define a history: a load, then a flight in which one or two modes vibrate, then a landing.  A
+`Relation` writes it twice, unchanged and changed.  Both are read and asked for the same choice.  The second answer must
+be the first one, moved and scaled as the change requires: exactly if the reader gets the same numbers, otherwise within
+the stated ``+-`` of both.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from tests.made_binout import LsdaWriter
 from tests.made_t01 import MadePart, headed
 from tests.text_files import glstat_text, matsum_text
 
-_IDS: Final = (7, 3)  # of the parts: the first vibrates, the second is elsewhere
+_IDS: Final = (7, 3)  # part ids: the first part vibrates, the second is elsewhere
 _ROUNDED: Final = (
-    1e-9  # of the time or the residual: what another scale changes by rounding
+    1e-9  # relative change of a time or residual that rounding causes in other units
 )
 _TEXTS: Final = {
     ",": ".",
@@ -39,7 +39,7 @@ _TEXTS: Final = {
 
 
 class MadeRun(NamedTuple):
-    """A run: times (n,), internal and kinetic energy of the part that vibrates, the energy of another part, td."""
+    """Run: times (n,), internal and kinetic energy of the part that vibrates, energy of another part, and td."""
 
     time: Samples
     internal: Samples
@@ -51,7 +51,7 @@ class MadeRun(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Files of a run, and the choice that is asked of them."""
+    """Files of a run, and the choice asked of them."""
 
     names: list[str]
     td: float
@@ -61,12 +61,12 @@ class Asked(NamedTuple):
 
 
 class Relation(NamedTuple):
-    """``change`` writes a run twice into a folder.
+    """Relation whose ``change`` writes a run twice into a folder.
 
-    Times of the second answer are ``scale`` times those of the first, later by ``shift`` spans of the record.  If it is
-    ``exact``, everything must be the same to rounding.  If it ``may_lose`` what the first history shows, the second one
-    may be too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` things than
-    the first one, less or more, pairs that are alike may change places: another tr may be chosen, of the same residual.
+    Times of the second answer are ``scale`` times those of the first, and later by ``shift`` record lengths.  If it is
+    ``exact``, everything must be equal except for rounding.  If it ``may_lose`` information, the second history may be
+    too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` evidence than the
+    first, equally good pairs may change places: another tr of the same residual may be chosen.
     """
 
     change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
@@ -78,7 +78,7 @@ class Relation(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """What is compared of an answer; None for what nothing can be said of."""
+    """Values of an answer that are compared; None if unknown."""
 
     tr: float | None
     half_width: float
@@ -89,7 +89,7 @@ class Chosen(NamedTuple):
 
 
 def make_run(random: Random) -> MadeRun:
-    """Make a run whose vibration, load and sampling are random; the energy has two periods in one of the vibration."""
+    """Draw a run with random vibration, load and sampling; the energy has two periods per vibration period."""
     mode_count = random.choice((1, 1, 2))
     period = 10 ** random.uniform(-3, 0)
     flight = random.uniform(3, 8) * period
@@ -118,19 +118,19 @@ def make_run(random: Random) -> MadeRun:
     landing = load + flight
     pushed = energy * 3 * np.maximum(time - landing, 0.0) / flight
     internal = internal * np.sin(math.pi / 2 * loaded) ** 2 + pushed
-    other = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
+    second_energy = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
     return MadeRun(
         time,
         internal,
         kinetic,
-        other,
+        second_energy,
         load,
         landing,
         load + random.uniform(0.5, 0.95) * flight,
     )
 
 
-# How a run is written.
+# Writers of a run.
 
 
 def csv(
@@ -139,7 +139,7 @@ def csv(
     name: str = "run.csv",
     separator: str = ",",
 ) -> list[str]:
-    """Write columns with all digits; the names of the files."""
+    """Write columns with all digits; return the file names."""
     rows = (
         separator.join(map(repr, row))
         for row in zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -174,7 +174,7 @@ def asked(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
 
 
 def rounded(run: MadeRun, digits: int) -> MadeRun:
-    """Give a run as a text with so many digits holds it."""
+    """Return a run as a text with this number of digits stores it."""
 
     def printed(column: Samples) -> Samples:
         return np.array([float(f"{value:.{digits - 1}E}") for value in column])
@@ -185,7 +185,7 @@ def rounded(run: MadeRun, digits: int) -> MadeRun:
 
 
 def single(run: MadeRun) -> MadeRun:
-    """Give a run as a file in single precision holds it."""
+    """Return a run as a file in single precision stores it."""
 
     def stored(column: Samples) -> Samples:
         return column.astype(np.float32).astype(float)
@@ -196,25 +196,27 @@ def single(run: MadeRun) -> MadeRun:
 
 
 def binout(folder: Path, run: MadeRun) -> list[str]:
-    """Write the energies of two parts as LS-DYNA does in a binout in single precision."""
-    made = LsdaWriter()
-    made.cd("/matsum/metadata")
-    made.put("ids", _IDS, "i4")
+    """Write the energies of two parts as LS-DYNA does in a binout in single precision; return the file names."""
+    writer = LsdaWriter()
+    writer.cd("/matsum/metadata")
+    writer.put("ids", _IDS, "i4")
     for state, time in enumerate(run.time):
-        made.cd(f"/matsum/d{state + 1:06d}")
-        made.put("time", [time], "f4")
-        made.put("internal_energy", [run.internal[state], run.other[state]], "f4")
-    made.table()
-    return put(folder, "binout", bytes(made.data))
+        writer.cd(f"/matsum/d{state + 1:06d}")
+        writer.put("time", [time], "f4")
+        writer.put("internal_energy", [run.internal[state], run.other[state]], "f4")
+    writer.table()
+    return put(folder, "binout", bytes(writer.data))
 
 
 def time_history(folder: Path, run: MadeRun) -> list[str]:
-    """Write the energies of two parts as Radioss does."""
+    """Write the energies of two parts as Radioss does; return the file names."""
     parts = [MadePart(id_, f"part {id_}", (1,)) for id_ in _IDS]
-    made = headed(parts, globals_=2)
-    for time, internal, other in zip(run.time, run.internal, run.other, strict=True):
-        made.state(time, [internal + other, 0.0], [internal, other])
-    return put(folder, "runT01", bytes(made.data))
+    writer = headed(parts, globals_=2)
+    for time, internal, second_energy in zip(
+        run.time, run.internal, run.other, strict=True
+    ):
+        writer.state(time, [internal + second_energy, 0.0], [internal, second_energy])
+    return put(folder, "runT01", bytes(writer.data))
 
 
 def matsum(
@@ -228,7 +230,7 @@ def matsum(
     )
 
 
-# Changes that must not matter, or matter in a known way.
+# Changes that must not change the answer, or must change it in a known way.
 
 
 def same_numbers(
@@ -236,7 +238,7 @@ def same_numbers(
     as_stored: Callable[[MadeRun], MadeRun],
     parts: int | None = None,
 ) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
-    """Write a table of the numbers that another format stores, and that format."""
+    """Return a change that writes a table and another format with the same numbers."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
         table = csv(folder, columns_of(as_stored(run)))
@@ -259,28 +261,28 @@ def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, 
 
 
 def further_columns(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    more = {
+    extra_columns = {
         "pressure": np.array([random.gauss(0, 1) for _ in run.time]),
         **columns_of(run),
         "status": run.other,
     }
-    in_front = {"time": run.time, **more}
+    in_front = {"time": run.time, **extra_columns}
     return asked(run, csv(folder, columns_of(run))), asked(
         run, csv(folder, in_front, "more.csv")
     )
 
 
 def kinetic_energy_too(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    more = {**columns_of(run), "kinetic_energy": run.kinetic}
+    extra_columns = {**columns_of(run), "kinetic_energy": run.kinetic}
     return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, more, "more.csv")
+        run, csv(folder, extra_columns, "more.csv")
     )
 
 
 def scaled(
     time: float, energy: float, shift: float = 0.0
 ) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
-    """Write times and energies in other units, and times from another origin, so many spans of the record later."""
+    """Return a change of the units of time and energy, and of the time origin by ``shift`` record lengths."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
         later = shift * float(run.time[-1])
@@ -357,8 +359,8 @@ def other_names(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Aske
 
 
 def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    other = csv(folder, columns_of(run), "other.txt", random.choice((";", "\t")))
-    return asked(run, csv(folder, columns_of(run))), asked(run, other)
+    other_file = csv(folder, columns_of(run), "other.txt", random.choice((";", "\t")))
+    return asked(run, csv(folder, columns_of(run))), asked(run, other_file)
 
 
 def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
@@ -433,7 +435,7 @@ def choose(question: Asked) -> Chosen:
 
 
 def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
-    """Say how the second answer is not the first one as the relation moves it; nothing if it is."""
+    """Describe how the second answer breaks the relation; empty if it does not."""
     if relation.may_lose and (second.tr is None or second.basis != first.basis):
         return ""
     if (first.tr is None) != (second.tr is None):
@@ -459,12 +461,15 @@ def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) 
 
 
 def check_relation(name: str, random: Random) -> bool:
-    """Compare the two answers of one history; whether a tr was chosen. AssertionError if they do not follow."""
+    """Check a relation for one history; return True if a tr was chosen.
+
+    Raises AssertionError if the second answer does not follow.
+    """
     relation, run = RELATIONS[name], make_run(random)
     with TemporaryDirectory() as folder:
         first, second = (
             choose(question) for question in relation.change(run, Path(folder), random)
         )
-    wrong = difference(relation, run, first, second)
-    assert not wrong, wrong
+    fault = difference(relation, run, first, second)
+    assert not fault, fault
     return first.tr is not None and second.tr is not None

@@ -1,4 +1,4 @@
-"""Cubes on springs, as a Radioss deck: masses and stiffness that a test knows."""
+"""Radioss deck of cubes on springs, whose masses and stiffnesses are known."""
 
 from tests.decks import wide
 
@@ -10,9 +10,11 @@ def cubes(
     masses: tuple[float, ...],
     springs: list[tuple[int, int, float]],
     prop: str = "SPRING",
-    more: str = "",
+    extra_text: str = "",
 ) -> str:
-    """Write cubes of some masses in a row along x, 10 apart, and springs between corners: 10 is the first of cube 1."""
+    """Write cubes with these masses in a row along x, 10 apart, and springs between corners; cube 1 begins with corner
+    10.
+    """
     sides = [(mass / DENSITY) ** (1 / 3) for mass in masses]
     corners = [
         (0, 0, 0),
@@ -32,7 +34,7 @@ def cubes(
     text += f"/MAT/ELAST/1\nm\n{wide(DENSITY, width=REAL)}{wide(MODULUS, 0.3, width=REAL)}/PROP/SOLID/1\ns\n{wide(24)}"
     for number, side in enumerate(sides, start=1):
         nodes = [
-            (10 * number + i, *(side * one for one in corner))
+            (10 * number + i, *(side * first_block for first_block in corner))
             for i, corner in enumerate(corners)
         ]
         text += "/NODE\n" + "".join(
@@ -40,7 +42,7 @@ def cubes(
             for n, x, y, z in nodes
         )
         text += f"/PART/{number}\np\n{wide(1, 1)}/BRICK/{number}\n{wide(number, *(n for n, *_ in nodes))}"
-    for number, (one, other, stiffness) in enumerate(springs, start=50):
-        text += f"/PROP/{prop}/{number}\nk\n{wide(0.0, width=REAL)}{wide(stiffness, 10.0, width=REAL)}{more}"
-        text += f"/PART/{number}\nk\n{wide(number, 1)}/SPRING/{number}\n{wide(number, one, other)}"
+    for number, (first_block, second_block, stiffness) in enumerate(springs, start=50):
+        text += f"/PROP/{prop}/{number}\nk\n{wide(0.0, width=REAL)}{wide(stiffness, 10.0, width=REAL)}{extra_text}"
+        text += f"/PART/{number}\nk\n{wide(number, 1)}/SPRING/{number}\n{wide(number, first_block, second_block)}"
     return text + "/END\n"

@@ -1,4 +1,4 @@
-"""The documentation shows what the program does: its examples are run, its commands and links exist."""
+"""The documentation is true: its examples run, its commands and links exist."""
 
 import doctest
 import re
@@ -31,18 +31,18 @@ from tests.examples import (
 
 README = text_of("README.md")
 ALL = "\n".join(text_of(page) for page in PAGES)
-LONGEST_README = 12_000  # [bytes] read in five minutes
-# Each has a test below, or shows nothing to be run.
+LONGEST_README = 12_000  # size that can be read in five minutes [bytes]
+# Each language has a test below, or shows nothing that can be run.
 KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
 
 
 def slug(heading: str) -> str:
-    """Anchor that GitHub gives a heading."""
+    """Return the anchor that GitHub gives a heading."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
 def anchors(page: Path) -> set[str]:
-    """Anchors of a page."""
+    """Return the anchors of a page."""
     return {
         slug(heading)
         for heading in re.findall(
@@ -52,7 +52,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def links(page: str) -> Iterator[tuple[Path, str]]:
-    """Files and anchors in the repository that a page points to."""
+    """Yield the files and anchors in the repository that a page links to."""
     for target in re.findall(r"\]\(([^)]+)\)", prose(text_of(page))):
         if "://" not in target:
             name, _, anchor = target.partition("#")
@@ -60,7 +60,7 @@ def links(page: str) -> Iterator[tuple[Path, str]]:
 
 
 def one_is_quick(pages: Iterable[str]) -> list[Any]:
-    """Pages of which the README alone is tried each time."""
+    """Return the pages as parameters; only the README runs each time, the others are marked slow."""
     return [
         page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow)
         for page in pages
@@ -70,18 +70,18 @@ def one_is_quick(pages: Iterable[str]) -> list[Any]:
 @pytest.mark.parametrize("page", one_is_quick(PAGES))
 def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
     with folder_of_a_reader():
-        for command, shown in sessions(
+        for command, shown_output in sessions(
             text_of(page)
         ):  # in order and in one folder, as a reader would type them
             assert (
                 f"{command}\n{rounded(printed(command))}"
-                == f"{command}\n{rounded(shown)}"
+                == f"{command}\n{rounded(shown_output)}"
             )
 
 
 def test_the_sessions_show_the_commands_that_matter_most() -> None:
-    shown = {shlex.split(command)[1] for command, _ in sessions(ALL)}
-    assert {*COMMANDS} - {"rule"} <= shown
+    shown_commands = {shlex.split(command)[1] for command, _ in sessions(ALL)}
+    assert {*COMMANDS} - {"rule"} <= shown_commands
 
 
 @pytest.mark.parametrize(
@@ -118,8 +118,8 @@ def test_no_page_repeats_another() -> None:
         paragraph
         for page in PAGES
         for paragraph in {
-            " ".join(found.split())
-            for found in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))
+            " ".join(text_block.split())
+            for text_block in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))
         }
         if len(paragraph) > 80
     ]
@@ -146,10 +146,14 @@ def test_links_of_a_page_lead_somewhere(page: str) -> None:
 
 
 def test_the_files_that_the_recipes_name_exist() -> None:
-    named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
-    assert len(named) > 20
+    named_files = re.findall(
+        r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md")
+    )
+    assert len(named_files) > 20
     assert not {
-        name for name in named if "NAME" not in name and not (ROOT / name).exists()
+        name
+        for name in named_files
+        if "NAME" not in name and not (ROOT / name).exists()
     }
 
 
@@ -159,13 +163,13 @@ def test_every_command_has_help_and_is_documented_with_its_options(
 ) -> None:
     assert re.search(
         rf"^  {command}  +\w", README, flags=re.MULTILINE
-    )  # in the help of all
-    shown = run(command, "--help").stdout
-    assert re.search(r"Examples:\n +d2rpick", shown)
+    )  # options that every command has
+    result = run(command, "--help").stdout
+    assert re.search(r"Examples:\n +d2rpick", result)
     options = set(
         re.findall(
             r"(?<![\w-])--[a-z][a-z0-9-]+",
-            re.split(r"\n[A-Z][a-z ]+:\n", shown, maxsplit=1)[1].split("Examples:")[0],
+            re.split(r"\n[A-Z][a-z ]+:\n", result, maxsplit=1)[1].split("Examples:")[0],
         )
     )
     common = {
@@ -173,7 +177,7 @@ def test_every_command_has_help_and_is_documented_with_its_options(
         "--input-format",
         "--output-format",
         "--output-file",
-    }  # by their short names
+    }  # options by their short names
     assert not {option for option in options - common if option not in ALL}
 
 
@@ -204,7 +208,7 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
 @pytest.mark.usefixtures("here")
 def test_the_jobs_in_the_documentation_run() -> None:
     shutil.copy(DECK, "main.k")
-    Path("d2rpick").symlink_to(ROOT)  # where the clone lies
+    Path("d2rpick").symlink_to(ROOT)  # the folder of the clone
     jobs = "".join(blocks(ALL, "yaml"))
     assert [
         Path(name, "pyproject.toml").exists()
@@ -231,18 +235,18 @@ def test_the_configuration_in_the_documentation_is_one() -> None:
 def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> None:
     (settings,) = blocks(text_of(page), "toml")
     (here / "d2rpick.toml").write_text(settings)
-    shown = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
+    result = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
     table = tomllib.loads(settings)
     taken = {*table, *table.pop("suggest")} - {
         "suggest",
         "fail-on",
-    }  # which check alone takes
-    assert shown.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
+    }  # options that only check has
+    assert result.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
 
 
 @pytest.mark.usefixtures("here")
 def test_the_parquet_of_the_recipes_is_read() -> None:
-    """Where pandas can: pyarrow is no dependency."""
+    """Only if pandas can read parquet: pyarrow is not a dependency."""
     pytest.importorskip("pyarrow")
     (line,) = re.findall(r"`(pd\.read_parquet\(.*?\))`", text_of("docs/recipes.md"))
     pd.read_csv(ENERGY, index_col="time").to_parquet("energies.parquet")

@@ -1,4 +1,4 @@
-"""What must hold of the package as a whole: the direction of its imports, and what a command loads."""
+"""Structure of the package: the direction of its imports, and the modules that a command loads."""
 
 import ast
 import re
@@ -20,7 +20,7 @@ from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 PACKAGE = ROOT / "d2rpick"
 
-# Each folder imports only from itself and from those on the lines above its own.
+# Each folder imports only from itself and from the lines above its own.
 LAYERS = (
     ("base",),
     ("histories", "deck"),
@@ -35,12 +35,12 @@ LAYERS = (
     ("cli",),
     ("__main__",),
 )
-# The only modules that may import these.
+# The only folders that may import these libraries.
 RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for types
 
 
 def name_of(path: Path) -> str:
-    """Name of a module within the package."""
+    """Return the name of a module within the package."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(part for part in parts if part != "__init__") or "d2rpick"
 
@@ -49,23 +49,25 @@ MODULES = {name_of(path): path for path in PACKAGE.rglob("*.py")}
 
 
 def parsed(module: str) -> ast.Module:
-    """The source of a module."""
+    """Return the syntax tree of a module."""
     return ast.parse(MODULES[module].read_text("utf-8"))
 
 
 def statements(module: str) -> Iterator[ast.AST]:
-    """All statements in the source of a module, however deep, without their expressions."""
-    rest: list[ast.AST] = [parsed(module)]
-    while rest:
-        yield (node := rest.pop())
-        rest += [
-            one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr)
+    """Yield all statements of a module, nested ones included, without their expressions."""
+    nodes_to_visit: list[ast.AST] = [parsed(module)]
+    while nodes_to_visit:
+        yield (node := nodes_to_visit.pop())
+        nodes_to_visit += [
+            child
+            for child in ast.iter_child_nodes(node)
+            if not isinstance(child, ast.expr)
         ]
 
 
 @cache
 def imports(module: str) -> frozenset[str]:
-    """Names of all modules that a module imports, also for type checking, those of the package without its name."""
+    """Return the names of all modules that a module imports, also for type checking; without the package's name."""
     return frozenset(_imports(module))
 
 
@@ -86,11 +88,11 @@ def _imports(module: str) -> Iterator[str]:
 LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
 INNER = sorted(
     name for name in MODULES if name != "d2rpick"
-)  # the public face stands above all
+)  # the public names are above all layers
 
 
 def folder(module: str) -> str:
-    """Folder of a module at the root of the package."""
+    """Return the top folder of a module in the package."""
     return module.partition(".")[0]
 
 
@@ -100,27 +102,27 @@ def test_every_folder_has_its_layer() -> None:
 
 def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
     inner = {*INNER}
-    found = {
+    wrong_imports = {
         (module, name)
         for module in INNER
         for name in imports(module) & inner
         if folder(name) != folder(module)
         and LAYER[folder(name)] >= LAYER[folder(module)]
     }
-    assert not found
+    assert not wrong_imports
     assert not [
         module for module in INNER if "d2rpick" in imports(module)
-    ]  # the public face stands above all
+    ]  # the public names are above all layers
 
 
 def test_the_command_line_knows_the_library_results_and_base_alone() -> None:
-    known = {
+    known_folders = {
         folder(name)
         for module in INNER
         if folder(module) == "cli"
         for name in imports(module) & {*INNER}
     }
-    assert known == {"cli", "api", "report", "base"}
+    assert known_folders == {"cli", "api", "report", "base"}
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
@@ -176,36 +178,36 @@ SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
 
 
 def swapped(tree: ast.Module) -> Iterator[str]:
-    """What a test module sets attributes or entries of: the name that it begins with."""
+    """Yield the first name of each expression whose attributes or entries a test module replaces by monkeypatch."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and SWAP.search(ast.unparse(node.func)):
             yield re.findall(r"\w+", ast.unparse(node.args[0]))[0]
 
 
 def test_tests_swap_names_of_the_standard_library_alone() -> None:
-    """Where a module of ours moves, a test that swaps a name in it would have to be written anew."""
+    """A test that replaces a name of our modules must be rewritten if the module moves."""
     sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("*.py")}
     for path, tree in (
         (path, ast.parse(text)) for path, text in sources.items() if SWAP.search(text)
     ):
         froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         theirs = {
-            one.name
+            name.name
             for node in froms
             if node.module in sys.stdlib_module_names
-            for one in node.names
+            for name in node.names
         }
         assert {*swapped(tree)} <= theirs | sys.stdlib_module_names, path
 
 
 def test_no_file_is_mapped_into_memory() -> None:
-    """Where a mapped file is cut by another program, the system ends the process."""
+    """If another program cuts a mapped file, the system kills the process."""
     assert not [module for module in MODULES if "mmap" in imports(module)]
 
 
 @cache
 def loaded(*args: str) -> frozenset[str]:
-    """Modules that a call of the program has loaded by its end."""
+    """Return the modules that a call of the program has loaded when it ends."""
     code = (
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
         "from d2rpick.__main__ import main; main()"
@@ -224,20 +226,21 @@ def loaded(*args: str) -> frozenset[str]:
 
 @cache
 def beside(libraries: str) -> frozenset[str]:
-    """Modules of a process that imports nothing but some libraries."""
+    """Return the modules of a process that imports only these libraries."""
     return frozenset(
         printed_by(f"import sys, {libraries}; print(*sys.modules)").split()
     )
 
 
 def share(modules: frozenset[str]) -> float:
-    """How much of the package these of its modules are, by the bytes of their sources."""
+    """Return the share of the package that these modules are, by source size [bytes]."""
     size = {name: path.stat().st_size for name, path in MODULES.items()}
     loaded = {name.removeprefix("d2rpick.") for name in modules}
     return sum(size[name] for name in loaded) / sum(size.values())
 
 
-# What else of the standard library and of numpy costs start-up, and an answer to a plain table does without.
+# Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
+# need.
 UNNEEDED = {
     *(
         "pathlib",
@@ -277,7 +280,7 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
 
 @pytest.mark.parametrize(
-    ("args", "libraries", "most"),
+    ("args", "libraries", "module_limit"),
     [
         (("--help",), "click", 0.02),
         (("--version",), "click", 0.02),
@@ -296,18 +299,18 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
     ],
 )
 def test_a_command_loads_only_what_its_answer_needs(
-    args: tuple[str, ...], libraries: str, most: float
+    args: tuple[str, ...], libraries: str, module_limit: float
 ) -> None:
-    """No library but these, and so much of the package at most: a file more is worth a thought."""
-    there = beside(libraries)
-    assert "d2rpick" not in there
-    mine = loaded(*args) - there
-    own = frozenset(name for name in mine if folder(name) == "d2rpick")
-    assert {folder(name) for name in mine - own} <= {
+    """No other library, and at most this share of the package: a further module must be justified."""
+    libraries_beside = beside(libraries)
+    assert "d2rpick" not in libraries_beside
+    mine = loaded(*args) - libraries_beside
+    own_modules = frozenset(name for name in mine if folder(name) == "d2rpick")
+    assert {folder(name) for name in mine - own_modules} <= {
         *sys.stdlib_module_names,
         *re.findall(r"\w+", libraries),
     }
-    assert share(own) <= most
+    assert share(own_modules) <= module_limit
 
 
 @pytest.mark.parametrize(
@@ -333,7 +336,7 @@ def test_a_small_deck_needs_little_of_what_python_has() -> None:
 
 
 def printed_by(code: str) -> str:
-    """What a fresh interpreter prints."""
+    """Return the output of a fresh interpreter."""
     result = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
@@ -346,7 +349,7 @@ def printed_by(code: str) -> str:
 
 
 def test_the_package_alone_imports_nothing() -> None:
-    """What typing and its like make is looked through for garbage, unless the command line comes first."""
+    """Otherwise garbage collection scans the objects of typing and the like, unless the command line comes first."""
     code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
     assert {*printed_by(code).split()} <= {
         "d2rpick",
@@ -371,7 +374,7 @@ def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are(
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
 
-# The result of each command that knows JSON, and the number of its schema.
+# The result of each command with JSON output, and the version of its schema.
 SCHEMAS = [
     f"schemas/{name}.json"
     for name in (

@@ -1,4 +1,4 @@
-"""glstat and matsum as LS-DYNA writes them, from numbers."""
+"""glstat and matsum texts as LS-DYNA writes them, from numbers."""
 
 from collections.abc import Sequence
 
@@ -23,15 +23,22 @@ def glstat_line(label: str, value: float) -> bytes:
 
 
 def glstat_blocks(times: ArrayLike, energies: ArrayLike) -> list[bytes]:
-    """One block per state: controller line, values (other than the energies: their rank), two blank lines."""
-    rest = {label: glstat_line(label, rank) for rank, label in enumerate(LABELS)}
-    rest["spring and damper energy"] = glstat_line("spring and damper energy", 1e-20)
-    fixed = [rest[label] for label in LABELS]
-    place = LABELS.index("internal energy")
-    before, behind = b"".join(fixed[:place]), b"".join(fixed[place + 1 :]) + LAST
+    """Return a block per state: controller line, values, two blank lines; values other than energies are their rank."""
+    other_labels = {
+        label: glstat_line(label, rank) for rank, label in enumerate(LABELS)
+    }
+    other_labels["spring and damper energy"] = glstat_line(
+        "spring and damper energy", 1e-20
+    )
+    fixed = [other_labels[label] for label in LABELS]
+    energy_rank = LABELS.index("internal energy")
+    before_energy, after_energy = (
+        b"".join(fixed[:energy_rank]),
+        b"".join(fixed[energy_rank + 1 :]) + LAST,
+    )
     return [
         b" dt of cycle%8d is controlled by solid         100449 of part        10\n\n" % (24 * state + 1)
-        + glstat_line("time", time) + before + glstat_line("internal energy", energy) + behind + b"\n\n"
+        + glstat_line("time", time) + before_energy + glstat_line("internal energy", energy) + after_energy + b"\n\n"
         for state, (time, energy) in enumerate(zip(np.asarray(times), np.asarray(energies), strict=True))
     ]  # fmt: skip
 
@@ -51,7 +58,7 @@ def matsum_head(ids: Sequence[int]) -> bytes:
 
 
 def matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
-    """Lines of one part; numbers other than its internal energy are 0."""
+    """Return the lines of one part; numbers other than its internal energy are 0."""
     zero = b"   0.0000E+00"
     number = b"%5d             " % id_ if id_ < 100_000 else b"%8d          " % id_
     text = (

@@ -167,22 +167,22 @@ class Mesh:
     )
     _numbers: dict[Place, int] = field(default_factory=dict)
 
-    def node(self, place: Iterable[float]) -> int:
+    def node(self, position: Iterable[float]) -> int:
         """Give the number of the node at a place, a new one if there is none."""
-        x, y, z = (round(float(value), 7) + 0.0 for value in place)
+        x, y, z = (round(float(value), 7) + 0.0 for value in position)
         if (x, y, z) not in self._numbers:
             self.places.append((x, y, z))
             self._numbers[x, y, z] = len(self.places)
         return self._numbers[x, y, z]
 
-    def add_beam(self, start: Reals, end: Reals, beside: Reals) -> None:
+    def add_beam(self, start: Reals, end: Reals, side_vector: Reals) -> None:
         """Add the elements of a beam; the node ``beside`` it orients its section."""
         stations = (
             start + share * (end - start)
             for share in np.linspace(0, 1, _BEAM_PIECES + 1)
         )
         numbers = [self.node(station) for station in stations]
-        orients = self.node(beside)
+        orients = self.node(side_vector)
         self.elements[_BEAMS] += [
             [first, second, orients] for first, second in pairwise(numbers)
         ]
@@ -251,10 +251,13 @@ def write_deck(landing: Landing) -> str:
 
 
 def _node_cards(mesh: Mesh) -> str:
-    places = {**dict(enumerate(mesh.places, start=1)), MAIN_NODE: tuple(_LENGTHS / 2)}
+    positions = {
+        **dict(enumerate(mesh.places, start=1)),
+        MAIN_NODE: tuple(_LENGTHS / 2),
+    }
     lines = (
         f"{number:10d}{x:20.9g}{y:20.9g}{z:20.9g}"
-        for number, (x, y, z) in places.items()
+        for number, (x, y, z) in positions.items()
     )
     return "\n".join(("/NODE", *lines))
 

@@ -78,8 +78,8 @@ class AllNodes(Model):
     def deck(self) -> bytes:
         """Give the starter deck."""
         text = super().deck().decode()
-        before, rest = text.split("/TH/NODE/1\n")
-        after = rest[rest.index("/TH/PART/") :]
+        text_before, text_after = text.split("/TH/NODE/1\n")
+        tail = text_after[text_after.index("/TH/PART/") :]
         nodes = (
             text.partition(f"/GRNOD/NODE/{self.group}\n")[2]
             .partition("\n/")[0]
@@ -92,7 +92,7 @@ class AllNodes(Model):
             if int(node) != self.main
         )
         variables = "DX        DY        DZ        VX        VY        VZ"
-        return f"{self._switch_group(before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
+        return f"{self._switch_group(text_before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{tail}".encode()
 
     def _switch_group(self, text: str) -> str:
         """Let the first rigid body hold the group."""
@@ -233,10 +233,10 @@ class Reference:
         """Compare a switched run."""
         landing = self._compare_landings(legs, pair[1])
         start, end = pair[1] + _CLEAR, self.record(pair[1]).landing - _CLEAR
-        wanted, found = (
+        wanted, reference_motion = (
             read_motion(names, self.nodes, start, end) for names in (self.legs, legs)
         )
-        vibration = compare_vibration(wanted, found, self.nodes)
+        vibration = compare_vibration(wanted, reference_motion, self.nodes)
         worth = (
             vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
         )
@@ -368,15 +368,15 @@ def main() -> None:
         metavar="CASE",
         help=f"of {', '.join(CASES)}; by default all",
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         print("skipped: OPENRADIOSS_PATH is not set")
         return
     table = csv.writer(sys.stdout, lineterminator="\n")
     table.writerow(_COLUMNS)
-    for name in given.cases or CASES:
-        for row in study(CASES[name], given.folder / name, Path(solver)):
+    for name in options.cases or CASES:
+        for row in study(CASES[name], options.folder / name, Path(solver)):
             for line in cells(name, row):
                 table.writerow(
                     [

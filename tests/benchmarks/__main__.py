@@ -15,7 +15,7 @@ from importlib import import_module
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from tests.benchmarks.timing import ROOT, processor_seconds, ratio
+from tests.benchmarks.timing import ROOT, measure_processor_seconds, measure_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -36,11 +36,11 @@ def process_ratio(
     libraries: str, *args: str, env: Mapping[str, str] | None = None
 ) -> float:
     """Processor time of a command over that of a process that only imports what it cannot do without."""
-    own = (THREADS, "PYTHONDONTWRITEBYTECODE")
+    own_settings = (THREADS, "PYTHONDONTWRITEBYTECODE")
     clean = {
         name: value
         for name, value in os.environ.items()
-        if name not in own and not name.startswith("D2RPICK_")
+        if name not in own_settings and not name.startswith("D2RPICK_")
     }
 
     def process(*command: str) -> Callable[[], object]:
@@ -52,13 +52,18 @@ def process_ratio(
             env={**clean, **(env or {})},
         )
 
-    ours, least = process("-m", "d2rpick", *args), process("-c", f"import {libraries}")
+    ours, lower_bound = (
+        process("-m", "d2rpick", *args),
+        process("-c", f"import {libraries}"),
+    )
     with TemporaryDirectory() as compiled:
         clean["PYTHONPYCACHEPREFIX"] = (
             compiled  # an installed package is compiled; a working copy may not be
         )
-        ours(), least()
-        return ratio(ours, least, _PROCESSES, cost=processor_seconds)
+        ours(), lower_bound()
+        return measure_ratio(
+            ours, lower_bound, _PROCESSES, cost=measure_processor_seconds
+        )
 
 
 def integration_ratio(repeats: int) -> float:
@@ -102,7 +107,7 @@ def integration_ratio(repeats: int) -> float:
         np.testing.assert_allclose(
             ours, theirs, rtol=0, atol=1e-9 * np.max(np.abs(theirs))
         )
-    return ratio(integrated, closed_form, _ROUNDS, repeats)
+    return measure_ratio(integrated, closed_form, _ROUNDS, repeats)
 
 
 def measured(
@@ -111,10 +116,10 @@ def measured(
     """Give a measure of a module here, which is imported, and makes its files, when it is asked."""
 
     def measure() -> float | None:
-        found: float | None = getattr(
+        figure: float | None = getattr(
             import_module(f"tests.benchmarks.{module}"), name
         )(*args)
-        return found
+        return figure
 
     return measure
 
@@ -530,19 +535,19 @@ def main() -> int:
     print(f"{'ratio':<54}  measured  goal")
     missed = []
     for row in (row for row in ROWS if any(word in row.what for word in words)):
-        found = row.measure()
-        if found is None:
+        figure = row.measure()
+        if figure is None:
             print(f"{row.what:<54}  not installed")
             continue
         goal = (
             f"<= {row.most:g}" if row.most else f">= {row.least:g}" if row.least else ""
         )
-        met = (row.most is None or found <= row.most) and (
-            row.least is None or found >= row.least
+        met = (row.most is None or figure <= row.most) and (
+            row.least is None or figure >= row.least
         )
         missed += [row.what.strip()] * (not met)
         print(
-            f"{row.what:<54}  {found:8.2f}  {goal}{'' if met else '  missed'}".rstrip(),
+            f"{row.what:<54}  {figure:8.2f}  {goal}{'' if met else '  missed'}".rstrip(),
             flush=True,
         )
     print("goals missed: " + ("; ".join(missed) or "none"))

@@ -49,7 +49,7 @@ class Flown(NamedTuple):
 TIME: Final = np.linspace(0, 1, STATES + 1)
 
 
-def computed(
+def compute_runs(
     random: np.random.Generator, count: int, force: Force, *, falling: bool
 ) -> Iterator[Flown]:
     """Integrate ``count`` chains in time at once."""
@@ -136,15 +136,15 @@ def repeated(random: np.random.Generator, count: int) -> Force:
 
 def wall(random: np.random.Generator, count: int) -> Force:
     """A fixed elastic wall: it throws back what hits it, and what it stores for a moment is written nowhere."""
-    at, stiffness = (
+    wall_position, stiffness = (
         random.uniform(0.02, 1.0, count),
         10 ** random.uniform(4, 6.5, count),
     )
 
     def force(_: float, moved: Samples, __: Samples) -> Samples:
-        size = -stiffness * np.maximum(moved[:, 0] - at, 0) + stiffness * np.maximum(
-            -moved[:, 0] - at, 0
-        )
+        size = -stiffness * np.maximum(
+            moved[:, 0] - wall_position, 0
+        ) + stiffness * np.maximum(-moved[:, 0] - wall_position, 0)
         return np.column_stack([size, np.zeros(count)])
 
     return force
@@ -171,7 +171,7 @@ CLASSES: Final = {
 }
 
 
-def history_of(run: Flown, form: str) -> History:
+def make_history(run: Flown, form: str) -> History:
     """Write a run in one of the `FORMS`."""
     precision = Precision(DIGITS)
     kinetic, internal = printed(run.kinetic, DIGITS), printed(run.internal, DIGITS)
@@ -183,8 +183,10 @@ def history_of(run: Flown, form: str) -> History:
         values = np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)
         values = printed(values.ravel(), DIGITS).reshape(values.shape)
         masses = run.masses if form == "parts" else run.masses.sum(keepdims=True)
-        known, chosen = (PARTS, (0, 1, 2)) if form == "parts" else (None, (0,))
-        momenta = (Momenta(TIME, values, known, precision, chosen, masses=masses),)
+        history_parts, chosen = (PARTS, (0, 1, 2)) if form == "parts" else (None, (0,))
+        momenta = (
+            Momenta(TIME, values, history_parts, precision, chosen, masses=masses),
+        )
     velocity = momenta[0].values[:, 0] if form == "momenta" else None
     balance = Balance(TIME, internal, kinetic, velocity=velocity, precision=precision)
     return History(
@@ -198,13 +200,15 @@ def history_of(run: Flown, form: str) -> History:
     )
 
 
-def counted(run: Flown, form: str) -> Counter[str]:
+def count_flights(run: Flown, form: str) -> Counter[str]:
     """Count flights claimed that are not graded poor, those that are wrong, true flights, and those that are missed."""
-    found = flights_of(history_of(run, form), Settings(replay=False))
-    claims = [(f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in found]
+    claimed_flights = flights_of(make_history(run, form), Settings(replay=False))
+    claims = [
+        (f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in claimed_flights
+    ]
     believed = [
         claim
-        for claim, flight in zip(claims, found, strict=True)
+        for claim, flight in zip(claims, claimed_flights, strict=True)
         if not flight.unknown_load
     ]
     impulse = np.concatenate(
@@ -215,9 +219,12 @@ def counted(run: Flown, form: str) -> Counter[str]:
     )
     largest = np.linalg.norm(run.momentum.sum(axis=1), axis=1).max()
     inside = [impulse[(start <= TIME) & (end >= TIME)] for start, end in believed]
-    wrong = sum(
-        bool(np.linalg.norm(one - one[0], axis=1).max() > LITTLE * largest)
-        for one in inside
+    wrong_count = sum(
+        bool(
+            np.linalg.norm(flight_momentum - flight_momentum[0], axis=1).max()
+            > LITTLE * largest
+        )
+        for flight_momentum in inside
     )
     size = np.linalg.norm(run.force, axis=1)
     edges = np.flatnonzero(
@@ -229,21 +236,25 @@ def counted(run: Flown, form: str) -> Counter[str]:
         if b - a > LONG * STATES
     ]
     flights = [
-        one for one in flights if _steady_for(impulse, one, LITTLE * largest) > LONG
+        flight_momentum
+        for flight_momentum in flights
+        if _measure_steady_time(impulse, flight_momentum, LITTLE * largest) > LONG
     ]
     missed = sum(
         not any(start < b and a < end for start, end in claims) for a, b in flights
     )
     return Counter(
-        claimed=len(believed), wrong=wrong, flights=len(flights), missed=missed
+        claimed=len(believed), wrong=wrong_count, flights=len(flights), missed=missed
     )
 
 
-def _steady_for(impulse: Samples, flight: tuple[float, float], most: float) -> float:
+def _measure_steady_time(
+    impulse: Samples, flight: tuple[float, float], limit: float
+) -> float:
     """How long the end of a flight lasts in which the force changes the momentum by at most ``most``."""
-    first, last = (round(one * STATES) for one in flight)
-    left = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
-    return float(np.count_nonzero(left <= most)) / STATES
+    first, last = (round(impulse_in_flight * STATES) for impulse_in_flight in flight)
+    momentum_change = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
+    return float(np.count_nonzero(momentum_change <= limit)) / STATES
 
 
 def main(count: int = 300, seed: int = 27) -> None:
@@ -253,12 +264,13 @@ def main(count: int = 300, seed: int = 27) -> None:
     for number, (name, load) in enumerate(CLASSES.items()):
         random = np.random.default_rng((seed, number))
         runs = list(
-            computed(random, count, load(random, count), falling=name != "friction")
+            compute_runs(random, count, load(random, count), falling=name != "friction")
         )
         for form in FORMS:
-            total = sum((counted(run, form) for run in runs), Counter[str]())
+            total = sum((count_flights(run, form) for run in runs), Counter[str]())
             print(
-                f"{name:10s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names)
+                f"{name:10s}{form:10s}"
+                + "".join(f"{total[form_name]:9d}" for form_name in names)
             )
 
 

@@ -16,7 +16,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode
-from tests.benchmarks.timing import ratio
+from tests.benchmarks.timing import measure_ratio
 from tests.records import (
     ENERGY,
     MODE,
@@ -57,12 +57,12 @@ def to_scipy() -> float:
         return mode.omega
 
     assert abs(ours() / scipy_fit() - 1) < 1e-7
-    return ratio(ours, scipy_fit, _ROUNDS)
+    return measure_ratio(ours, scipy_fit, _ROUNDS)
 
 
 def residual_error(kind: str, count: int) -> float:
     """How far the stated residual is off at most in 95 % of so many random records [-]."""
-    return within(small_second_modes(kind, range(count)))[0]
+    return summarize_records(small_second_modes(kind, range(count)))[0]
 
 
 class Stated(NamedTuple):
@@ -80,26 +80,33 @@ class Stated(NamedTuple):
 def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
     """What is stated of random records, seeded, of one of the kinds; those without a recommended pair left out."""
     return [
-        found
+        stated_records
         for seed in seeds
-        if (found := _stated(np.random.default_rng(seed), _SHARES[kind]))
+        if (
+            stated_records := _state_residual(
+                np.random.default_rng(seed), _SHARES[kind]
+            )
+        )
     ]
 
 
-def within(found: list[Stated]) -> tuple[float, float, float]:
+def summarize_records(records: list[Stated]) -> tuple[float, float, float]:
     """95th percentile of how far residuals are off, and off their range; share of the intervals that hold tr."""
-    off = [abs(one.stated - one.true) for one in found]
-    beyond = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
-    held = [one.held for one in found if one.held is not None]
+    deviations = [abs(record.stated - record.true) for record in records]
+    beyond = [
+        max(record.stated - record.true, record.true - record.highest, 0.0)
+        for record in records
+    ]
+    held = [record.held for record in records if record.held is not None]
     return (
-        float(np.percentile(off, 95)),
+        float(np.percentile(deviations, 95)),
         float(np.percentile(beyond, 95)),
         float(np.mean(held)),
     )
 
 
-def _stated(rng: np.random.Generator, least: float) -> Stated | None:
-    truth, time, noise = _random_modes(rng, least * 10 ** rng.uniform())
+def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | None:
+    truth, time, noise = _draw_modes(rng, least_share * 10 ** rng.uniform())
     energy = energy_of(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
@@ -108,24 +115,28 @@ def _stated(rng: np.random.Generator, least: float) -> Stated | None:
         td,
         Settings(after=0.0),
     )
-    best = next((one for one in answer.candidates if one.recommended), None)
+    best = next(
+        (candidate for candidate in answer.candidates if candidate.recommended), None
+    )
     if best is None or best.residual is None:
         return None
     assert best.residual_high is not None
     assert best.tr_low is not None
     assert best.tr_high is not None
     crossings = level_crossings(truth, td, -0.2)
-    seen = best.kind == "crossing" and bool(np.any(np.abs(crossings - best.tr) < _NEAR))
+    is_crossing_seen = best.kind == "crossing" and bool(
+        np.any(np.abs(crossings - best.tr) < _NEAR)
+    )
     held = (
         bool(np.any((best.tr_low <= crossings) & (crossings <= best.tr_high)))
-        if seen
+        if is_crossing_seen
         else None
     )
     true = float(replayed_residual(truth, np.array([best.tr]), td)[0])
     return Stated(best.residual, best.residual_high, true, held)
 
 
-def _random_modes(
+def _draw_modes(
     rng: np.random.Generator, share: float
 ) -> tuple[list[Mode], Samples, float]:
     """Modes of one damping, the first with period 1, the other with that share of the energy; times, and noise."""
@@ -148,7 +159,7 @@ def _random_modes(
 if __name__ == "__main__":
     for name, count in (("one", 600), ("small", 200), ("large", 200)):
         records = small_second_modes(name, range(count))
-        residual, beyond, crossing = within(records)
+        residual, beyond, crossing = summarize_records(records)
         print(
             f"{name}: {len(records)} of {count}, 95 % within {residual:.3g}, {beyond:.3g}; tr held {crossing:.3f}"
         )

@@ -22,10 +22,10 @@ from d2rpick.choice.question import Settings, read
 from tests.benchmarks.chains import (
     Chains,
     Run,
-    directions,
-    half_sine,
-    integrated,
-    on_first,
+    apply_half_sine,
+    apply_to_first,
+    draw_directions,
+    integrate_chains,
 )
 from tests.written_runs import WRITERS
 
@@ -99,13 +99,13 @@ def late_contact(random: np.random.Generator, count: int) -> Load:
         random.uniform(0.4, 0.85, count),
         10 ** random.uniform(-2, -0.7, count),
     )
-    size, along = 10 ** random.uniform(-1.5, 1, count), directions(random, count)
+    size, along = 10 ** random.uniform(-1.5, 1, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+        pushed = (size * masses.sum(axis=1) * apply_half_sine(time, start, length))[
             :, np.newaxis
         ] * along
-        return on_first(pushed)
+        return apply_to_first(pushed)
 
     return Load(force)
 
@@ -113,12 +113,14 @@ def late_contact(random: np.random.Generator, count: int) -> Load:
 def airbag(random: np.random.Generator, count: int) -> Load:
     """A pressure that rises at once and leaks away."""
     start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
-    size, along = 10 ** random.uniform(-0.5, 1.5, count), directions(random, count)
+    size, along = 10 ** random.uniform(-0.5, 1.5, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
         since = np.maximum(time - start, 0) / lasts
         pressure = np.where(time > start, since * np.exp(1 - 4 * since), 0.0)
-        return on_first((size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along)
+        return apply_to_first(
+            (size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along
+        )
 
     return Load(force)
 
@@ -130,10 +132,12 @@ def rope(random: np.random.Generator, count: int) -> Load:
         10 ** random.uniform(1, 4, (count, 1)),
     )
 
-    def force(_: float, __: Samples, places: Samples, ___: Samples) -> Samples:
-        distance = np.linalg.norm(places[:, 0], axis=1, keepdims=True)
+    def force(_: float, __: Samples, positions: Samples, ___: Samples) -> Samples:
+        distance = np.linalg.norm(positions[:, 0], axis=1, keepdims=True)
         stretched = np.maximum(distance - length, 0)
-        return on_first(-pull * stretched * places[:, 0] / np.maximum(distance, 1e-9))
+        return apply_to_first(
+            -pull * stretched * positions[:, 0] / np.maximum(distance, 1e-9)
+        )
 
     return Load(force)
 
@@ -141,10 +145,10 @@ def rope(random: np.random.Generator, count: int) -> Load:
 def couple(random: np.random.Generator, count: int) -> Load:
     """Two opposite forces on two masses: they change no momentum."""
     start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
-    size, along = 10 ** random.uniform(-1, 1, count), directions(random, count)
+    size, along = 10 ** random.uniform(-1, 1, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+        pushed = (size * masses.sum(axis=1) * apply_half_sine(time, start, length))[
             :, np.newaxis
         ] * along
         return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
@@ -156,12 +160,12 @@ def other_gravity(random: np.random.Generator, count: int) -> Load:
     """Gravity of another planet, which without a deck no file tells from a load."""
     size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
 
-    def force(_: float, masses: Samples, places: Samples, __: Samples) -> Samples:
+    def force(_: float, masses: Samples, positions: Samples, __: Samples) -> Samples:
         return np.asarray(
             masses[..., np.newaxis]
             * size
             * np.array([0.0, -1.0])
-            * np.ones_like(places)
+            * np.ones_like(positions)
         )
 
     return Load(force, falling=False)
@@ -173,7 +177,7 @@ CLASSES: Final = {
 }
 
 
-def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
+def compute_runs(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
     """Integrate ``count`` chains that are pushed, and then fly but for their load.
 
     Every other one has a single spring and moves along x: one oscillator describes its energy.
@@ -186,35 +190,37 @@ def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Ru
     damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1))
     falls = (random.integers(0, 2, count) * load.falling)[:, np.newaxis, np.newaxis]
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
-    speed = directions(random, count) * random.uniform(1, 12, (count, 1))
-    places = random.normal(size=(count, 3, 2)) * random.uniform(
+    speed = draw_directions(random, count) * random.uniform(1, 12, (count, 1))
+    positions = random.normal(size=(count, 3, 2)) * random.uniform(
         1e-3, 2e-2, (count, 1, 1)
     )
-    places[::2, :, 1] = 0
+    positions[::2, :, 1] = 0
     velocities, never = np.repeat(speed[:, np.newaxis], 3, axis=1), np.zeros(count)
     chains = Chains(
-        masses, stiffness, damping, 0 * stiffness, never, places, velocities
+        masses, stiffness, damping, 0 * stiffness, never, positions, velocities
     )
     whole, lasts = masses.sum(axis=1), random.uniform(0.02, 0.1, count)
     pushed = (
-        directions(random, count)
+        draw_directions(random, count)
         * (whole * random.uniform(5, 50, count))[:, np.newaxis]
     )
 
     def force(time: float, moved: Samples, velocity: Samples) -> Samples:
-        push = on_first(pushed * half_sine(time, 0 * lasts, lasts)[:, np.newaxis])
+        push = apply_to_first(
+            pushed * apply_half_sine(time, 0 * lasts, lasts)[:, np.newaxis]
+        )
         return load.force(time, masses, moved, velocity) + push
 
-    yield from integrated(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
+    yield from integrate_chains(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
 
 
-def changes(impulse: Samples, time: Samples, start: float, end: float) -> float:
+def measure_change(impulse: Samples, time: Samples, start: float, end: float) -> float:
     """Largest change of an impulse (n, 2) from ``start`` to ``end``."""
     inside = impulse[(time >= start) & (time <= end)]
     return float(np.linalg.norm(inside - inside[:1], axis=1).max(initial=0.0))
 
 
-def counted(reference: Reference, run: Run) -> Counter[str]:
+def count_pairs(reference: Reference, run: Run) -> Counter[str]:
     """Count the pairs that are not called poor, those that are wrong, true flights, and those that no source shows."""
     counts: Counter[str] = Counter()
     time, impulse = run.written.time, run.impulse
@@ -228,23 +234,25 @@ def counted(reference: Reference, run: Run) -> Counter[str]:
         if pair is None or answer.quality is None or answer.quality.grade == "poor":
             continue
         counts["pairs"] += 1
-        counts["wrong"] += changes(impulse, time, pair.tr, pair.td) > WRONG * largest
-    true = list(_true_flights(impulse, time, STEADY * largest))
+        counts["wrong"] += (
+            measure_change(impulse, time, pair.tr, pair.td) > WRONG * largest
+        )
+    true = list(_find_true_flights(impulse, time, STEADY * largest))
     try:
-        shown = [
-            one.within(time)
-            for one in flights_of(reference.history, Settings(replay=False))
+        shown_flights = [
+            flight_found.within(time)
+            for flight_found in flights_of(reference.history, Settings(replay=False))
         ]
     except D2RPickError:
-        shown = []
+        shown_flights = []
     counts["flights"] += len(true)
     counts["missed"] += sum(
-        not any(start < b and a < end for start, end in shown) for a, b in true
+        not any(start < b and a < end for start, end in shown_flights) for a, b in true
     )
     return counts
 
 
-def _true_flights(
+def _find_true_flights(
     impulse: Samples, time: Samples, room: float
 ) -> Iterator[tuple[float, float]]:
     """Give the longest stretches in which an impulse changes by at most ``room``, one after the other."""
@@ -273,14 +281,14 @@ def main(count: int = 60, seed: int = 48) -> None:
     with TemporaryDirectory() as folder:
         for number, (name, load) in enumerate(CLASSES.items()):
             random = np.random.default_rng((seed, number))
-            runs = list(computed(random, count, load(random, count)))
+            runs = list(compute_runs(random, count, load(random, count)))
             for form, write in WRITERS.items():
                 total: Counter[str] = Counter()
                 for run in runs:
-                    total += counted(read([write(run.written, Path(folder))]), run)
+                    total += count_pairs(read([write(run.written, Path(folder))]), run)
                 print(
                     f"{name:15s}{form:10s}"
-                    + "".join(f"{total[one]:9d}" for one in names),
+                    + "".join(f"{total[load_name]:9d}" for load_name in names),
                     flush=True,
                 )
 

@@ -174,7 +174,7 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
     good = pairs[pairs["grade"] == "good"]
     banded = pairs[pairs["high"].notna()]
     above = banded["true"] - banded["high"]
-    off = above.combine(banded["low"] - banded["true"], max)
+    outside_band = above.combine(banded["low"] - banded["true"], max)
     early = pairs["flight_start"] - pairs["tr"]
     flight_time = pairs["flight_end"] - pairs["flight_start"]
     return {
@@ -190,8 +190,8 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
         "R>0.3, said <0.25": _count(said_sure["true"] > BAD),
         "good of oracle<0.2": _count(possible["grade"] == "good"),
         "good, R>0.3": _count(good["true"] > BAD),
-        "in band": _share(off <= _ROUNDING),
-        "+-0.05": _share(off <= WITHIN),
+        "in band": _compute_share(outside_band <= _ROUNDING),
+        "+-0.05": _compute_share(outside_band <= WITHIN),
         "worst above": f"{above.max():.2f}" if len(above) else "-",
         "by basis": ", ".join(
             f"{basis} {count}" for basis, count in pairs["basis"].value_counts().items()
@@ -203,7 +203,7 @@ def _count(hits: pd.Series[bool]) -> str:
     return f"{int(hits.sum())}/{len(hits)}"
 
 
-def _share(hits: pd.Series[bool]) -> str:
+def _compute_share(hits: pd.Series[bool]) -> str:
     return f"{hits.mean():.3f} of {len(hits)}" if len(hits) else "-"
 
 

@@ -32,26 +32,26 @@ HEAD = (
 )
 
 
-def rehearsed(number: int) -> Rehearsal:
+def rehearse_set(number: int) -> Rehearsal:
     """One set, a tr every 6 ms in the trip."""
     with TemporaryDirectory() as folder:
-        return rehearse(SETS[number], Path(folder), every=2)
+        return rehearse(SETS[number], Path(folder), stride=2)
 
 
-def line(number: int, one: Rehearsal) -> tuple[str, bool]:
+def format_line(number: int, trial: Rehearsal) -> tuple[str, bool]:
     """Everything about one set, and whether it is right."""
-    p, run = one.parameters, one.reference
-    good = one.roll_share < 0.1 and abs(one.energy_off) < 0.25
+    p, run = trial.parameters, trial.reference
+    good = trial.roll_share < 0.1 and abs(trial.energy_off) < 0.25
     text = (
         f"{number:2d}  {p.stiffness:9.3g}  {p.yield_strain:.5f}  {p.damping:5.2f}  {p.speed:5.2f}  {p.mesh:4d}"
-        f"  {(run.released or np.nan) * 1e3:8.1f}  {(run.landed or np.nan) * 1e3:6.1f}  {one.td:.3f}"
-        f"  {one.tr or np.nan:.5f}  {one.error:10.4f}  {one.roll_share:8.4f}"
-        f"  {one.announced:9.3f}  {one.mean_ratio:.3f}  {one.energy_off:+.3f}{'' if good else '  FAILED'}"
+        f"  {(run.released or np.nan) * 1e3:8.1f}  {(run.landed or np.nan) * 1e3:6.1f}  {trial.td:.3f}"
+        f"  {trial.tr or np.nan:.5f}  {trial.error:10.4f}  {trial.roll_share:8.4f}"
+        f"  {trial.announced:9.3f}  {trial.mean_ratio:.3f}  {trial.energy_off:+.3f}{'' if good else '  FAILED'}"
     )
     return text, good
 
 
-def saving(mesh: int) -> str:
+def measure_saving(mesh: int) -> str:
     """Bar updates and wall time of a switched run over those of the run without switching."""
     parameters = Parameters(mesh=mesh)
     pairs = [
@@ -68,8 +68,8 @@ def main() -> int:
     missed = 0
     print(HEAD)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for number, one in enumerate(pool.map(rehearsed, range(len(SETS)))):
-            text, good = line(number, one)
+        for number, trial in enumerate(pool.map(rehearse_set, range(len(SETS)))):
+            text, good = format_line(number, trial)
             missed += not good
             print(text, flush=True)
     print(
@@ -77,7 +77,7 @@ def main() -> int:
     )
     print("mesh  step     bar updates   wall time  seconds")
     for mesh in (8, 16, 32, 64):
-        print(saving(mesh), flush=True)
+        print(measure_saving(mesh), flush=True)
     run = simulate(Parameters(), 0.4)
     start = perf_counter()
     suggest(history_of(run), 0.37, Settings())

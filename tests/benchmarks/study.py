@@ -107,12 +107,12 @@ def process(*args: str) -> tuple[float, float, bytes]:
         [sys.executable, "-c", code, sys.executable, *args], stdout=subprocess.PIPE, check=True, cwd=ROOT,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     ).stdout  # fmt: skip
-    head, _, rest = result.partition(b"\n")
+    head, _, last_line = result.partition(b"\n")
     seconds, memory = json.loads(head)
-    return seconds, memory, rest
+    return seconds, memory, last_line
 
 
-def study(names: list[str], *options: str) -> tuple[float, float]:
+def measure_study(names: list[str], *options: str) -> tuple[float, float]:
     """Seconds and peak memory of a study in which every run has a tr and all share one."""
     args = (
         "-m",
@@ -127,17 +127,17 @@ def study(names: list[str], *options: str) -> tuple[float, float]:
         *names,
     )
     seconds, memory, text = process(*args)
-    found = json.loads(text)
-    assert [run["status"] for run in found["runs"]] == ["ok"] * len(names)
-    assert found["common_tr"] is not None
+    document = json.loads(text)
+    assert [run["status"] for run in document["runs"]] == ["ok"] * len(names)
+    assert document["common_tr"] is not None
     return seconds, memory
 
 
 def main() -> int:
     """Measure and tell; 1 when a goal is missed."""
     everything = str(len(os.sched_getaffinity(0)))
-    with TemporaryDirectory() as place:
-        names = write_runs(Path(place), RUNS, STATES)
+    with TemporaryDirectory() as folder:
+        names = write_runs(Path(folder), RUNS, STATES)
         jobs = {
             f"study --jobs {number}": ("--jobs", number)
             for number in ("1", "2", everything)
@@ -148,11 +148,11 @@ def main() -> int:
         for _ in range(ROUNDS):
             loops.append(process("-c", LOOP, *names)[0])
             for name, options in jobs.items():
-                studies[name].append(study(names, *options)[0])
+                studies[name].append(measure_study(names, *options)[0])
         loop = median(loops)
-        after = os.getloadavg()[0]
+        load_after = os.getloadavg()[0]
         print(
-            f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {after:.1f} after"
+            f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {load_after:.1f} after"
         )
         for name, seconds in {
             "plain loop over the library call": loops,
@@ -162,14 +162,16 @@ def main() -> int:
                 f"{name:34} {median(seconds) / RUNS * 1e3:6.2f} ms per run, {median(seconds) / loop:4.2f} of the loop"
             )
         grown = []
-        for extra in ((), ("--plot", f"{place}/runs.png", "--overwrite")):
-            few, many = (
-                study(some, "--jobs", "2", *extra)[1] for some in (names[:FEW], names)
+        for extra in ((), ("--plot", f"{folder}/runs.png", "--overwrite")):
+            few_mb, many_mb = (
+                measure_study(chosen_names, "--jobs", "2", *extra)[1]
+                for chosen_names in (names[:FEW], names)
             )
-            grown.append((many - few) / (RUNS - FEW) * 1e3)
-            what = f"peak memory of study {' '.join(extra[:1])}".strip()
+            grown.append((many_mb - few_mb) / (RUNS - FEW) * 1e3)
+            quantity = f"peak memory of study {' '.join(extra[:1])}".strip()
             print(
-                f"{what}: {few:.1f} MB with {FEW} runs, {many:.1f} MB with {RUNS}: {grown[-1]:.1f} kB per run more"
+                f"{quantity}: {few_mb:.1f} MB with {FEW} runs, {many_mb:.1f} MB with {RUNS}: "
+                f"{grown[-1]:.1f} kB per run more"
             )
     return int(
         median(studies["study --jobs 1"]) > MOST * loop or max(grown) > MOST_GROWN

@@ -13,12 +13,12 @@ from tests.benchmarks.promise_parts import (
     CLASSES as CLASSES_OF_PARTS,
     Motion,
     Record,
-    history,
-    records,
-    stated,
+    draw_records,
+    make_history_of_parts,
+    recommend_pair,
 )
 from tests.energies import sure
-from tests.vibration.test_identify import about_a_preload
+from tests.vibration.test_identify import move_about_preload
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
     """Half the rate, and a quarter of the kinetic share: the residual is twice the one of a vibration through zero."""
     time, td = np.arange(0.0, 6.711, 1 / 40), 5.506
     path = tmp_path / "preloaded.csv"
-    energy = 100 * about_a_preload(time, 2 * np.pi, 3.4484)[0] ** 2
+    energy = 100 * move_about_preload(time, 2 * np.pi, 3.4484)[0] ** 2
     np.savetxt(
         path,
         np.stack([time, energy], axis=1),
@@ -61,7 +61,7 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
     answer = d2rpick.suggest(d2rpick.read(str(path)), td=td).to_dict()
     best = next(one for one in answer["candidates"] if one["recommended"])
     before, after = (
-        about_a_preload(np.array(at), 2 * np.pi, 3.4484) for at in (best["tr"], td)
+        move_about_preload(np.array(at), 2 * np.pi, 3.4484) for at in (best["tr"], td)
     )
     true = float(
         np.hypot(before[0] - after[0], after[1]) / np.hypot(after[0] - 1, after[1])
@@ -74,9 +74,10 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
 @pytest.mark.parametrize("kind", CLASSES_OF_PARTS)
 def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     asked = [
-        record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 2)
+        record._replace(window=record.window[:1] * 2)
+        for record in draw_records(kind, 1, 2)
     ]  # one td is cheap
-    found = [one for record in asked if (one := stated(record))]
+    found = [one for record in asked if (one := recommend_pair(record))]
     assert found
     assert all(one.kept is not False for one in found)
     assert not any(one.true > BAD for one in found if one.grade == "good")
@@ -85,8 +86,8 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
 @pytest.mark.slow
 def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
     """A residual of 0.32 was good, since 0.18 was the most that the floor was thought to hide."""
-    record = next(islice(records("parts with mixed modes", 101, 77), 76, None))
-    found = sure(stated(record))
+    record = next(islice(draw_records("parts with mixed modes", 101, 77), 76, None))
+    found = sure(recommend_pair(record))
     assert found.true < BAD or found.grade != "good"
 
 
@@ -102,9 +103,9 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
     )
     time = np.arange(0, 0.4, 4e-4)
     found = sure(
-        stated(
+        recommend_pair(
             Record(
-                history(time, truth.energies(time)),
+                make_history_of_parts(time, truth.energies(time)),
                 Settings(after=0.0),
                 (0.2, 0.38),
                 truth.residual,

@@ -85,7 +85,7 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
         cubes((5.0, 5.0), []),
         cubes((5.0, 5.0), [(10, 20, 0.0)]),
         cubes((5.0, 5.0), [(10, 20, 1e5)], prop="SPR_GENE"),
-        cubes((5.0, 5.0), [(10, 20, 1e5)], more=wide(7)),
+        cubes((5.0, 5.0), [(10, 20, 1e5)], extra_text=wide(7)),
         cubes((5.0, 5.0), [(10, 20, 1e5)]).replace("/END", "#include other.inc\n/END"),
         cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(f"{DENSITY:>20}", f"{0.0:>20}"),
     ],

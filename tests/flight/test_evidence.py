@@ -83,20 +83,20 @@ def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_
     rolled: Rolled, form: str
 ) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
-    asked = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
-    found = answer(*asked, str(round(rolled.end - 0.01, 3)))
-    flight = found["flight"]
+    arguments = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
+    document = answer(*arguments, str(round(rolled.end - 0.01, 3)))
+    flight = document["flight"]
     assert (flight["certain"], flight["source"]) == (True, "momentum")
     assert (flight["start"], flight["end"]) == pytest.approx(
         (rolled.start, rolled.end), abs=MILLISECOND
     )
-    assert found["recommended"]["tr"] >= rolled.start - 2e-4
-    assert not codes(found) & {
+    assert document["recommended"]["tr"] >= rolled.start - 2e-4
+    assert not codes(document) & {
         "contact-in-window",
         "work-in-window",
         "flight-sources-disagree",
     }
-    result = run(*asked, str(rolled.end + 0.02), "-f", "json")
+    result = run(*arguments, str(rolled.end + 0.02), "-f", "json")
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
     flight = json.loads(result.stdout)["flight"]
@@ -121,15 +121,18 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
         name: table[axis] / mass
         for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)
     }
-    kept = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
-    kept.to_csv(tmp_path / "run.csv", index=False)
+    velocity_table = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
+    velocity_table.to_csv(tmp_path / "run.csv", index=False)
     td = str(round(rolled.end - 0.01, 3))
-    found, expected = (
-        answer("suggest", "--no-verify", "--td", td, *asked, str(file))["flight"]
-        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.file("csv")))
+    flight_dict, expected = (
+        answer("suggest", "--no-verify", "--td", td, *arguments, str(file))["flight"]
+        for arguments, file in (
+            (options, tmp_path / "run.csv"),
+            ((), rolled.file("csv")),
+        )
     )
-    assert found == expected
-    assert found["source"] == "momentum"
+    assert flight_dict == expected
+    assert flight_dict["source"] == "momentum"
 
 
 @pytest.mark.slow
@@ -146,15 +149,15 @@ def test_td_after_the_contact_is_refused_by_every_command(
         tmp_path / "deck.k",
         run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout,
     )
-    found = answer("check", str(deck), "--history", file)
-    assert "D2R204" in {finding["rule"] for finding in found["findings"]}
+    check_report = answer("check", str(deck), "--history", file)
+    assert "D2R204" in {finding["rule"] for finding in check_report["findings"]}
 
 
 @pytest.mark.slow
 def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("glstat"))
+    whole = read_history_of_parts(rolled.file("glstat"))
     written = {
         name: getattr(whole.balance, name) for name in ("sliding", "external_work")
     }
@@ -170,7 +173,7 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
 def test_the_energy_balance_tells_the_flight_where_there_is_neither(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("glstat"))
+    whole = read_history_of_parts(rolled.file("glstat"))
     time, energy = whole.time[::2], whole.energy[::2]
     written = {
         name: getattr(whole.balance, name)[::2]
@@ -194,18 +197,18 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
 def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("csv"))
+    whole = read_history_of_parts(rolled.file("csv"))
     history = table(whole.time, whole.energy)
     td = rolled.end - 0.01
-    found = suggest(history, td, Settings(replay=False))
-    if found.recommended:
-        assert found.recommended.tr >= rolled.start
-        assert not found.situation.flight.certain
+    suggestion = suggest(history, td, Settings(replay=False))
+    if suggestion.recommended:
+        assert suggestion.recommended.tr >= rolled.start
+        assert not suggestion.situation.flight.certain
     assert suggest(history, td, Settings(replay=False, strict=True)).recommended is None
 
 
 @cache
-def history_of(source: str, *parts: str) -> History:
+def read_history_of_parts(source: str, *parts: str) -> History:
     return open_run([source]).history(Selection(parts=parts))
 
 
@@ -224,21 +227,22 @@ def history_of(source: str, *parts: str) -> History:
 def test_all_flights_of_runs_of_a_solver_are_found(
     source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
 ) -> None:
-    found = [
+    flight_times = [
         (f.start, f.end)
-        for f in flights_of(history_of(source, *parts), Settings())
+        for f in flights_of(read_history_of_parts(source, *parts), Settings())
         if f.start is not None
     ]
     for start, end in flights:
         assert [
-            one
-            for one in found
-            if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4
+            flight
+            for flight in flight_times
+            if abs(flight[0] - start) <= 5e-4
+            and abs((flight[1] or np.inf) - end) <= 5e-4
         ]
 
 
 def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
-    history = history_of(CAR)
+    history = read_history_of_parts(CAR)
     assert (
         0.0385
         <= sure(examine(history, 0.146, Settings(replay=False)).flight.start)
@@ -248,12 +252,15 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
 
 @pytest.mark.slow
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
-    history = history_of(DROP)
-    found = suggest(history, 0.2838, Settings())
-    assert (sure(found.recommended).tr, found.candidates[0].kind) == (0.0, "start")
-    assert "at-rest" in {caution.code for caution in found.cautions}
-    assert sure(found.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
-    assert all(verify_at(found.situation, tr).verified for tr in (0.0, 0.1, 0.28))
+    history = read_history_of_parts(DROP)
+    suggestion = suggest(history, 0.2838, Settings())
+    assert (sure(suggestion.recommended).tr, suggestion.candidates[0].kind) == (
+        0.0,
+        "start",
+    )
+    assert "at-rest" in {caution.code for caution in suggestion.cautions}
+    assert sure(suggestion.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
+    assert all(verify_at(suggestion.situation, tr).verified for tr in (0.0, 0.1, 0.28))
     alone = suggest(table(history.time, history.energy), 0.2838, Settings())
     assert sure(alone.recommended).tr == 0.0
 
@@ -280,7 +287,7 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
 def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(
     part: str, share: float
 ) -> None:
-    whole = history_of(DROP, part)
+    whole = read_history_of_parts(DROP, part)
     history = table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
         quiet = quiet_time(history, start + share * (end - start))
@@ -317,13 +324,17 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
 def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> (
     None
 ):
-    found = history_of(BOX, "box")
-    assert found.balance
-    longer = np.minimum(found.time, 0.15) + np.maximum(found.time - 0.3819, 0.0)
-    balance = Balance(
-        found.time, sliding=longer, external_work=found.balance.external_work
+    own_history = read_history_of_parts(BOX, "box")
+    assert own_history.balance
+    longer = np.minimum(own_history.time, 0.15) + np.maximum(
+        own_history.time - 0.3819, 0.0
     )
-    (of_parts, _) = found.momenta
+    balance = Balance(
+        own_history.time,
+        sliding=longer,
+        external_work=own_history.balance.external_work,
+    )
+    (of_parts, _) = own_history.momenta
     flown = of_parts.of((0, 1))[:, np.newaxis]
     whole = Momenta(
         of_parts.time,
@@ -336,12 +347,12 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
     for momenta, start in ((of_parts, 0.0908), (whole, 0.15)):
         evidence = Given((momenta,), balance)
         history = History(
-            found.time,
-            found.energy,
+            own_history.time,
+            own_history.energy,
             ("run",),
             "made",
             "E",
-            parts=found.parts,
+            parts=own_history.parts,
             evidence=evidence,
         )
         flight = examine(history, 0.37, Settings(replay=False)).flight
@@ -357,15 +368,21 @@ ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
     assert "(energy alone, not certain)" in run("suggest", *ALONE).stdout
-    found = answer("suggest", *ALONE)
-    assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
-    pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
+    suggestion = answer("suggest", *ALONE)
+    assert (suggestion["flight"]["source"], suggestion["flight"]["certain"]) == (
+        "energy",
+        False,
+    )
+    pair = ("verify", "--tr", str(suggestion["recommended"]["tr"]), *ALONE)
     assert "verified by the energy level alone" in run(*pair).stdout
     assert [
-        run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)
+        run(*arguments, "--strict").exit_code
+        for arguments in (("suggest", *ALONE), pair)
     ] == [1, 1]
     (message,) = (
-        w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy"
+        w["message"]
+        for w in suggestion["warnings"]
+        if w["code"] == "flight-from-energy"
     )
     assert "left unused for safety" in message
 
@@ -373,12 +390,16 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (
     None
 ):
-    found = checked("suggest", *ALONE)
-    windows = found["acceptable_windows"]
-    (own,) = (window for window in windows if window["recommended"])
-    assert own["start"] <= found["recommended"]["tr"] <= own["end"]
+    suggestion = checked("suggest", *ALONE)
+    windows = suggestion["acceptable_windows"]
+    (recommended_window,) = (window for window in windows if window["recommended"])
+    assert (
+        recommended_window["start"]
+        <= suggestion["recommended"]["tr"]
+        <= recommended_window["end"]
+    )
     assert all(
-        found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows
+        suggestion["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows
     )
     assert sum(w["share"] for w in windows) <= 1
     for window in windows[:3]:
@@ -388,7 +409,10 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
             window["end"],
         ):
             assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
-    assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
+    assert (
+        f"{recommended_window['start']:.6g} to {recommended_window['end']:.6g}"
+        in run("suggest", *ALONE).stdout
+    )
     assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
 
 
@@ -404,9 +428,9 @@ def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes
 
     history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
-    seen = [seen_flight(history, td) for td in times]
-    assert seen == [seen_flight(fresh(), td) for td in times]
-    assert len({one.flight and one.flight[:2] for one in seen}) == 1
-    after = rolled.end + 0.02
-    assert seen_flight(history, after) == seen_flight(fresh(), after)
-    assert seen_flight(history, after).refusal
+    evidences = [seen_flight(history, td) for td in times]
+    assert evidences == [seen_flight(fresh(), td) for td in times]
+    assert len({evidence.flight and evidence.flight[:2] for evidence in evidences}) == 1
+    contact_time = rolled.end + 0.02
+    assert seen_flight(history, contact_time) == seen_flight(fresh(), contact_time)
+    assert seen_flight(history, contact_time).refusal

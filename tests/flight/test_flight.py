@@ -24,7 +24,9 @@ from tests.records import noisy, table
 PERIOD = 2 * np.pi / paper.OMEGA_2
 
 
-def moved(force: Callable[[float], float], end: float, *, alpha: float) -> History:
+def integrate_oscillator(
+    force: Callable[[float], float], end: float, *, alpha: float
+) -> History:
     """The paper's oscillator, from rest, under a force on its frame; one state each 0.1 ms."""
 
     def equations_of_motion(t: float, u: np.ndarray) -> list[float]:
@@ -37,7 +39,7 @@ def moved(force: Callable[[float], float], end: float, *, alpha: float) -> Histo
         ]
 
     time = np.linspace(0, end, round(end / 1e-4) + 1)
-    found = solve_ivp(
+    solution = solve_ivp(
         equations_of_motion,
         (0, end),
         [0.0] * 4,
@@ -47,11 +49,11 @@ def moved(force: Callable[[float], float], end: float, *, alpha: float) -> Histo
         atol=1e-13,
         max_step=5e-4,
     )
-    return table(time, 330e3 * (found.y[1] - found.y[0]) ** 2)
+    return table(time, 330e3 * (solution.y[1] - solution.y[0]) ** 2)
 
 
 @cache
-def pushed(alpha: float, contact: float) -> History:
+def push_oscillator(alpha: float, contact: float) -> History:
     """Under a half-sine force of 20 ms, and under another one from ``contact`` on."""
 
     def force(t: float) -> float:
@@ -59,18 +61,18 @@ def pushed(alpha: float, contact: float) -> History:
             return 5000.0 * math.sin(np.pi * min(t - contact, 0.02) / 0.02)
         return 2000.0 * math.sin(np.pi * t / 0.02) if t < 0.02 else 0.0
 
-    return moved(force, 0.15, alpha=alpha)
+    return integrate_oscillator(force, 0.15, alpha=alpha)
 
 
-def loaded(
+def push_with_noise(
     *, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf
 ) -> History:
     """The same, with white noise."""
-    history = pushed(alpha, contact)
+    history = push_oscillator(alpha, contact)
     return table(history.time, noisy(history.energy, noise, seed))
 
 
-def from_the_load(flight: Flight) -> bool:
+def begins_after_load(flight: Flight) -> bool:
     """Whether an oscillator shows a flight that begins a quarter of a period after 20 ms.
 
     A load that ends while the spring passes zero moves it unseen; no tr may lie in it.
@@ -88,22 +90,22 @@ def from_the_load(flight: Flight) -> bool:
 def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(
     alpha: float, td: float
 ) -> None:
-    flight = examine(loaded(alpha=alpha), td, Settings()).flight
-    assert from_the_load(flight)
+    flight = examine(push_with_noise(alpha=alpha), td, Settings()).flight
+    assert begins_after_load(flight)
     assert flight.end is None
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_end_of_the_load_is_found_under_noise(seed: int) -> None:
-    assert from_the_load(
-        examine(loaded(noise=0.01, seed=seed), 0.064, Settings()).flight
+    assert begins_after_load(
+        examine(push_with_noise(noise=0.01, seed=seed), 0.064, Settings()).flight
     )
 
 
 @pytest.mark.parametrize("td", [0.05, 0.075, 0.085])
 def test_the_next_contact_ends_the_flight(td: float) -> None:
-    flight = examine(loaded(alpha=5.0, contact=0.09), td, Settings()).flight
-    assert from_the_load(flight)
+    flight = examine(push_with_noise(alpha=5.0, contact=0.09), td, Settings()).flight
+    assert begins_after_load(flight)
     assert flight.end == pytest.approx(0.09, abs=PERIOD / 10)
 
 
@@ -137,23 +139,25 @@ def test_an_energy_that_never_was_above_its_band_shows_no_end_of_a_load() -> Non
 
 
 def test_a_start_that_is_given_replaces_the_start_only() -> None:
-    situation = examine(loaded(alpha=5.0, contact=0.09), 0.075, Settings(after=0.03))
+    situation = examine(
+        push_with_noise(alpha=5.0, contact=0.09), 0.075, Settings(after=0.03)
+    )
     assert (situation.flight.start, situation.flight.source) == (0.03, "given")
     assert situation.flight.end == pytest.approx(0.09, abs=PERIOD / 10)
     assert situation.basis == "oscillator"
 
 
 def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
-    situation = examine(loaded(), 0.064, Settings(after=0.005))
+    situation = examine(push_with_noise(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
     assert sure(situation.evidence.span).start == pytest.approx(0.020, abs=PERIOD / 10)
     assert situation.vibration.whole.energy(0.01) == pytest.approx(
-        loaded().energy_at(0.01)
+        push_with_noise().energy_at(0.01)
     )
 
 
 @pytest.mark.parametrize(
-    ("made", "td", "asked", "why"),
+    ("channels", "td", "settings", "why"),
     [
         (
             {"alpha": 5.0, "contact": 0.09},
@@ -166,16 +170,16 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     ],
 )
 def test_where_no_oscillator_tells_the_sign_it_is_said_why(
-    made: dict[str, float], td: float, asked: Settings, why: str
+    channels: dict[str, float], td: float, settings: Settings, why: str
 ) -> None:
-    situation = examine(loaded(**made), td, asked)  # type: ignore[arg-type]
+    situation = examine(push_with_noise(**channels), td, settings)  # type: ignore[arg-type]
     assert situation.basis == "energy"
     assert why in (situation.vibration.unknown or "")
-    assert asked.replay or situation.evidence.fit is None
+    assert settings.replay or situation.evidence.fit is None
 
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
-    situation = examine(loaded(), 0.064, Settings(fit_window=(0.03, 0.12)))
+    situation = examine(push_with_noise(), 0.064, Settings(fit_window=(0.03, 0.12)))
     assert (
         sure(situation.evidence.fit).start,
         sure(situation.evidence.fit).end,
@@ -186,7 +190,7 @@ def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
 # ---- td early in a flight, and in the next contact
 
 
-def two_loads(t: float) -> float:
+def apply_two_loads(t: float) -> float:
     """A load to 20 ms, free flight, the next contact from 150 ms on."""
     if t < 0.02:
         return 1e4 * math.sin(math.pi * t / 0.02)
@@ -194,13 +198,13 @@ def two_loads(t: float) -> float:
 
 
 @cache
-def struck() -> History:
-    return moved(two_loads, 0.25, alpha=10.0)
+def push_twice() -> History:
+    return integrate_oscillator(apply_two_loads, 0.25, alpha=10.0)
 
 
 @pytest.mark.parametrize("td", [0.028, 0.034, 0.044, 0.1])
 def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
-    situation = examine(struck(), td, Settings())
+    situation = examine(push_twice(), td, Settings())
     assert situation.basis == "oscillator"
     assert situation.flight.start == pytest.approx(0.020 + PERIOD / 4, abs=PERIOD / 10)
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
@@ -208,11 +212,11 @@ def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.153, 0.157, 0.162, 0.17, 0.178])
-@pytest.mark.parametrize("after", [None, 0.03])
+@pytest.mark.parametrize("first_td", [None, 0.03])
 def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
-    td: float, after: float | None
+    td: float, first_td: float | None
 ) -> None:
-    answer = suggest(struck(), td, Settings(after=after))
+    answer = suggest(push_twice(), td, Settings(after=first_td))
     assert answer.recommended is None
     assert answer.situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
     assert "td-after-contact" in {caution.code for caution in answer.cautions}
@@ -220,7 +224,7 @@ def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
 
 @pytest.mark.parametrize("td", [0.1, 0.149])
 def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
-    situation = examine(struck(), td, Settings())
+    situation = examine(push_twice(), td, Settings())
     fitted = situation.vibration.whole.mode
     assert fitted is not None
     assert fitted.alpha == pytest.approx(10, abs=0.05)
@@ -255,13 +259,13 @@ def test_a_small_second_mode_makes_no_short_flights() -> None:
 
 
 def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
-    time = struck().time
+    time = push_twice().time
     free = (
         330e3
         * (np.diff(np.stack(paper.OSCILLATOR.free(paper.START, time))[:2], axis=0)[0])
         ** 2
     )
-    energy = np.where(time < 0.15, free, struck().energy)
+    energy = np.where(time < 0.15, free, push_twice().energy)
     situation = examine(
         table(time, energy), 0.064, Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0))
     )

@@ -39,7 +39,7 @@ ZERO = np.zeros(TIME.size)
 PARTS = (Part(1, "body"), Part(2, "other"))
 
 
-def momenta(
+def make_momenta(
     *columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: int = 2
 ) -> Momenta:
     """Momenta of parts along one axis."""
@@ -56,7 +56,7 @@ def momenta(
     )
 
 
-def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
+def make_energy_table(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
     """A table of energies."""
     return table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
 
@@ -67,11 +67,13 @@ def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_cha
     load: str,
 ) -> None:
     random = np.random.default_rng(5)
-    runs = campaign.computed(
+    runs = campaign.compute_runs(
         random, 4, campaign.CLASSES[load](random, 4), falling=load != "friction"
     )
     counts = [
-        (form, campaign.counted(one, form)) for one in runs for form in campaign.FORMS
+        (form, campaign.count_flights(run, form))
+        for run in runs
+        for form in campaign.FORMS
     ]
     assert not [form for form, count in counts if count["wrong"]]
     assert (
@@ -91,11 +93,11 @@ def test_the_flight_behind_a_load_that_fades_is_found(
     impulse = np.concatenate(
         [[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)]
     )
-    found = sure(flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
-    start = int(np.searchsorted(TIME, found.start))
+    flight = sure(flight_around(make_momenta(impulse - 10.0 * gravity * TIME), 0.9))
+    start = int(np.searchsorted(TIME, flight.start))
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
-    assert found.start < 0.6
-    assert found.end == 1.0
+    assert flight.start < 0.6
+    assert flight.end == 1.0
 
 
 @pytest.mark.parametrize(
@@ -112,21 +114,23 @@ def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_al
 ) -> None:
     along = np.array(direction) / np.linalg.norm(direction)
     values = (20.0 * acceleration * (1 - 0.5 * TIME))[:, np.newaxis, np.newaxis] * along
-    one = Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
-    found = flight_around(one, 0.5)
-    assert (found is not None) is flies
+    braked = Momenta(
+        TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0])
+    )
+    flight = flight_around(braked, 0.5)
+    assert (flight is not None) is flies
     falling = replace(
-        one, values=one.values - values[-1] * 1.5
+        braked, values=braked.values - values[-1] * 1.5
     )  # it stands, and goes back
     assert flight_around(falling, 0.5) is not None
 
 
-def impulse_of(force: Samples) -> Samples:
+def integrate_force(force: Samples) -> Samples:
     """Its integral over TIME."""
     return np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * TIME[1]])
 
 
-def aslant(along_x: Samples, along_z: Samples) -> Momenta:
+def make_momenta_in_plane(along_x: Samples, along_z: Samples) -> Momenta:
     """Momentum of one body of mass 10 in a plane, with seven digits."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = along_x, along_z
@@ -138,33 +142,38 @@ def aslant(along_x: Samples, along_z: Samples) -> Momenta:
 def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
     gravity: float,
 ) -> None:
-    impulse = impulse_of(5e3 * (1 + TIME / 0.1) ** -3.1)
-    found = sure(
-        flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95)
+    impulse = integrate_force(5e3 * (1 + TIME / 0.1) ** -3.1)
+    flight = sure(
+        flight_around(
+            make_momenta_in_plane(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME),
+            0.95,
+        )
     )
-    assert found.gravity == pytest.approx(gravity, rel=1e-3)
-    left = impulse[-1] - impulse[int(np.searchsorted(TIME, found.start))]
-    assert 0.001 * impulse[-1] < left < 0.01 * impulse[-1]
+    assert flight.gravity == pytest.approx(gravity, rel=1e-3)
+    remaining_change = impulse[-1] - impulse[int(np.searchsorted(TIME, flight.start))]
+    assert 0.001 * impulse[-1] < remaining_change < 0.01 * impulse[-1]
 
 
 def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
     push = 3e2 * np.sin(np.pi * np.minimum(TIME / 0.6, 1))
-    body = aslant(0.8 * impulse_of(push), 0.6 * impulse_of(push) - 98.1 * TIME)
-    found = sure(flight_around(body, 0.9))
-    assert found.start == pytest.approx(0.6, abs=0.02)
+    body = make_momenta_in_plane(
+        0.8 * integrate_force(push), 0.6 * integrate_force(push) - 98.1 * TIME
+    )
+    flight = sure(flight_around(body, 0.9))
+    assert flight.start == pytest.approx(0.6, abs=0.02)
     assert not [td for td in np.linspace(0.02, 0.58, 29) if flight_around(body, td)]
 
 
-@pytest.mark.parametrize("left", [0.005, 0.0])
-def test_what_hardly_moves_flies_if_it_goes_on_as_it_does(left: float) -> None:
-    thrown = momenta(
+@pytest.mark.parametrize("end_velocity", [0.005, 0.0])
+def test_what_hardly_moves_flies_if_it_goes_on_as_it_does(end_velocity: float) -> None:
+    thrown = make_momenta(
         np.where(
             TIME < 0.3,
-            500 * (left + (1 - left) * np.cos(np.pi * TIME / 0.6)),
-            500 * left,
+            500 * (end_velocity + (1 - end_velocity) * np.cos(np.pi * TIME / 0.6)),
+            500 * end_velocity,
         )
     )
-    assert bool(flight_around(thrown, 0.7)) is (left > 0)
+    assert bool(flight_around(thrown, 0.7)) is (end_velocity > 0)
 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])
@@ -177,10 +186,12 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(
         / 1000
     )
     assert (
-        flight_around(momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6)
+        flight_around(
+            make_momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6
+        )
         is None
     )
-    assert flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
+    assert flight_around(make_momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
 
 
 @pytest.mark.parametrize(
@@ -192,12 +203,12 @@ def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
 ) -> None:
     """Friction and other planets: kinetic energy follows any constant force, so the acceleration itself decides."""
     assert not flights_of(
-        accelerated(acceleration if falling else -acceleration), PLAIN
+        make_accelerated_model(acceleration if falling else -acceleration), PLAIN
     )
-    assert flights_of(accelerated(9.81), PLAIN)
+    assert flights_of(make_accelerated_model(9.81), PLAIN)
 
 
-def accelerated(acceleration: float) -> History:
+def make_accelerated_model(acceleration: float) -> History:
     """Velocity and energies of a model of 10 that is accelerated, in a glstat with six digits."""
     velocity = np.zeros((TIME.size, 1, 3))
     velocity[:, 0, 0] = 30 + acceleration * TIME
@@ -221,7 +232,9 @@ def accelerated(acceleration: float) -> History:
 
 def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
     """Without the mass and without energies nothing shows whether the force is gravity."""
-    falling = momenta(200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,))
+    falling = make_momenta(
+        200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,)
+    )
     whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
     answer = suggest(
         table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings()
@@ -233,26 +246,26 @@ def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
 def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     falling = np.where(TIME < 0.1, -2e3 * TIME, -200 - 40 * 9.81 * (TIME - 0.1))
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
-    both = momenta(carried, falling, masses=(10.0, 40.0))
-    assert flight_around(both.choosing((0,)), 0.6) is None
-    found = sure(flight_around(both.choosing((1,)), 0.6))
-    assert found.gravity == pytest.approx(9.81, rel=1e-3)
+    both_bodies = make_momenta(carried, falling, masses=(10.0, 40.0))
+    assert flight_around(both_bodies.choosing((0,)), 0.6) is None
+    flight = sure(flight_around(both_bodies.choosing((1,)), 0.6))
+    assert flight.gravity == pytest.approx(9.81, rel=1e-3)
 
 
 @pytest.mark.parametrize("states", [1, 2, 3])
 def test_a_few_states_show_no_bodies_apart(states: int) -> None:
-    whole = momenta(50 + 0 * TIME, -10 + 0 * TIME, axis=0)
-    few = replace(whole, time=whole.time[:states], values=whole.values[:states])
-    assert bodies_apart(few, (0, 1)) == ()
-    assert flight_around(few, float(few.time[0])) is None
+    whole = make_momenta(50 + 0 * TIME, -10 + 0 * TIME, axis=0)
+    few_states = replace(whole, time=whole.time[:states], values=whole.values[:states])
+    assert bodies_apart(few_states, (0, 1)) == ()
+    assert flight_around(few_states, float(few_states.time[0])) is None
 
 
 def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
     hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
-    body = momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
+    body = make_momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
     assert bodies_apart(body, (0, 1)) == (0, 1)
-    found = sure(flight_around(body, 0.7))
-    assert found.start == pytest.approx(0.4, abs=0.01)
+    flight = sure(flight_around(body, 0.7))
+    assert flight.start == pytest.approx(0.4, abs=0.01)
     assert flight_around(body, 0.35) is None
 
 
@@ -260,7 +273,7 @@ def test_a_motion_that_has_ended_is_no_flight() -> None:
     stopped = np.where(
         TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0
     )  # a motion that is prescribed, then none
-    assert flight_around(momenta(stopped), 0.8) is None
+    assert flight_around(make_momenta(stopped), 0.8) is None
 
 
 def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> (
@@ -269,7 +282,7 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
     """Springs back from 0.2 to 0.8: kinetic energy comes from the internal one, and both together stay."""
     pushed = 500 * np.clip((TIME - 0.2) / 0.6, 0, 1) ** 2
     ringing = 3 * np.sin(300 * TIME) ** 2
-    history = totals(900 - pushed + ringing, 100 + pushed - ringing)
+    history = make_energy_table(900 - pushed + ringing, 100 + pushed - ringing)
     for td in (0.4, 0.6):
         assert not examine(history, td, PLAIN).in_flight
     flights = flights_of(history, PLAIN)
@@ -277,14 +290,16 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
     assert not [flight for flight in flights if flight.certain]
 
 
-@pytest.mark.parametrize("kept", [0.0, 40.0])
-def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
+@pytest.mark.parametrize("spring_share", [0.0, 40.0])
+def test_a_spring_to_ground_does_not_fly(spring_share: float) -> None:
     """All of its kinetic energy is that of the vibration; what flies keeps some where the deformation turns."""
     internal = 100 * np.sin(60 * TIME) ** 2
-    history = totals(internal, 100 - internal + kept - 10 * np.maximum(0.05 - TIME, 0))
+    history = make_energy_table(
+        internal, 100 - internal + spring_share - 10 * np.maximum(0.05 - TIME, 0)
+    )
     balance = sure(history.balance)
-    assert moves_as_a_whole(balance, 0.1, 1.0) is (kept > 0)
-    assert bool(flights_of(history, PLAIN)) is (kept > 0)
+    assert moves_as_a_whole(balance, 0.1, 1.0) is (spring_share > 0)
+    assert bool(flights_of(history, PLAIN)) is (spring_share > 0)
 
 
 def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> (
@@ -327,8 +342,8 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
-    found = flights_of(
-        totals(
+    flights = flights_of(
+        make_energy_table(
             pushed * (150 + rung),
             pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME),
         ),
@@ -336,10 +351,10 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
     )
     assert any(
         flight.start == pytest.approx(0.2, abs=0.05) and flight.end is None
-        for flight in found
+        for flight in flights
     )
     assert not [
-        flight for flight in found if flight.certain or (flight.start or 0.0) < 0.15
+        flight for flight in flights if flight.certain or (flight.start or 0.0) < 0.15
     ]
 
 
@@ -355,10 +370,10 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
 def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
     internal: Samples, kinetic: Samples
 ) -> None:
-    found = suggest(totals(internal, kinetic), 0.8, PLAIN)
-    assert sure(found.quality).grade == "poor"
-    assert "by gravity or by another load" in sure(found.quality).told
-    assert found.situation.flight.unknown_load
+    suggestion = suggest(make_energy_table(internal, kinetic), 0.8, PLAIN)
+    assert sure(suggestion.quality).grade == "poor"
+    assert "by gravity or by another load" in sure(suggestion.quality).told
+    assert suggestion.situation.flight.unknown_load
 
 
 def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
@@ -385,7 +400,7 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
         + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
     )
     whole = 80 - 2 * alpha * integral(TIME, kinetic)
-    record = totals(whole - kinetic, kinetic)
+    record = make_energy_table(whole - kinetic, kinetic)
     assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
     flight = suggest(
         record, 0.8, Settings()
@@ -405,7 +420,7 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
     internal = 20 * decay - ringing
     flight = suggest(
-        totals(internal, moving + ringing), 0.8, Settings()
+        make_energy_table(internal, moving + ringing), 0.8, Settings()
     ).situation.flight
     assert flight.described
     assert flight.certain is (lost == 0)
@@ -418,13 +433,13 @@ def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
         0.1, 0.9, "energy-balance", gravity=np.inf, described=True
     ).certain
     assert Flight(0.1, 0.9, "energy-balance", described=True).certain
-    found = suggest(
-        totals(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN
+    suggestion = suggest(
+        make_energy_table(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN
     )
-    assert found.situation.flight.unknown_load
+    assert suggestion.situation.flight.unknown_load
     assert not any(
         "any tr there is right" in caution.message
-        for caution in cautions_of(found.situation)
+        for caution in cautions_of(suggestion.situation)
     )
 
 
@@ -441,16 +456,16 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
     None
 ):
     hit = np.clip((TIME - 0.5) / 0.02, 0, 5)
-    both = momenta(
+    two_bodies = make_momenta(
         np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5
     )
-    history = table(TIME, 1 + np.sin(300 * TIME) ** 2, both)
+    history = table(TIME, 1 + np.sin(300 * TIME) ** 2, two_bodies)
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal
 
 
-def falling_and_damped(
+def make_falling_damped_body(
     *left_out: str, internal: Samples = ZERO, vibration: float = 40.0
 ) -> History:
     """A vibration that damping takes, above plastic work of 5, of a body of 20 that falls from 0.1 on; seven digits.
@@ -458,20 +473,26 @@ def falling_and_damped(
     The terms ``left_out`` are not written; ``internal`` is added to the internal energy.
     """
     since = np.maximum(TIME - 0.1, 0.0)
-    left, swing = vibration * np.exp(-9 * since), np.cos(250 * since) ** 2
+    remaining_pull, swing = vibration * np.exp(-9 * since), np.cos(250 * since) ** 2
     internal, pushed = (
-        internal + 5 + left * swing,
+        internal + 5 + remaining_pull * swing,
         20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02,
     )
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = np.sqrt(2 * 20 * pushed), -20 * 9.81 * since
-    kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + left * (1 - swing)
+    kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + remaining_pull * (1 - swing)
     momentum = Momenta(
         TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,)
     )
-    written = {"internal": internal, "kinetic": kinetic, "damping": vibration - left}
+    written = {
+        "internal": internal,
+        "kinetic": kinetic,
+        "damping": vibration - remaining_pull,
+    }
     columns = {
-        name: printed(one, 7) for name, one in written.items() if name not in left_out
+        name: printed(column, 7)
+        for name, column in written.items()
+        if name not in left_out
     }
     mass = np.array([np.nan if "kinetic" in left_out else 20.0])
     energies = replace(Balance(TIME, precision=Precision(7)), **columns)  # type: ignore[arg-type]
@@ -486,7 +507,7 @@ def falling_and_damped(
 def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(
     left_out: tuple[str, ...],
 ) -> None:
-    flight = examine(falling_and_damped(*left_out), 0.5, PLAIN).flight
+    flight = examine(make_falling_damped_body(*left_out), 0.5, PLAIN).flight
     assert flight.source == "momentum"
     assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
     assert flight.end is None
@@ -496,11 +517,13 @@ def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(
 def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_energy(
     tmp_path: Path,
 ) -> None:
-    for number, fall in enumerate(falls.fallen(np.random.default_rng(3), 6, 300)):
+    for number, fall in enumerate(
+        falls.integrate_falls(np.random.default_rng(3), 6, 300)
+    ):
         td, room = (fall.start + fall.end) / 2, (falls.WITHIN + 0.01) * fall.run.time[1]
         for form, write in FALL_WRITERS.items():
             for kinetic in (True, False):
-                start = falls.found_start(
+                start = falls.find_flight_start(
                     write(fall.run, tmp_path, kinetic=kinetic), td
                 )
                 assert start == pytest.approx(fall.start, abs=room), (
@@ -512,14 +535,14 @@ def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_e
 
 def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:
     """Two bodies in it hit each other: their momentum together is that of free fall."""
-    history = falling_and_damped(internal=200 * TIME)
+    history = make_falling_damped_body(internal=200 * TIME)
     assert not examine(history, 0.5, PLAIN).in_flight
 
 
-def deformed_in_flight(at: float, *left_out: str) -> History:
+def make_body_deformed_in_flight(load_start: float, *left_out: str) -> History:
     """The body of `falling_and_damped`, of whose motion 30 turn into plastic work within 20 ms from ``at`` on."""
-    done = 30 * np.sin(np.pi / 2 * np.clip((TIME - at) / 0.02, 0.0, 1.0)) ** 2
-    history = falling_and_damped(*left_out, internal=done, vibration=2.0)
+    done = 30 * np.sin(np.pi / 2 * np.clip((TIME - load_start) / 0.02, 0.0, 1.0)) ** 2
+    history = make_falling_damped_body(*left_out, internal=done, vibration=2.0)
     balance = history.balance
     if balance is None or balance.kinetic is None:
         return history
@@ -533,18 +556,20 @@ def deformed_in_flight(at: float, *left_out: str) -> History:
 def test_a_body_that_yields_as_the_load_ends_flies_from_there(
     left_out: tuple[str, ...],
 ) -> None:
-    flight = examine(deformed_in_flight(0.1, *left_out), 0.5, PLAIN).flight
+    flight = examine(make_body_deformed_in_flight(0.1, *left_out), 0.5, PLAIN).flight
     assert flight.source == "momentum"
     assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
 
 
-@pytest.mark.parametrize("at", [0.2, 0.25, 0.3])
+@pytest.mark.parametrize("contact_time", [0.2, 0.25, 0.3])
 @pytest.mark.parametrize("left_out", [(), ("kinetic", "damping")])
 def test_two_bodies_that_hit_each_other_in_a_fall_do_not_fly_together_before(
-    at: float, left_out: tuple[str, ...]
+    contact_time: float, left_out: tuple[str, ...]
 ) -> None:
-    flight = examine(deformed_in_flight(at, *left_out), 0.6, PLAIN).flight
-    assert flight.start is None or flight.start > at
+    flight = examine(
+        make_body_deformed_in_flight(contact_time, *left_out), 0.6, PLAIN
+    ).flight
+    assert flight.start is None or flight.start > contact_time
 
 
 @pytest.mark.parametrize(

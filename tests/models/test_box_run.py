@@ -22,7 +22,7 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     number: int, tmp_path: Path
 ) -> None:
     coarse = replace(SETS[number], mesh=MESH)
-    rehearsal = rehearse(coarse, tmp_path, every=EVERY, interval=INTERVAL)
+    rehearsal = rehearse(coarse, tmp_path, stride=EVERY, interval=INTERVAL)
     assert rehearsal.flight[2] == "momentum"
     assert rehearsal.roll_share < 0.1
     assert abs(rehearsal.energy_off) < 0.25

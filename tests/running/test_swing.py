@@ -20,24 +20,28 @@ FREE, TD = 0.0385, 0.1464
 
 
 @cache
-def car() -> tuple[History, Drift]:
+def read_car_with_drift() -> tuple[History, Drift]:
     """A computed run, and how its bodies drift in its flight."""
     history = solved("carT01.gz").history
-    (momenta,) = (one for one in history.momenta if one.parts is not None)
+    (momenta,) = (
+        part_momenta
+        for part_momenta in history.momenta
+        if part_momenta.parts is not None
+    )
     moving = tuple(sure(momenta.parts)[i] for i in momenta.moving)
     return history, sure(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
 
 
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
-    history, whole = car()
+    history, whole = read_car_with_drift()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
-    found = sure(find_swing(history, FREE, tr))
-    assert found.name == "engine"
-    assert error <= found.error <= 1.3 * error
+    swing = sure(find_swing(history, FREE, tr))
+    assert swing.name == "engine"
+    assert error <= swing.error <= 1.3 * error
     # a flight of that length has a path of a hundred times the error, at the speed so far
     mean = float(np.interp(tr, whole.time, whole.path)) / (tr - float(whole.time[0]))
-    assert found.flight * mean == pytest.approx(100 * found.error, rel=0.05)
+    assert swing.flight * mean == pytest.approx(100 * swing.error, rel=0.05)
 
 
 @pytest.mark.parametrize("swings", [0.0, 0.004])
@@ -53,10 +57,10 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     momenta = Momenta(
         time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses
     )
-    found = sure(find_swing(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
-    assert found.name == "block"
-    assert found.error == pytest.approx(2 * swings, abs=1e-5)
-    assert "at most" in found.told
+    first_swing = sure(find_swing(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
+    assert first_swing.name == "block"
+    assert first_swing.error == pytest.approx(2 * swings, abs=1e-5)
+    assert "at most" in first_swing.told
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
@@ -65,6 +69,6 @@ def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
 
 
 def test_an_advised_switch_says_it() -> None:
-    told = run("follow", "--once", "--exit-zero", "--wait", "0.024", str(CAR)).stdout
-    (switch,) = (line for line in told.splitlines() if "  switch  " in line)
+    result = run("follow", "--once", "--exit-zero", "--wait", "0.024", str(CAR)).stdout
+    (switch,) = (line for line in result.splitlines() if "  switch  " in line)
     assert "engine still swings" in switch

@@ -62,15 +62,15 @@ def test_the_better_pair_has_no_residual() -> None:
     assert values.residual(values.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
-@pytest.mark.parametrize("known", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
+@pytest.mark.parametrize("true_states", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
 def test_integration_gives_the_states_that_were_computed_with_40_digits(
-    known: tuple[tuple[float, ...], ...],
+    true_states: tuple[tuple[float, ...], ...],
 ) -> None:
-    tr, td = (0.006, 0.08) if known is paper.SWITCHED_6_80 else (0.013, 0.064)
-    rows = np.array([row for row in known if row[0] not in (tr, td)])
-    found = integrated(Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td), rows[:, 0])
+    tr, td = (0.006, 0.08) if true_states is paper.SWITCHED_6_80 else (0.013, 0.064)
+    rows = np.array([row for row in true_states if row[0] not in (tr, td)])
+    states = integrated(Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td), rows[:, 0])
     np.testing.assert_allclose(
-        np.stack(found, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11
+        np.stack(states, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11
     )
 
 
@@ -150,11 +150,11 @@ def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_doe
     None
 ):
     columns = ALL["after-td"].columns
-    after = columns["time_ms"] > 1e3 * paper.BETTER_TD
-    wanted = columns["r_free_m"][after]
-    np.testing.assert_allclose(columns["r_better_m"][after], wanted, atol=1e-12)
+    after_td = columns["time_ms"] > 1e3 * paper.BETTER_TD
+    wanted = columns["r_free_m"][after_td]
+    np.testing.assert_allclose(columns["r_better_m"][after_td], wanted, atol=1e-12)
     assert (
-        np.abs(columns["r_published_m"][after] - wanted).max()
+        np.abs(columns["r_published_m"][after_td] - wanted).max()
         > 0.5 * np.abs(wanted).max()
     )
     assert ALL["after-td"].agrees is False
@@ -173,54 +173,54 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 @pytest.mark.slow
 def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     coarse = Parameters(mesh=4)
-    every = tuple(box.variants_of(coarse))
-    some = (
-        every[0],
-        every[2],
-        every[6],
-        every[-1],
+    all_variants = tuple(box.variants_of(coarse))
+    some_variants = (
+        all_variants[0],
+        all_variants[2],
+        all_variants[6],
+        all_variants[-1],
     )  # two that act after td, two before
-    assert [one.before for one in some] == [False, False, True, True]
-    made = {
+    assert [variant.before for variant in some_variants] == [False, False, True, True]
+    exhibits_by_name = {
         exhibit.name: exhibit
         for exhibit in (make() for _, make in box.exhibits_of(coarse)[1:-1])
     }
-    made["variants"] = box.exhibit_of(box.tried(some))
-    assert [exhibit.figure for exhibit in made.values()] == [
+    exhibits_by_name["variants"] = box.exhibit_of(box.tried(some_variants))
+    assert [exhibit.figure for exhibit in exhibits_by_name.values()] == [
         "2a, b",
         "2c",
         "8",
         "section 4",
     ]
-    assert made["early"].agrees
+    assert exhibits_by_name["early"].agrees
     tr = next(
         name
-        for name in made["revised"].columns
+        for name in exhibits_by_name["revised"].columns
         if name.startswith("droll") and "70" not in name
     )
-    at_td = np.searchsorted(made["revised"].columns["time_ms"], 370.0)
-    assert abs(made["revised"].columns[tr][at_td]) < abs(
-        made["revised"].columns["droll_70_deg"][at_td]
+    at_td = np.searchsorted(exhibits_by_name["revised"].columns["time_ms"], 370.0)
+    assert abs(exhibits_by_name["revised"].columns[tr][at_td]) < abs(
+        exhibits_by_name["revised"].columns["droll_70_deg"][at_td]
     )
-    variants = made["variants"].columns
+    variants = exhibits_by_name["variants"].columns
     assert (
         np.ptp(variants["own_tr_ms"][:2]) < 1e-9
     )  # what acts after td leaves tr alone
     assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.ptp(variants["common_tr_ms"]) == 0
-    assert made["variants"].agrees
+    assert exhibits_by_name["variants"].agrees
     assert (
         f"tr = {variants['common_tr_ms'][0]:.1f} ms is still acceptable in all 4"
-        in made["variants"].found
+        in exhibits_by_name["variants"].found
     )
-    for exhibit in made.values():
+    for exhibit in exhibits_by_name.values():
         figure = draw_exhibit(exhibit)
         assert len(figure.axes) == sum(map(len, exhibit.panels))
 
 
 @pytest.mark.slow
 def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
-    place, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
+    folder, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
     sections = (
         "--section",
         "2",
@@ -231,19 +231,19 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
         "--report",
         str(page),
     )
-    result = run("reproduce", "--output-dir", str(place), *sections, "--solver", RUN)
+    result = run("reproduce", "--output-dir", str(folder), *sections, "--solver", RUN)
     assert result.exit_code == 0, result.stderr
-    names = {path.name for path in place.iterdir()}
+    names = {path.name for path in folder.iterdir()}
     drawn = ("masses", "response", "elements", "motion", "saving")
     expected = {
         f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")
     } - {"masses.csv", "elements.csv"}
     assert names == expected | {"README.md", "table.csv"}
     assert all(misprint in unwrapped(result.stdout) for misprint in MISPRINTS)
-    index = (place / "README.md").read_text("utf-8")
+    index = (folder / "README.md").read_text("utf-8")
     assert all(f"{name}.svg" in index for name in drawn)
     assert page.read_text("utf-8").count("<figure>") == len(drawn)
-    columns = np.genfromtxt(place / "response.csv", delimiter=",", names=True)
+    columns = np.genfromtxt(folder / "response.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(
         columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"]
     )
@@ -286,28 +286,32 @@ def test_its_files_are_the_same_every_time_and_replaced_only_when_told(
     first = answer(*whole)
     check_by_schema(first)
     assert first["better"]["residual"] < 1e-12
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    contents_before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert "the file exists" in refused(*whole)
     assert run(*whole, "--overwrite", "-q").exit_code == 0
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    assert {name.rpartition("/")[2] for name in first["files"]} == {*before}
+    assert {
+        path.name: path.read_bytes() for path in tmp_path.iterdir()
+    } == contents_before
+    assert {name.rpartition("/")[2] for name in first["files"]} == {*contents_before}
 
 
 def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "file").write_text("mine")
-    for place in (tmp_path / "file", tmp_path / "file" / "paper"):
+    for path in (tmp_path / "file", tmp_path / "file" / "paper"):
         assert "the folder cannot be created" in refused(
-            "reproduce", "--output-dir", str(place)
+            "reproduce", "--output-dir", str(path)
         )
 
 
 def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None:
-    known = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
+    true_values = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
              for pair, rows in (("6, 80", paper.SWITCHED_6_80), ("13, 64", paper.SWITCHED_13_64))
              for row in rows for name, value in (("z", row[1]), ("y", row[2]), ("E", row[5]))}  # fmt: skip
-    assert {row.what: row.reference for row in table() if row.what in known} == known
+    assert {
+        row.what: row.reference for row in table() if row.what in true_values
+    } == true_values
 
 
 def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None:
@@ -324,13 +328,17 @@ def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None
 
 def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
     tables = {
-        kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))
+        kind: read_named_columns(name)
+        for kind, name in (("pairs", SOLVER), ("run", RUN))
     }
-    made = {
+    exhibits_by_name = {
         exhibit.name: exhibit
         for exhibit in (make() for _, make in exhibits.exhibits_of(tables))
     }
-    pairs, motion = made["solver"].columns, made["motion"].columns
+    pairs, motion = (
+        exhibits_by_name["solver"].columns,
+        exhibits_by_name["motion"].columns,
+    )
     scale = np.abs(pairs["reference_solver_m"]).max()
     for name in ("published", "better"):
         assert (
@@ -341,10 +349,10 @@ def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
             np.abs(motion[f"{name}_other_m"] - motion[f"{name}_closed_m"]).max()
             < 1e-4 * 0.053
         )
-    assert made["motion"].agrees
+    assert exhibits_by_name["motion"].agrees
 
 
-def named_columns(name: str) -> dict[str, np.ndarray]:
+def read_named_columns(name: str) -> dict[str, np.ndarray]:
     """Columns of a sample by their names."""
     rows = np.genfromtxt(name, delimiter=",", names=True)
     return {column: rows[column] for column in rows.dtype.names or ()}

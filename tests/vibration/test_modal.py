@@ -21,7 +21,7 @@ EVEN = np.linspace(0.0, 9.0, 40)
 PAIRS = np.array([(tr, td) for tr in EVEN for td in EVEN if tr < td]).T
 
 
-def residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
+def compute_residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
     """What follows from the lock-in error and the kinetic share."""
     return residual(lock_in_error(vibration, tr, td), kinetic_share(vibration, td))
 
@@ -32,11 +32,11 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(
     seed: int, count: int, static: float
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    found = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
-    assert found.signed, found.doubts
+    modal = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
+    assert modal.signed, modal.doubts
     true = structure.residual(*PAIRS)
-    assert np.sqrt(np.mean((residuals(found, *PAIRS) - true) ** 2)) < 0.02
-    _, low, high = found.residual_band(residuals(found, *PAIRS), *PAIRS)
+    assert np.sqrt(np.mean((compute_residuals(modal, *PAIRS) - true) ** 2)) < 0.02
+    _, low, high = modal.residual_band(compute_residuals(modal, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
 
 
@@ -51,10 +51,10 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(
         noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
     )
     clean, noisy = (
-        sure(identify_modal(TIME, one)) for one in (energy, energy + scatter)
+        sure(identify_modal(TIME, record)) for record in (energy, energy + scatter)
     )
     true = structure.residual(*PAIRS)
-    _, low, high = noisy.residual_band(residuals(noisy, *PAIRS), *PAIRS)
+    _, low, high = noisy.residual_band(compute_residuals(noisy, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
     assert np.median(noisy.half_width(*PAIRS)) > np.median(clean.half_width(*PAIRS))
 
@@ -72,12 +72,16 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
         )
     )
     assert (
-        np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        np.sqrt(
+            np.mean(
+                (compute_residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2
+            )
+        )
         < 0.02
     )
-    both = sure(confirm(internal, kinetic))
-    assert both.second is kinetic.reading
-    assert np.all(both.half_width(*PAIRS) >= internal.half_width(*PAIRS))
+    confirmed = sure(confirm(internal, kinetic))
+    assert confirmed.second is kinetic.reading
+    assert np.all(confirmed.half_width(*PAIRS) >= internal.half_width(*PAIRS))
 
 
 def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
@@ -106,15 +110,19 @@ def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
     structure = LinearStructure.draw(11, 3)
     about = structure.deformations(TIME)
     about[0] += stretch * structure.amplitude[0]
-    found = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
-    assert not found.reading.is_mode.all()
+    modal = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
+    assert not modal.reading.is_mode.all()
     assert (
-        np.sqrt(np.mean((residuals(found, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        np.sqrt(
+            np.mean(
+                (compute_residuals(modal, *PAIRS) - structure.residual(*PAIRS)) ** 2
+            )
+        )
         < 0.03
     )
 
 
-def rubbed() -> Samples:
+def compute_rubbed_energy() -> Samples:
     """Energy of a mass that slides with friction on its spring: its swings fall by the same length each time."""
     position, speed, step = 1.0, 0.0, 2e-3
     positions = []
@@ -135,14 +143,14 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
         + 0.3 * np.cos(16 * TIME) ** 2
         + third * np.cos(24 * TIME) ** 2
     )
-    found = sure(identify_modal(TIME, energy))
-    assert (found.doubts.refusal is not None) == is_harmonic
+    modal = sure(identify_modal(TIME, energy))
+    assert (modal.doubts.refusal is not None) == is_harmonic
 
 
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
-        (rubbed()[::3], "predict|lines"),
+        (compute_rubbed_energy()[::3], "predict|lines"),
         (
             np.cumsum(np.random.default_rng(2).standard_normal(1500)),
             "predict|lines|mean",
@@ -152,8 +160,8 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
     ids=["friction", "random walk", "coarse"],
 )
 def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) -> None:
-    found = sure(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
-    refusal = sure(found.doubts.refusal)
+    modal = sure(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
+    refusal = sure(modal.doubts.refusal)
     assert any(word in refusal for word in reason.split("|")), refusal
 
 
@@ -163,8 +171,8 @@ def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) ->
     ids=["still", "no swing"],
 )
 def test_without_lines_there_are_no_modes(energy: Samples) -> None:
-    found = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
-    assert found is None or not found.signed
+    modal = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
+    assert modal is None or not modal.signed
     assert identify_modal(np.linspace(0.0, 1.0, 20), np.arange(20.0)) is None
 
 
@@ -180,7 +188,7 @@ LOADED = of(
 )
 
 
-def true_residual(tr: float, td: float) -> float:
+def compute_true_residual(tr: float, td: float) -> float:
     """R of one pair, by the motion."""
     return float(STRUCTURE.residual(np.array([tr]), np.array([td]))[0])
 
@@ -190,10 +198,10 @@ def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
     answer = suggest(LOADED, td, Settings(after=1.0))
     best = sure(answer.chosen)
     assert answer.situation.basis == "modal"
-    assert best.residual == pytest.approx(true_residual(best.tr, td), abs=0.02)
+    assert best.residual == pytest.approx(compute_true_residual(best.tr, td), abs=0.02)
     early = np.linspace(1.0, td - 0.25 * (td - 1.0), 2000)
     oracle = float(STRUCTURE.residual(early, np.full(early.size, td)).min())
-    assert true_residual(best.tr, td) < oracle + 0.03
+    assert compute_true_residual(best.tr, td) < oracle + 0.03
     verdict = verify(LOADED, best.tr, td, Settings(after=1.0))
     assert verdict.candidate.residual == pytest.approx(best.residual, abs=1e-9)
     assert sure(verdict.quality).grade == sure(answer.quality).grade
@@ -203,12 +211,15 @@ def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there
     None
 ):
     answer = suggest(LOADED, 7.7, Settings(after=1.0))
-    assert min(sure(one.residual) for one in answer.candidates) < 1
+    assert min(sure(candidate.residual) for candidate in answer.candidates) < 1
     assert all(
-        sure(one.residual) <= 1.01 for one in answer.candidates if one.acceptable
+        sure(candidate.residual) <= 1.01
+        for candidate in answer.candidates
+        if candidate.acceptable
     )
     worst = max(
-        np.linspace(1.1, 6.0, 500).tolist(), key=lambda tr: true_residual(tr, 7.7)
+        np.linspace(1.1, 6.0, 500).tolist(),
+        key=lambda tr: compute_true_residual(tr, 7.7),
     )
     verdict = verify(LOADED, worst, 7.7, Settings(after=1.0))
     assert not verdict.verified
@@ -230,9 +241,9 @@ def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> 
     raised = replace(
         vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4))
     )
-    for one in (vibration, raised):
-        if one.keeps_nothing:
-            moments = one.moments(0.2)
+    for record in (vibration, raised):
+        if record.keeps_nothing:
+            moments = record.moments(0.2)
             energies = STRUCTURE.elastic_energy(moments.tr)
             assert energies.min() < 0.2 * STRUCTURE.elastic_energy(TIME).max()
     assert situation.kinetic_share is not None
@@ -244,14 +255,14 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
     answer = suggest_in_window(LOADED, (4.0, 8.8), Settings(after=1.0))
     best = sure(answer.recommended)
     assert best.rigid_time > 0.4 * (8.8 - 1.0)
-    assert true_residual(best.tr, best.td) == pytest.approx(
+    assert compute_true_residual(best.tr, best.td) == pytest.approx(
         sure(best.residual), abs=0.02
     )
     for td in (5.0, 6.3, 7.7, 8.6):
-        other = suggest(LOADED, td, Settings(after=1.0)).recommended
+        suggestion = suggest(LOADED, td, Settings(after=1.0)).recommended
         assert (
-            sure(best.residual) <= sure(sure(other).residual) + 0.02
-            or sure(other).rigid_time < 3.9
+            sure(best.residual) <= sure(sure(suggestion).residual) + 0.02
+            or sure(suggestion).rigid_time < 3.9
         )
 
 
@@ -261,9 +272,9 @@ def test_a_weak_mode_of_few_states_is_told_of() -> None:
         time = np.linspace(0.0, 6.0, 1200)
         strong = np.cos(2 * np.pi * time) ** 2 + 0.7 * np.cos(14.3 * time) ** 2
         weak = 0.08 * np.cos(2 * np.pi * rate * time + 0.4) ** 2
-        found = sure(identify_modal(time, strong + weak))
-        assert found.doubts.coarse > 4.0
-        assert (found.states_per_period < 4.0) == is_coarse
+        modal = sure(identify_modal(time, strong + weak))
+        assert modal.doubts.coarse > 4.0
+        assert (modal.states_per_period < 4.0) == is_coarse
 
 
 def test_a_profile_without_two_times_has_no_interval() -> None:

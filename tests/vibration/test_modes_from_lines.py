@@ -30,7 +30,7 @@ PAIRS = np.array(
 ).T
 
 
-def random_modes(
+def draw_modes(
     rng: np.random.Generator, count: int, most_damping: float = 0.5
 ) -> list[Mode]:
     """Modes with a damping each, the slowest with period 1, the others up to four times as fast."""
@@ -48,13 +48,13 @@ def random_modes(
             return modes
 
 
-TWO = random_modes(np.random.default_rng(5), 2)
+TWO = draw_modes(np.random.default_rng(5), 2)
 
 
-def residuals_of(found: ModalVibration, tr: Samples, td: Samples) -> Samples:
+def predict_residuals(modal: ModalVibration, tr: Samples, td: Samples) -> Samples:
     """Residual of pairs, each of shape (n,), by the measures of a deformation [-]."""
-    squared = found.separation(tr, td) + found.kinetic_energy(td)
-    return np.asarray(np.sqrt(squared / found.vibration_energy(td)))
+    squared = modal.separation(tr, td) + modal.kinetic_energy(td)
+    return np.asarray(np.sqrt(squared / modal.vibration_energy(td)))
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
@@ -67,16 +67,19 @@ def test_the_residual_is_predicted_from_the_total_energy(
     rng = np.random.default_rng(20261)
     errors: list[float] = []
     for seed in range(6):
-        modes = random_modes(rng, count)
-        found = sure(
+        modes = draw_modes(rng, count)
+        modal = sure(
             identify_modal(
                 TIME, noisy(printed(energy_of(modes, TIME)), noise, seed=seed)
             )
         )
-        assert found.signed
-        true, told = replayed_residual(modes, *PAIRS), residuals_of(found, *PAIRS)
-        errors.append(float(np.sqrt(np.mean((told - true) ** 2))))
-        _, low, high = found.residual_band(told, *PAIRS)
+        assert modal.signed
+        true, predicted = (
+            replayed_residual(modes, *PAIRS),
+            predict_residuals(modal, *PAIRS),
+        )
+        errors.append(float(np.sqrt(np.mean((predicted - true) ** 2))))
+        _, low, high = modal.residual_band(predicted, *PAIRS)
         assert np.mean((low - 0.01 <= true) & (true <= high + 0.01)) >= 0.95
     assert np.median(errors) <= median
     assert max(errors) <= worst
@@ -86,18 +89,20 @@ def test_the_residual_is_predicted_from_the_total_energy(
 def test_rates_damping_and_energies_of_the_modes_are_found(
     count: int, seed: int
 ) -> None:
-    modes = random_modes(np.random.default_rng(seed), count, most_damping=0.3)
-    found = sure(identify_modal(TIME, energy_of(modes, TIME)))
+    modes = draw_modes(np.random.default_rng(seed), count, most_damping=0.3)
+    modal = sure(identify_modal(TIME, energy_of(modes, TIME)))
     td = 4.0
     largest = sum(float(mode.vibration_energy(td)) for mode in modes)
     at_td = [
-        mode for mode in found.modes_at(td) if mode.vibration_energy_td > 1e-3 * largest
+        mode for mode in modal.modes_at(td) if mode.vibration_energy_td > 1e-3 * largest
     ]
     expected = [
         mode for mode in modes if float(mode.vibration_energy(td)) > 2e-3 * largest
     ]
     for mode in expected:
-        nearest = min(at_td, key=lambda one: abs(one.omega - mode.omega))
+        nearest = min(
+            at_td, key=lambda expected_mode: abs(expected_mode.omega - mode.omega)
+        )
         assert nearest.omega == pytest.approx(mode.omega, rel=1e-4)
         assert nearest.alpha == pytest.approx(mode.alpha, abs=1e-2)
         assert nearest.vibration_energy_td == pytest.approx(
@@ -109,17 +114,17 @@ def test_rates_damping_and_energies_of_the_modes_are_found(
 def test_the_modes_are_known_up_to_both_ends_of_their_window(states: int) -> None:
     """Fine records are brought to means over blocks, whose middles do not reach the ends."""
     time = np.linspace(0, 6, states)
-    found = sure(identify_modal(time, energy_of(TWO, time)))
-    assert found.known_at(6.0)
-    assert found.comparable_since(6.0) == 0.0
-    assert not found.known_at(6.01)
+    modal = sure(identify_modal(time, energy_of(TWO, time)))
+    assert modal.known_at(6.0)
+    assert modal.comparable_since(6.0) == 0.0
+    assert not modal.known_at(6.01)
     tr, td = np.array([0.0, 1.7]), np.array([6.0, 6.0])
-    true, told = replayed_residual(TWO, tr, td), residuals_of(found, tr, td)
-    assert told == pytest.approx(true, abs=2e-3)
+    true, predicted = replayed_residual(TWO, tr, td), predict_residuals(modal, tr, td)
+    assert predicted == pytest.approx(true, abs=2e-3)
 
 
 def test_elastic_and_kinetic_energy_are_those_of_the_modes() -> None:
-    found = sure(identify_modal(TIME, energy_of(TWO, TIME)))
+    modal = sure(identify_modal(TIME, energy_of(TWO, TIME)))
     inside = TIME[50:-50:7]
     elastic, kinetic = (
         energy_of(TWO, inside),
@@ -127,21 +132,21 @@ def test_elastic_and_kinetic_energy_are_those_of_the_modes() -> None:
     )
     largest = float(elastic.max())
     np.testing.assert_allclose(
-        found.elastic_energy(inside), elastic, atol=1e-6 * largest
+        modal.elastic_energy(inside), elastic, atol=1e-6 * largest
     )
     np.testing.assert_allclose(
-        found.kinetic_energy(inside), kinetic, atol=1e-4 * largest
+        modal.kinetic_energy(inside), kinetic, atol=1e-4 * largest
     )
-    whole = sum(mode.vibration_energy_td for mode in found.modes_at(3.0))
-    assert whole == pytest.approx(float(found.vibration_energy(3.0)), rel=1e-3)
+    whole = sum(mode.vibration_energy_td for mode in modal.modes_at(3.0))
+    assert whole == pytest.approx(float(modal.vibration_energy(3.0)), rel=1e-3)
 
 
 def test_the_residual_of_several_modes_is_that_of_its_measures() -> None:
     tr, td = np.array([0.4, 1.3, 2.2]), 4.1
-    found = sure(identify_modal(TIME, energy_of(TWO, TIME)))
-    kinetic = kinetic_share(found, td)
+    modal = sure(identify_modal(TIME, energy_of(TWO, TIME)))
+    kinetic = kinetic_share(modal, td)
     expected = [
-        residual(float(error), kinetic) for error in lock_in_error(found, tr, td)
+        residual(float(error), kinetic) for error in lock_in_error(modal, tr, td)
     ]
     np.testing.assert_allclose(replayed_residual(TWO, tr, td), expected, atol=1e-4)
 
@@ -150,12 +155,12 @@ def test_the_residual_of_several_modes_is_that_of_its_measures() -> None:
 def test_several_modes_are_no_oscillator(count: int) -> None:
     rng = np.random.default_rng(count)
     rates = 2 * np.pi * np.sort(rng.uniform(1, 4, count))
-    found = identify(
+    fitted = identify(
         TIME,
         energy_of([Mode(rate, 0.2, 1.0, 0.3, 0.0) for rate in rates.tolist()], TIME),
     )
-    assert not found.describes_record
-    assert found.reason
+    assert not fitted.describes_record
+    assert fitted.reason
 
 
 def test_the_rollover_is_no_oscillator() -> None:
@@ -180,8 +185,8 @@ def test_the_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
     ],
 )
 def test_records_without_lines_have_no_modes(time: Samples, energy: Samples) -> None:
-    found = identify_modal(time, energy)
-    assert found is None or not found.signed
+    modal = identify_modal(time, energy)
+    assert modal is None or not modal.signed
 
 
 # ---- the choice
@@ -249,6 +254,8 @@ def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     errors = []
     for run in chain.scan():
         vibration = sure(situation.at(run["td_s"]).vibration.modal)
-        told = residuals_of(vibration, np.array([run["tr_s"]]), np.array([run["td_s"]]))
-        errors.append(abs(float(told[0]) - run["R_sim"]))
+        predicted = predict_residuals(
+            vibration, np.array([run["tr_s"]]), np.array([run["td_s"]])
+        )
+        errors.append(abs(float(predicted[0]) - run["R_sim"]))
     assert max(errors) < 0.025

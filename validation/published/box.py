@@ -79,13 +79,13 @@ def _setting(_: Parameters) -> Exhibit:
 
 def _early(base: Parameters) -> Exhibit:
     reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
-    off = _roll_error(reference, early)
+    roll_error = _roll_error(reference, early)
     return _compared(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
         "Outlines and roll with and without switching; switched at 1 ms the box rolls less than the reference.",
-        f"So does this box, by {abs(off):.2f} degrees of {np.degrees(abs(_at_td(reference).roll)):.0f} at td. Outlines "
-        "and roll look identical; the difference is visible only in a panel of its own.",
-        agrees=off < 0,
+        f"So does this box, by {abs(roll_error):.2f} degrees of {np.degrees(abs(_at_td(reference).roll)):.0f} at td. "
+        "Outlines and roll look identical; the difference is visible only in a panel of its own.",
+        agrees=roll_error < 0,
     )  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def _revised(base: Parameters) -> Exhibit:
 
 def _compared(
     name: str, title: str, figure: str, section: int, base: Parameters, times: tuple[float, ...], paper: str,
-    found: str, *, agrees: bool,
+    results: str, *, agrees: bool,
 ) -> Exhibit:  # fmt: skip
     """Outlines, roll and height of runs switched at ``times`` beside the reference, and the differences."""
     reference = _run(base)
@@ -149,12 +149,12 @@ def _compared(
         rolls.append(Curve(label, f"roll_{key}_deg", "thin"))
         differences.append(Curve(label, f"droll_{key}_deg"))
         heights.append(Curve(label, f"dz_{key}_mm"))
-    every = 1e3 * _END / (_OUTLINES - 1)
+    period_ms = 1e3 * _END / (_OUTLINES - 1)
     marks = (("td", 1e3 * TD),)
     panels = (
         (
             Panel(
-                f"box every {every:.0f} ms",
+                f"box every {period_ms:.0f} ms",
                 "z [m]",
                 shapes=tuple(shapes),
                 xlabel="x [m]",
@@ -176,7 +176,9 @@ def _compared(
             ),
         ),
     )
-    return Exhibit(name, title, section, figure, paper, found, agrees, columns, panels)
+    return Exhibit(
+        name, title, section, figure, paper, results, agrees, columns, panels
+    )
 
 
 def variants_of(base: Parameters) -> Iterator[Variant]:
@@ -220,23 +222,31 @@ def tried(variants: Sequence[Variant]) -> Trial:
 
     td is 10 ms before the first of their landings.
     """
-    landings = [_run(one.parameters).landed or _END for one in variants]
+    landings = [
+        _run(trial_result.parameters).landed or _END for trial_result in variants
+    ]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     rows = [
-        row_of(one.name, suggest(history_of(_run(one.parameters)), td, Settings()))
-        for one in variants
+        row_of(
+            trial_result.name,
+            suggest(history_of(_run(trial_result.parameters)), td, Settings()),
+        )
+        for trial_result in variants
     ]
     common = common_tr(rows)
     assert common.tr is not None
     window = RigidWindow(common.tr, td)
-    known = zip(variants, rows, common.errors, strict=True)
-    runs = tuple(_at(one, row, error or 0.0, window) for one, row, error in known)
-    named = [
+    common_results = zip(variants, rows, common.errors, strict=True)
+    runs = tuple(
+        _at(trial_result, row, error or 0.0, window)
+        for trial_result, row, error in common_results
+    )
+    named_rows = [
         row
         for row in rows
         if row.source in ("base", "stiffness -15%", "stiffness +15%")
     ]
-    alone = common_tr(named)
+    alone = common_tr(named_rows)
     three = (
         None
         if alone.tr is None
@@ -260,10 +270,15 @@ def exhibit_of(trial: Trial) -> Exhibit:
     """Show what one tr for many variants costs each of them."""
     window, rows = trial.window, trial.runs
     number = np.arange(1.0, len(rows) + 1)
-    own = np.array([np.nan if one.row.tr is None else one.row.tr for one in rows])
+    own_tr = np.array(
+        [
+            np.nan if result_row.row.tr is None else result_row.row.tr
+            for result_row in rows
+        ]
+    )
     columns = {
-        "run": number, "own_tr_ms": 1e3 * own, "common_tr_ms": 0 * number + 1e3 * window.tr,
-        "rigid_own": (window.td - own) / _END, "rigid_common": 0 * number + (window.td - window.tr) / _END,
+        "run": number, "own_tr_ms": 1e3 * own_tr, "common_tr_ms": 0 * number + 1e3 * window.tr,
+        "rigid_own": (window.td - own_tr) / _END, "rigid_common": 0 * number + (window.td - window.tr) / _END,
         "level_error": np.array([row.level_error for row in rows]),
         "roll_error_deg": np.array([row.roll_error for row in rows]),
         "end_error_deg": np.array([row.end_error for row in rows]),
@@ -314,9 +329,9 @@ def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
 def _alone_after(trial: Trial) -> bool:
     """Whether what acts after td leaves tr where it is, to a state of the record."""
     times = [
-        one.row.tr
-        for one in trial.runs
-        if one.row.tr is not None and not one.variant.before
+        run.row.tr
+        for run in trial.runs
+        if run.row.tr is not None and not run.variant.before
     ]
     return max(times) - min(times) < float(
         _run(trial.runs[0].variant.parameters).time[1]
@@ -326,28 +341,40 @@ def _alone_after(trial: Trial) -> bool:
 def _told(trial: Trial) -> str:
     """Say how far the paper's statement holds, and where it fails."""
     rows, window = trial.runs, trial.window
-    known = [(one, 1e3 * one.row.tr) for one in rows if one.row.tr is not None]
-    after, before = (
-        [tr for one, tr in known if one.variant.before is flag]
+    chosen = [
+        (result_of_variant, 1e3 * result_of_variant.row.tr)
+        for result_of_variant in rows
+        if result_of_variant.row.tr is not None
+    ]
+    later, earlier = (
+        [
+            tr
+            for result_of_variant, tr in chosen
+            if result_of_variant.variant.before is flag
+        ]
         for flag in (False, True)
     )
-    loads = [1e3 * (_run(one.variant.parameters).released or 0.0) for one in rows]
-    worst = max(rows, key=lambda one: one.level_error)
+    loads = [
+        1e3 * (_run(result_of_variant.variant.parameters).released or 0.0)
+        for result_of_variant in rows
+    ]
+    worst = max(rows, key=lambda result_of_variant: result_of_variant.level_error)
     given_up, rigid = (
-        1e3 * window.tr - min(tr for _, tr in known),
+        1e3 * window.tr - min(tr for _, tr in chosen),
         1e3 * (window.td - window.tr),
     )
-    roll = max(abs(one.roll_error) for one in rows)
+    roll = max(abs(result_of_variant.roll_error) for result_of_variant in rows)
     names = "; ".join(
-        f"{place} {one.variant.name}" for place, one in enumerate(rows, start=1)
+        f"{place_number} {result_of_variant.variant.name}"
+        for place_number, result_of_variant in enumerate(rows, start=1)
     )
     fails = "" if trial.kept else (
         "It fails for all of them at once: no tr lies within the timing tolerance of each run, so that no error grows "
         "by more than 0.05. "
     )  # fmt: skip
     return (
-        f"True for what acts after td: tr moves by {max(after) - min(after):.2g} ms. What acts before td moves it: "
-        f"from {min(before):.1f} to {max(before):.1f} ms. {_of_stiffness(trial, dict(_named(known)))}{fails}"
+        f"True for what acts after td: tr moves by {max(later) - min(later):.2g} ms. What acts before td moves it: "
+        f"from {min(earlier):.1f} to {max(earlier):.1f} ms. {_of_stiffness(trial, dict(_named(chosen)))}{fails}"
         f"tr = {1e3 * window.tr:.1f} ms is still acceptable in all {len(rows)}: the level is off by up to "
         f"{worst.level_error:.3f} ({worst.variant.name}), with a tolerance of 0.2; switched there, the roll at td is "
         f"right within {roll:.2f} degrees, and up to {given_up:.1f} ms of about {rigid:.0f} are given up. "
@@ -356,17 +383,18 @@ def _told(trial: Trial) -> str:
     )
 
 
-def _named(known: Sequence[tuple[Tried, float]]) -> Iterator[tuple[str, float]]:
-    for one, tr in known:
-        yield one.variant.name, tr
+def _named(known_results: Sequence[tuple[Tried, float]]) -> Iterator[tuple[str, float]]:
+    for known_result, tr in known_results:
+        yield known_result.variant.name, tr
 
 
-def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
+def _of_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
     """Say what the stiffness alone does, where its variants were run."""
-    if trial.stiffness is None or "stiffness +15%" not in own:
+    if trial.stiffness is None or "stiffness +15%" not in own_results:
         return ""
     times = ", ".join(
-        f"{own[name]:.1f}" for name in ("stiffness -15%", "base", "stiffness +15%")
+        f"{own_results[name]:.1f}"
+        for name in ("stiffness -15%", "base", "stiffness +15%")
     )
     tr, error = trial.stiffness
     return (
@@ -386,8 +414,8 @@ class _State(NamedTuple):
 
 
 def _at_td(record: Record) -> _State:
-    at = int(np.abs(record.time - TD).argmin())
-    return _State(float(record.roll[at]), complex(record.centre[at]))
+    state_index = int(np.abs(record.time - TD).argmin())
+    return _State(float(record.roll[state_index]), complex(record.centre[state_index]))
 
 
 def _roll_error(reference: Record, run: Record) -> float:
@@ -396,8 +424,8 @@ def _roll_error(reference: Record, run: Record) -> float:
 
 
 def _outlines(record: Record) -> Plane:
-    shown = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
-    return np.asarray(record.outline[shown])
+    shown_states = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
+    return np.asarray(record.outline[shown_states])
 
 
 # Section of the paper and what makes each figure, some seconds with the default box.

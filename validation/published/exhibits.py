@@ -187,13 +187,17 @@ def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
     replay = switched(INTEGRATED)
     time = TIME if run is None else run["time_s"]
     closed = replay.motion(time)
-    other = integrated(replay, time) if run is None else [run[f"{name}_m"] for name in "zy"] + [
+    other_columns = integrated(replay, time) if run is None else [run[f"{name}_m"] for name in "zy"] + [
         run[f"v{name}_mps"] for name in "zy"
     ]  # fmt: skip
     method = "integrated" if run is None else "finite elements"
     columns = {"time_ms": 1e3 * time}
     for name, unit, ours, theirs in zip(
-        ("z", "y", "vz", "vy"), ("m", "m", "mps", "mps"), closed, other, strict=True
+        ("z", "y", "vz", "vy"),
+        ("m", "m", "mps", "mps"),
+        closed,
+        other_columns,
+        strict=True,
     ):
         columns |= {
             f"{name}_closed_{unit}": ours,
@@ -231,17 +235,17 @@ def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
         ("z", "y"),
         None,
     )
-    off = max(
+    largest = max(
         float(np.abs(columns[f"{name}_other_m"] - columns[f"{name}_closed_m"]).max()) for name in "zy"
     ) / float(np.abs(closed.z).max())  # fmt: skip
     return Exhibit(
         "motion", f"Closed form and {method}", 3, "6a-d",
         "Displacements and velocities for (6, 80) ms, analytical and by explicit finite elements, with the solver's "
         "transients at the switches.",
-        f"Displacements agree within {off:.1g} of the largest. Velocities jump at tr to their common value; a solver "
-        "takes one step for that, and its output shows the last state before it. At td nothing jumps: the "
+        f"Displacements agree within {largest:.1g} of the largest. Velocities jump at tr to their common value; "
+        "a solver takes one step for that, and its output shows the last state before it. At td nothing jumps: the "
         "spring alone accelerates the masses.",
-        off < 1e-2, columns, ((whole, velocities[0]), (velocities[1], velocities[2])),
+        largest < 1e-2, columns, ((whole, velocities[0]), (velocities[1], velocities[2])),
     )  # fmt: skip
 
 
@@ -311,10 +315,10 @@ def _after_td() -> Exhibit:
             Curve("without switching", "r_free_m"),
             Curve("switched", f"r_{name}_m"),
         )
-        shown = (10.0, 150.0)
+        limits = (10.0, 150.0)
         panels.append((
-            Panel(f"{name} pair: {_named(pair)}", "y [m]", motion, _rigid(pair), span=shown),
-            Panel(f"residual R = {residual(pair):.3f}", "deformation y - z [m]", vibration, _rigid(pair), span=shown),
+            Panel(f"{name} pair: {_named(pair)}", "y [m]", motion, _rigid(pair), span=limits),
+            Panel(f"residual R = {residual(pair):.3f}", "deformation y - z [m]", vibration, _rigid(pair), span=limits),
         ))  # fmt: skip
     columns["r_free_m"] = deformation_of(OSCILLATOR.free(START, TIME))
     return Exhibit(

@@ -84,27 +84,27 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction, shown: Shown) -> str:
+def as_table(answer: Reproduction, is_shown: Shown) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
     lines = [
-        tables.as_text(HEAD, [cells(row) for row in rows], shown.width),
+        tables.as_text(HEAD, [cells(row) for row in rows], is_shown.width),
         "",
         *pairs_of(),
         "",
     ]
-    for one in exhibits:
+    for exhibit in exhibits:
         lines += [
-            f"{heading(one)}: {verdict(one)}",
-            f"  paper  {one.paper}",
-            f"  here   {one.found}",
+            f"{heading(exhibit)}: {verdict(exhibit)}",
+            f"  paper  {exhibit.paper}",
+            f"  here   {exhibit.found}",
         ]
     lines += [
         "",
         "misprints in the paper",
         *(f"  {misprint}" for misprint in MISPRINTS),
     ]
-    return tables.wrapped("\n".join(lines), shown.width)
+    return tables.wrapped("\n".join(lines), is_shown.width)
 
 
 def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
@@ -114,14 +114,14 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
         "# Analysis of switched-rigid floating oscillator, reproduced",
         f"{MODEL}; d2rpick {__version__}.",
     ]
-    for one in exhibits:
-        shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
+    for exhibit in exhibits:
+        picture_lines = [f"![{exhibit.title}]({exhibit.name}.svg)"] if pictures else []
         blocks += [
-            f"## {heading(one)}",
-            *shown,
-            f"Paper: {one.paper}",
-            f"Here: {one.found}",
-            f"Agrees: {verdict(one)}.",
+            f"## {heading(exhibit)}",
+            *picture_lines,
+            f"Paper: {exhibit.paper}",
+            f"Here: {exhibit.found}",
+            f"Agrees: {verdict(exhibit)}.",
         ]
     blocks += [
         "## Published and computed values",
@@ -157,27 +157,35 @@ def as_csv(answer: Reproduction, _: Shown) -> str:
 
 def cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
-    known = (
+    cell_texts = (
         None if value is None else f"{round(value, _DECIMALS):.12g}"
         for value in (row.published, row.reference)
     )
-    here = f"{round(row.here, _DECIMALS):.12g}"
+    our_value = f"{round(row.here, _DECIMALS):.12g}"
     difference = (
         "0"
         if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected)
         else f"{row.difference:.1e}"
     )
-    return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
+    return [
+        row.what,
+        row.unit,
+        *cell_texts,
+        our_value,
+        difference,
+        row.agrees,
+        row.source,
+    ]
 
 
 def heading(exhibit: Exhibit) -> str:
     """Give the figure of the paper and what it shows."""
-    place = (
+    figure_label = (
         exhibit.figure
         if exhibit.figure.startswith("section")
         else f"fig. {exhibit.figure}"
     )
-    return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
+    return f"{figure_label[0].upper()}{figure_label[1:]}: {exhibit.title}"
 
 
 def verdict(exhibit: Exhibit) -> str:
@@ -202,7 +210,7 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
-        *(_exhibited(one) for one in answer.exhibits),
+        *(_exhibited(exhibit) for exhibit in answer.exhibits),
         section("Published and here", published),
         tag("ul", *(tag("li", text) for text in pairs_of())),
         section(
@@ -214,13 +222,13 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     )
 
 
-def _exhibited(one: Exhibit) -> Markup:
-    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
-    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
+def _exhibited(exhibit: Exhibit) -> Markup:
+    drawing = Markup(svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
+    class_ = {True: "good", False: "bad", None: "soft"}[exhibit.agrees]
     return section(
-        heading(one),
-        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
-        tag("p", tag("b", "Paper: "), one.paper),
-        tag("p", tag("b", "Here: "), one.found),
-        tag("p", "Agrees: ", tag("span", verdict(one), class_=class_)),
+        heading(exhibit),
+        tag("figure", tag("div", drawing, role="img", aria_label=exhibit.title)),
+        tag("p", tag("b", "Paper: "), exhibit.paper),
+        tag("p", tag("b", "Here: "), exhibit.found),
+        tag("p", "Agrees: ", tag("span", verdict(exhibit), class_=class_)),
     )

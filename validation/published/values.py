@@ -77,9 +77,17 @@ class PublishedValue:
         return abs(self.difference) <= self.tolerance
 
 
-def _exact(what: str, unit: str, reference: float, here: float) -> PublishedValue:
+def _exact(
+    quantity: str, unit: str, reference: float, our_value: float
+) -> PublishedValue:
     return PublishedValue(
-        what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT
+        quantity,
+        unit,
+        None,
+        reference,
+        our_value,
+        MOST_DIFFERENCE * abs(reference),
+        _EXACT,
     )
 
 
@@ -96,13 +104,13 @@ def table() -> tuple[PublishedValue, ...]:
 
 def deviation(pair: tuple[float, float]) -> float:
     """Largest error of the deformation after td over the largest deformation without switching there [-]."""
-    after = TIME[pair[1] <= TIME]
+    times_after_td = TIME[pair[1] <= TIME]
     replay = switched(pair)
-    wanted, found = (
-        deformation_of(replay.reference(after)),
-        deformation_of(replay.motion(after)),
+    wanted, deformation = (
+        deformation_of(replay.reference(times_after_td)),
+        deformation_of(replay.motion(times_after_td)),
     )
-    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+    return float(np.abs(deformation - wanted).max() / np.abs(wanted).max())
 
 
 def residual(pair: tuple[float, float]) -> float:
@@ -127,8 +135,8 @@ def _rows() -> Iterator[PublishedValue]:
     )
     yield _exact("energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1])
     yield _exact("tr for that peak", "ms", 13.5866683619825, 1e3 * better[0])
-    for pair, known in _STATES.items():
-        for time, z, y, energy in known:
+    for pair, known_values in _STATES.items():
+        for time, z, y, energy in known_values:
             state = switched(pair).motion(time)
             name = f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms at {1e3 * time:g} ms"
             yield _exact(f"z of {name}", "m", z, float(state.z))
@@ -136,13 +144,19 @@ def _rows() -> Iterator[PublishedValue]:
             yield _exact(
                 f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state))
             )
-    for name, pair, found in (
+    for name, pair, deviation_found in (
         ("(13, 64) ms", PUBLISHED, 0.888),
         ("better pair", better, 0.005),
     ):
-        what = f"deviation after td, {name}"
+        quantity = f"deviation after td, {name}"
         yield PublishedValue(
-            what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER
+            quantity,
+            "-",
+            None,
+            deviation_found,
+            deviation(pair),
+            _SOLVER_DIFFERENCE,
+            _SOLVER,
         )
 
 
@@ -219,7 +233,7 @@ def integrated(switched: Replay, time: Samples) -> State:
         return np.concatenate([x[2:], -o.alpha * x[2:]])
 
     x = np.array(switched.start, dtype=np.float64)
-    found = np.empty((4, time.size))
+    states = np.empty((4, time.size))
     bounds = (
         switched.origin,
         switched.tr,
@@ -242,6 +256,6 @@ def integrated(switched: Replay, time: Samples) -> State:
         )
         inside = (time >= start) & (time <= end)
         if inside.any():
-            found[:, inside] = steps.sol(time[inside])
+            states[:, inside] = steps.sol(time[inside])
         x = steps.y[:, -1]
-    return State(*found)
+    return State(*states)

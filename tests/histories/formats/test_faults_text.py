@@ -74,7 +74,7 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
             ]
             states = matsum_states(text, id_)
             # If one part is read, only its lines are compared, not those of other parts that may have its number.
-            assert is_within(states_read, states, most=1 if ids == IDS else 2), (
+            assert is_within(states_read, states, most_lost=1 if ids == IDS else 2), (
                 id_,
                 states_read,
                 states,

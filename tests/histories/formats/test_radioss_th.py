@@ -43,7 +43,7 @@ def test_any_age_and_form_of_the_format(
         MadePart(12, "step"),
         MadePart(3, "half a box", is_group=True),
     ]
-    writer = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
+    writer = t01(5, parts, globals_=globals_, code=code, title=title, writer=into())
     written = printed if isinstance(writer, T01TextWriter) else float
     assert recognises(bytes(writer.data)[:300])
     run = open_history(writer)
@@ -72,7 +72,7 @@ def test_any_age_and_form_of_the_format(
 
 @pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
 def test_control_bytes_in_titles_are_blanks(into: Callable[[], T01Writer]) -> None:
-    data = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(
+    data = bytes(t01(1, [MadePart(1, "part 7")], writer=into()).data).replace(
         b"part 7", b"p\nrt\x007"
     )
     assert open_history(data).parts[0].title == "p rt 7"
@@ -163,7 +163,7 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
 
 def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
     parts = [MadePart(id_, "piece", tuple(range(1, 501))) for id_ in range(1, 202)]
-    run = open_history(t01(1, parts, made=T01TextWriter()))
+    run = open_history(t01(1, parts, writer=T01TextWriter()))
     assert run.part_channel("internal_energy", [201]).tolist() == [
         [printed(value(0, 201, 1))]
     ]
@@ -171,7 +171,7 @@ def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
 
 @pytest.mark.parametrize("number", [-1.5e-120, 2.25e117, 0.0, -0.125])
 def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = t01(2, writer=T01TextWriter())
     writer.state(0.5, [number] * 22, [0.0] * 16)
     assert open_history(writer).channel("mass").tolist()[-1] == number
 
@@ -180,7 +180,7 @@ def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) ->
 def test_numbers_have_the_digits_in_which_the_solver_computed(
     single: bool, digits: int
 ) -> None:
-    writer = t01(0, made=T01TextWriter())
+    writer = t01(0, writer=T01TextWriter())
     for time in np.arange(4) / 7:
         writer.state(
             float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16
@@ -193,7 +193,7 @@ def test_numbers_have_the_digits_in_which_the_solver_computed(
 
 
 def test_legs_may_be_text_and_binary() -> None:
-    text, binary = t01(4, start=2, made=T01TextWriter()), t01(4)
+    text, binary = t01(4, start=2, writer=T01TextWriter()), t01(4)
     run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
     assert "if legs overlap the newer one is used" in run.notes[0]
@@ -251,7 +251,7 @@ def test_as_a_table_it_is_refused() -> None:
     ],
 )
 def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = t01(2, writer=T01TextWriter())
     writer.state(0.25, [7.0] * 22, [0.0] * 16)
     data = bytes(writer.data).decode()
     end = data.rindex(number * 2) + len(number)
@@ -260,7 +260,7 @@ def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
 
 
 def test_a_number_that_is_none_is_refused() -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = t01(2, writer=T01TextWriter())
     writer.state(0.25, [float("nan")] * 22, [0.0] * 16)
     with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
         run_of(radioss_th, bytes(writer.data)).history(Selection())
