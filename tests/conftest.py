@@ -17,7 +17,7 @@ os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
 import pytest
 from hypothesis import settings
 
-from d2rpick.base.workers import cores
+from d2rpick.base.workers import count_cores
 
 # No deadline, because a busy machine is no error. Every run draws new examples, so 20 instead of 100 are enough.
 settings.register_profile("d2rpick", deadline=None, max_examples=20)
@@ -54,9 +54,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def by_level(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge by the energy level alone on the command line, because fitting a vibration takes most of the time."""
+    """Judge by the energy level alone on the command line, because fitting a vibration takes most of the time.
+
+    What the level alone shows is poor, and is not to be a problem."""
     for command in ("SUGGEST", "VERIFY", "PLAN", "EXPLORE", "PARTS"):
         monkeypatch.setenv(f"D2RPICK_{command}_NO_VERIFY", "1")
+        monkeypatch.setenv(f"D2RPICK_{command}_MIN_QUALITY", "poor")
 
 
 pytest_plugins = ["tests.alone"]
@@ -68,7 +71,7 @@ gc.set_threshold(20_000, 20, 50)
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Use one worker per core: a worker that waits for a child process leaves its core to the child."""
-    return cores()
+    return count_cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,4 +1,4 @@
-"""Damaged inputs of all formats are read or refused (``D2RPICK_THOROUGH=20``: a million), and answers follow changes."""
+"""Damaged inputs of all formats are read or refused, a million with ``D2RPICK_THOROUGH=20``; answers follow changes."""
 
 from collections import Counter
 

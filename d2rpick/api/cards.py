@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck.printed_card import PrintedCard, Printing, Solver as Module
+    from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
@@ -244,9 +244,9 @@ class Cards:
         cards = replace(cards, name=cards.name or found.name, end=end)
         if not parts or cards.node:
             return cards, ()
-        from d2rpick.deck.radioss_bodies import bodies_for
+        from d2rpick.deck.radioss_bodies import find_bodies
 
-        bodies = bodies_for(deck, parts)
+        bodies = find_bodies(deck, parts)
         cards = replace(
             cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced
         )
@@ -316,6 +316,14 @@ class JudgedCard(NamedTuple):
         """Whether all windows are."""
         return all(verdict.verified for verdict in self.verdicts)
 
+    @property
+    def passed(self) -> bool:
+        """Whether all windows are admissible, and as good as ``min_quality`` asks for."""
+        return all(
+            verdict.decision.reaches(verdict.situation.settings.min_quality)
+            for verdict in self.verdicts
+        )
+
 
 def judged(
     asked: Asked,
@@ -363,10 +371,10 @@ def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
 
 def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
-    if not verdict.verified:
-        yield Caution(
-            "not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"
-        )
+    decision = verdict.decision
+    if not decision.reaches(verdict.situation.settings.min_quality):
+        told = f"{decision.verdict}: {decision.reason}"
+        yield Caution("not-verified", f"the times as printed: {told}; {decision.cure}")
 
 
 def card(
@@ -429,7 +437,7 @@ def card_of(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
     """Print the card of windows, judged as printed where there is a run."""
-    from d2rpick.deck.printing import DEFAULT, SOLVERS, cards as print_cards
+    from d2rpick.deck.printing import DEFAULT, SOLVERS, print_cards
 
     if run is None:
         request.without_history()

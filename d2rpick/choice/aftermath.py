@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.flight.margin import energy_of_approach
+from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -153,7 +153,11 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
     The energy of the error is R^2 U(td).  With an unknown residual the worst one counts, that of equal levels with
     opposite signs.
     """
-    contact = energy_of_next_contact(situation)
+    known, flight = situation.history.known, situation.flight
+    contact = known.once(
+        ("energy of the next contact", flight),
+        lambda: energy_of_next_contact(situation),
+    )
     if contact is None or situation.at_rest:
         return None
     compared = situation.vibration.compared
@@ -181,4 +185,4 @@ def energy_of_next_contact(situation: Situation) -> float | None:
         return None
     _, after = history.between(end, np.inf)
     rise = float(after.max(initial=-np.inf)) - history.energy_at(end)
-    return rise if rise > 0 else energy_of_approach(history, situation.flight)
+    return rise if rise > 0 else compute_energy_of_approach(history, situation.flight)

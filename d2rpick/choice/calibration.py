@@ -20,9 +20,9 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
-from d2rpick.deck import ls_dyna_inventory, main_decks, radioss_inventory
+from d2rpick.deck import find_main_decks, ls_dyna_inventory, radioss_inventory
 from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import find_windows, read_switching
@@ -230,14 +230,14 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
     FormatError
         If no file says what the run took.
     """
-    decks = main_decks(folder)
+    decks = find_main_decks(folder)
     if len(decks) != 1:
         count = (
             f"{len(decks)} main decks were found" if decks else "no main deck was found"
         )
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
     found = tuple(
-        _of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0])
+        _of_radioss(decks[0]) if list_run_files(decks[0]) else _of_ls_dyna(decks[0])
     )
     if not found:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
@@ -247,7 +247,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
 
 def _of_radioss(deck: str) -> Iterator[Observation]:
     run = read_run(deck)
-    inventory = radioss_inventory.read(run)
+    inventory = radioss_inventory.read_radioss_inventory(run)
     windows = find_run_windows(run).windows.windows
     rigid = [
         _Rigid(one.unit.id, one.tr, one.td or np.inf)
@@ -267,7 +267,7 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     read = read_deck(deck)
-    inventory = ls_dyna_inventory.read(read)
+    inventory = ls_dyna_inventory.read_ls_dyna_inventory(read)
     windows = find_windows(read_switching(read), read_parts(read)).windows
     rigid = [
         _Rigid(one.part, one.tr, one.td or np.inf)

@@ -14,11 +14,11 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.choice.warnings import Objection, objections
-from d2rpick.histories.digits import not_before
+from d2rpick.choice.warnings import POOR_RESIDUAL, Objection, objections
+from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
-from d2rpick.vibration.model import NEAR_TD, measured_of, moments_of
+from d2rpick.vibration.model import NEAR_TD, find_moments, measure_all
 from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ class Candidate(Measured, Record):
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
     without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
     parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
-    ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
+    ``level_ratio``: E(tr)/E(td).  ``admissible``: in the flight, same sign, error within tolerance; else ``notes`` say
+    why not.  ``acceptable``: with a residual of at most a half as well.  ``run_time_share``:
     expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
     that hardly anything is saved.  ``residual_high``: how large the residual may be if what the model leaves over
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
@@ -60,13 +61,14 @@ class Candidate(Measured, Record):
     tr: float
     kind: str
     energy: float
-    energy_ratio: float | None
+    level_ratio: float | None
     level_error: float | None
     rising: bool | None
     rigid_time: float
     rigid_fraction: float
     tr_low: float | None
     tr_high: float | None
+    admissible: bool
     acceptable: bool
     recommended: bool
     notes: tuple[str, ...]
@@ -128,7 +130,7 @@ class Judged:
         if len(each) == 1:  # of a noisy record, which memory is to hold once
             moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
         tr = moments.tr
-        energy, known = measured_of([one.vibration for one in situations], tr, ends)
+        energy, known = measure_all([one.vibration for one in situations], tr, ends)
         still = np.array([one.at_rest for one in situations])[place]
         level_error = measures.level_error(
             energy, np.array([one.energy_td for one in situations])[place]
@@ -336,11 +338,13 @@ class Candidates(Sequence[Candidate]):
             chain.from_iterable(one.told(i) for one in found.objections if one.holds[i])
         )
         remarks = _remarks(situation, reach, values if known else {}, parts)
+        residual = values["residual"]
+        kept = residual is None or residual <= POOR_RESIDUAL
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy_ratio=energy / situation.energy_td
+            level_ratio=energy / situation.energy_td
             if situation.energy_td > 0 and not situation.at_rest
             else None,
             rising=rising,
@@ -348,7 +352,8 @@ class Candidates(Sequence[Candidate]):
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            acceptable=not against,
+            admissible=not against,
+            acceptable=not against and kept,
             recommended=rank == self.recommended,
             notes=(*against, *_SAME_SWING * values["same_swing"], *remarks),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
@@ -378,7 +383,7 @@ def judged_of(
             one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf
             for one in asked
         ]
-        found = moments_of(
+        found = find_moments(
             [one.vibration for one in asked], asked[0].settings.tolerance, starts
         )
         kept = [
@@ -402,7 +407,7 @@ def _at_start(situation: Situation) -> Moments | None:
     if start is None or not situation.at_rest:
         return None
     first = max(start, float(situation.history.time[0]))
-    read = not_before(first)
+    read = round_up_as_read(first)
     return Moments.of("start", [read if read < situation.td else first])
 
 
@@ -449,10 +454,10 @@ def _remarks(
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
     if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         from d2rpick.vibration.part_signs import (
-            main_contributors,
+            name_main_contributors,
         )  # not above: a table has no parts
 
-        yield f"mismatch of {main_contributors(parts)}"
+        yield f"mismatch of {name_main_contributors(parts)}"
     if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
         yield f"residual up to {known['residual_high']:.2g} if the record hides a further mode"
     if known and reach > known["timing_tolerance"]:

@@ -12,7 +12,7 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.switched_run import FEWEST, SAME, same_parts
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.samples import stretches
+from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Comparison(NamedTuple):
     source: tuple[str, ...]
     energy_frozen: float
     energy_td: float
-    energy_ratio: float | None
+    level_ratio: float | None
     end: float
     mean_after: float
     mean_after_reference: float
@@ -182,7 +182,7 @@ def compare_runs(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=wanted,
-        energy_ratio=frozen / wanted if wanted > 0 else None,
+        level_ratio=frozen / wanted if wanted > 0 else None,
         end=end,
         mean_after=mean,
         mean_after_reference=mean_reference,
@@ -324,7 +324,9 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     """
     time, energy = switched.time, switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
-    still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST)
+    still = find_stretches(
+        np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST
+    )
     spans = [(max(one.start - 1, 0), one.stop - 1) for one in still]
     least = round_off(reference)
     moving = [

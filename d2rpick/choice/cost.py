@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import ConfigurationError, are, name_units
+from d2rpick.base.errors import ConfigurationError, choose_verb, name_units
 from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
@@ -152,7 +152,9 @@ class CostModel:
     def saved(self, parts: Collection[int]) -> Share:
         """Share of a step that is saved while these parts are rigid, c above [-]; unknown of parts beside the deck."""
         if absent := sorted(set(parts) - self.inventory.parts.keys()):
-            return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
+            return Share(
+                None, f"{name_units(absent)} {choose_verb(absent)} not in the deck"
+            )
         within = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total

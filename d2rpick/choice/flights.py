@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.margins import margin_of
-from d2rpick.flight.flight import Flight, all_seen, witnesses
-from d2rpick.flight.window import moments
-from d2rpick.histories.digits import not_after, sum_as_read
+from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
+from d2rpick.flight.window import list_moments
+from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,7 +61,7 @@ def longest_flight(
 
 def last_td(end: float, margin: float) -> float:
     """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
-    return not_after(sum_as_read(end, -margin)) if margin else end
+    return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
 def flights_of(
@@ -156,7 +156,7 @@ def _flights_of(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Find them without a landing: where the energy is all there is, by what describes it, or none."""
-    seen = all_seen(history)
+    seen = find_all_seen(history)
     if seen:
         return tuple(
             Flight(
@@ -174,7 +174,7 @@ def _flights_of(
     )  # not above: better evidence than the energy does without it
 
     look = looking(history, settings, fits)
-    if settings.replay and not witnesses(history):
+    if settings.replay and not list_witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
         for share in _WHERE_IT_VIBRATES:
             flight = look(first + share * (float(history.time[-1]) - first)).flight
@@ -186,7 +186,7 @@ def _flights_of(
         look = looking(history, replace(settings, replay=False))
     found: list[Flight] = []
     for td in sorted(
-        moments(history.time), reverse=True
+        list_moments(history.time), reverse=True
     ):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
@@ -210,21 +210,21 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
     import numpy as np
 
     from d2rpick.flight.momentum import (
-        all_flights,
-        to_be_asked,
+        find_all_flights,
+        select_momenta_for_flight,
     )  # not above: most evidence is found without
 
     asked = [
         one
-        for one in to_be_asked(history.momenta)
+        for one in select_momenta_for_flight(history.momenta)
         if np.array_equal(one.time, history.time)
     ]
     if not asked:
         return {}
     momenta = next(
-        (one for one in asked if all_flights(one, history.balance)), asked[0]
+        (one for one in asked if find_all_flights(one, history.balance)), asked[0]
     )
-    flights, members = all_flights(momenta, history.balance), momenta.chosen
+    flights, members = find_all_flights(momenta, history.balance), momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         members = tuple(

@@ -13,10 +13,10 @@ import numpy as np
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.flight import MOST_WORK
-from d2rpick.flight.internal_energy import largest
-from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
+from d2rpick.flight.internal_energy import find_largest
+from d2rpick.flight.work import FEWEST_STATES, compute_work_beyond_gravity
 from d2rpick.histories.history import LARGEST_ENERGY
-from d2rpick.histories.samples import window as within
+from d2rpick.histories.samples import find_window as within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -146,10 +146,10 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
     if not any("T0" in name for name in sources):  # none is a leg of a Radioss run
         return
     from d2rpick.histories.listings import (
-        wrong_energies,
+        find_wrong_energies,
     )  # not above: other histories do without it
 
-    if found := list(wrong_energies(sources)):
+    if found := list(find_wrong_energies(sources)):
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
         told = f"{found[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
         yield Caution(WRONG_ENERGY, told)
@@ -202,7 +202,7 @@ def _peak(balance: Balance) -> float | None:
     """Peak of the internal energy; None where it is unknown or tiny."""
     if balance.internal is None:
         return None
-    most = largest(
+    most = find_largest(
         balance.internal, balance.kinetic, balance.total, balance.external_work
     )
     peak = float(balance.internal.max())
@@ -295,7 +295,7 @@ def _in_window(
                 float(np.abs(energy[inside]).max())
             )  # by its printed digits
             found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
-    work = work_beyond_gravity(balance, start, end)
+    work = compute_work_beyond_gravity(balance, start, end)
     if work is not None:
         found["window_work"] = work / locked
     return found
@@ -339,7 +339,7 @@ def refuse_unsound(
 
 def unsound(history: History) -> Iterator[Caution]:
     """Say why a run cannot be judged, with stable codes."""
-    most = largest(history.energy)
+    most = find_largest(history.energy)
     if most > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
@@ -395,6 +395,6 @@ def _has_nothing(history: History) -> bool:
     balance = history.balance
     if balance is None:
         return False
-    highest = largest(history.energy, balance.internal)
-    beside = largest(balance.kinetic, balance.external_work, balance.total)
+    highest = find_largest(history.energy, balance.internal)
+    beside = find_largest(balance.kinetic, balance.external_work, balance.total)
     return highest == 0 or max(highest, beside) <= _NOTHING

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_of
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
-from d2rpick.deck.printing import DEFAULT, SOLVERS, cards, solver_of
+from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -34,7 +35,7 @@ class CardRequest(NamedTuple):
         end = (
             float(history.time[-1]) if self.printing.end is None else self.printing.end
         )
-        solver = self.solver or solver_of(history.format)
+        solver = self.solver or find_solver(history.format)
         printing = self.printing._replace(part=ids, end=end)
         if "contact" in SOLVERS[solver].takes:
             printing = _with_pushes(printing, history, SOLVERS[solver].title)
@@ -131,7 +132,7 @@ def judged_card(
         return None
     solver, printing = request.of(history)
     every = sorted((*done, *windows))
-    plain = cards(every, printing, solver)
+    plain = print_cards(every, printing, solver)
     printed = plain.windows
     if "contact" in SOLVERS[solver].takes:
         printed = _narrowed(printed, history)
@@ -141,7 +142,7 @@ def judged_card(
         if asked not in done
     )
     remarks = tuple(_remarks(done, history, verdicts))
-    return cards(every, printing, solver, remarks), verdicts
+    return print_cards(every, printing, solver, remarks), verdicts
 
 
 def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
@@ -177,12 +178,14 @@ def _remarks(
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
-    poor = verdict.quality is not None and verdict.quality.grade == "poor"
-    held = f"{verdict.word}{', but of poor quality' * poor}"
-    result = (
-        held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
-    )
-    yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
+    decision = verdict.decision
+    word = decision.verdict
+    said = word.upper() if word == DO_NOT_USE else word
+    judged = f"Judged by {', '.join(history.source)}, {history.channel}"
+    yield f"{judged}:{which} {said}. {_sentence(decision.reason)}"
+    if decision.cure:
+        yield f"To improve: {decision.cure}."
+    yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
     if verdict.situation.at_rest:  # no level to match: the warning says so
         return
     measures = [
@@ -190,10 +193,15 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
         for name, value in (
             ("lock-in error", candidate.lock_in_error),
             ("level error", candidate.level_error),
-            ("kinetic share", verdict.situation.kinetic_share),
+            ("kinetic fraction", verdict.situation.kinetic_share),
             ("residual", candidate.residual),
         )
         if value is not None
     ]
     if measures:
         yield f"{', '.join(measures).capitalize()}."
+
+
+def _sentence(text: str) -> str:
+    """Make a sentence of a reason."""
+    return f"{text[:1].upper()}{text[1:]}."

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.margin import Margin, margin_before_contact
+from d2rpick.flight.margin import Margin, compute_margin
 
 if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
@@ -26,14 +26,14 @@ def bodies_of(
     if flight.parts is None:
         return None
     from d2rpick.flight.position_error import (
-        bodies_in_flight,
+        find_bodies_in_flight,
     )  # not above: a table has no parts
 
     known = history.known if fits is None else fits
     told, placement = settings.bodies, settings.placement
     return known.once(
         ("drift", flight, told),
-        lambda: bodies_in_flight(history, flight, told, placement),
+        lambda: find_bodies_in_flight(history, flight, told, placement),
     )
 
 
@@ -42,10 +42,10 @@ def margin_of(
 ) -> Margin:
     """Give the margin that is asked for, or by how much a switch in the flight may let the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
-        return margin_before_contact(history, flight, settings.margin)
+        return compute_margin(history, flight, settings.margin)
     bodies = bodies_of(history, flight, settings, fits)
     place = None if bodies is None else _largest_error(bodies, flight.start, flight.end)
-    return margin_before_contact(history, flight, place=place)
+    return compute_margin(history, flight, place=place)
 
 
 def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:

@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
+from d2rpick.base.errors import (
+    Caution,
+    FormatError,
+    RangeError,
+    give_if_written,
+    list_names,
+)
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.health import (
     Health,
     assess,
@@ -20,13 +27,13 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
-from d2rpick.flight.momentum import with_parts_by_number
+from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.balance import balance_of
-from d2rpick.histories.database import doubts
-from d2rpick.histories.history import History, rows_of
+from d2rpick.histories.balance import read_balance
+from d2rpick.histories.database import note_doubts
+from d2rpick.histories.history import History, select_states
 from d2rpick.histories.names import Part, Selection, select_parts
-from d2rpick.histories.samples import median
+from d2rpick.histories.samples import compute_median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -72,6 +79,7 @@ class Overview(NamedTuple):
     ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
     ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
     that of the run, with the longest of them as its window; None without energies.
+    ``unjudged`` says why no times can be chosen by the run; empty if they can.
     ``should_write`` names the output that would show the flights for sure; None where it is there, or no state is.
     """
 
@@ -92,13 +100,60 @@ class Overview(NamedTuple):
     health: Health | None
     notes: tuple[str, ...]
     alarms: tuple[Caution, ...] = ()
+    unjudged: tuple[Caution, ...] = ()
     contact_forces: tuple[ForceOverview, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Whether switch times can be chosen by this run: "use", "use with care" or "do not use"."""
+        if self.unjudged or not self.flights:
+            return DO_NOT_USE
+        return USE_WITH_CARE if self._doubts else USE
+
+    @property
+    def reason(self) -> str:
+        """Why the verdict is what it is."""
+        if self.unjudged:
+            return "; ".join(caution.message for caution in self.unjudged)
+        if not self.flights:
+            return "no free flight is seen, so nothing can be made rigid"
+        found = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
+        return "; ".join(self._doubts) or found
+
+    @property
+    def _doubts(self) -> list[str]:
+        """What makes a run that flies less than good."""
+        health = cautions_of_health(self.health) if self.health else ()
+        doubts = [caution.message for caution in health]
+        if not self.complete:
+            doubts.append("the files end within a state")
+        if all(source == "energy" for source, _ in self.flights):
+            doubts.append(
+                "only the internal energy shows the flights, which is not certain"
+            )
+        return doubts
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
         """What to know of the health of the run and of its engine, and why it cannot be judged."""
         health = cautions_of_health(self.health) if self.health else ()
         return (*self.alarms, *health, *cautions_of_engine(self.source))
+
+
+def _flights_of(flights: Sequence[tuple[str, FreeFlight]]) -> str:
+    """Say how many flights there are, and how long the longest is."""
+    longest = max(flight.end - flight.start for _, flight in flights)
+    count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
+    return f"{count}, the longest for {longest:.6g}"
+
+
+def _health_of(health: Health | None) -> str:
+    """Say that the energies keep to the limits, as far as they are written."""
+    if health is None or health.energy_ratio_min is None:
+        return (
+            "the files do not hold the energy balance that shows whether a run is sound"
+        )
+    return "energies within the limits of practice"
 
 
 def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
@@ -111,7 +166,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         *run.left_out,
         *(note for database in run.databases for note in _notes(database)),
     ]
-    notes += doubts(run.databases)
+    notes += note_doubts(run.databases)
     notes += run.unused_energies(selection)
     states, time = None, np.empty(0)
     try:
@@ -123,12 +178,13 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     ) as error:  # several columns may be the time: there is still a list of them
         if (
             first.format == "csv"
-            and if_written(lambda: first.energy_channel) is not None
+            and give_if_written(lambda: first.energy_channel) is not None
         ):
             raise  # by its one energy it is known which column is the time: the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
     history = _history(run, selection)
+    flaws = tuple(unsound(history)) if history else tuple(_of_energy(run, selection))
     rigid = rigid_times(Reference(run, history)) if history else ()
     flights = _flights(by_the_model(history) if rigid else history) if history else ()
     return Overview(
@@ -140,7 +196,9 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max()))
+        sampling=Sampling(
+            float(steps.min()), float(compute_median(steps)), float(steps.max())
+        )
         if steps.size
         else None,
         complete=all(database.complete for database in run.databases),
@@ -156,7 +214,8 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         else _missing(run),
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
+        alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *told),
+        unjudged=flaws,
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
@@ -205,7 +264,7 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
     energies = (
-        if_written(lambda: run.part_energies(run.parts))
+        give_if_written(lambda: run.part_energies(run.parts))
         if run.parts
         else np.empty((0, 0))
     )
@@ -218,7 +277,7 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
 
 
 def _highest(run: Run, part: Part) -> float | None:
-    return if_written(lambda: _most(run.part_energies([part])))
+    return give_if_written(lambda: _most(run.part_energies([part])))
 
 
 def _most(energies: Samples) -> float | None:
@@ -227,7 +286,7 @@ def _most(energies: Samples) -> float | None:
 
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     if rigid:
-        when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
         told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
 
@@ -238,7 +297,7 @@ def _health(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    balance = balance_of(
+    balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
     if balance is None or not balance.time.size:
@@ -254,7 +313,7 @@ def _health(
                 until=float(balance.time[-1]),
             )
         return assess(
-            replace(rows_of(balance, states), hourglass_of_parts=()),
+            replace(select_states(balance, states), hourglass_of_parts=()),
             until=float(balance.time[-1]),
         )
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
@@ -268,11 +327,19 @@ def _health(
 def _history(run: Run, selection: Selection) -> History | None:
     """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
     if selection.parts:
-        selection = with_parts_by_number(run, selection)
+        selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    return if_written(lambda: run.history(selection))
+    return give_if_written(lambda: run.history(selection))
+
+
+def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
+    """Say why no internal energy can be read: one has to be chosen first, or there is none."""
+    try:
+        run.history(selection)
+    except FormatError as error:
+        yield Caution("no-energy", str(error))
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
@@ -34,10 +35,10 @@ class Reference(NamedTuple):
         """Read what is selected of a run that is open; FormatError when it is not there."""
         if selection.parts:
             from d2rpick.flight.momentum import (
-                with_parts_by_number,
+                replace_words_by_part_ids,
             )  # not above: a table has no parts
 
-            selection = with_parts_by_number(run, selection)
+            selection = replace_words_by_part_ids(run, selection)
         return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
@@ -69,6 +70,7 @@ class Settings:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
     ``keep_vibration``: grade the vibration by itself, however little its error is worth in the next contact.
+    ``min_quality``: least grade of a pair that is planned, and that a deck passes with.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
     ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
@@ -89,6 +91,7 @@ class Settings:
     replay: bool = True
     strict: bool = False
     keep_vibration: bool = False
+    min_quality: str = FAIR
     cost_share: float | None = None
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None

@@ -16,10 +16,10 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.margins import bodies_of, margin_of
 from d2rpick.choice.together import Together
-from d2rpick.flight.chosen import Described, begun_at, find_flight, landed_at
-from d2rpick.flight.flight import Flight, Seen, seen_flight
-from d2rpick.flight.internal_energy import largest, quiet_time, round_off
-from d2rpick.histories.digits import sum_as_read
+from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
+from d2rpick.flight.flight import Flight, Seen, find_seen_flight
+from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
+from d2rpick.histories.digits import sum_times_as_read
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
@@ -30,18 +30,18 @@ from d2rpick.vibration.identify import (
 from d2rpick.vibration.model import (
     Evidence,
     Vibration,
-    describing,
-    doubtful,
-    energy_at,
+    describe_energy_at,
+    find_energy_at,
+    is_doubtful,
     model_at,
 )
 from d2rpick.vibration.span import (
     Fits,
     Span,
-    described_span,
-    hidden_share,
+    estimate_hidden_share,
+    find_described_span,
+    find_span,
     most_described,
-    span_of,
 )
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _faint(history: History, start: float) -> float:
     """
     after = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(after) - after).max(initial=0.0))
-    highest = history.known.once("highest", lambda: largest(history.energy))
+    highest = history.known.once("highest", lambda: find_largest(history.energy))
     quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
@@ -154,7 +154,7 @@ class Situation:
     @cached_property
     def whole(self) -> Vibration:
         """What of it the whole energy shows."""
-        return energy_at(self.history, self.td, self.evidence)
+        return find_energy_at(self.history, self.td, self.evidence)
 
     @property
     def basis(self) -> str:
@@ -179,14 +179,16 @@ class Situation:
         """Start of the flight with the margin, or None when unknown [time]."""
         start = self.flight.start
         return (
-            None if start is None else sum_as_read(start, self.settings.margin or 0.0)
+            None
+            if start is None
+            else sum_times_as_read(start, self.settings.margin or 0.0)
         )
 
     @property
     def latest_td(self) -> float:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         end = self.flight.end
-        return float("inf") if end is None else sum_as_read(end, -self.margin)
+        return float("inf") if end is None else sum_times_as_read(end, -self.margin)
 
     @cached_property
     def margin(self) -> float:
@@ -247,7 +249,9 @@ class Situation:
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
-        return describing(self.history, self.td, self.evidence).peaks(start, end)
+        return describe_energy_at(self.history, self.td, self.evidence).peaks(
+            start, end
+        )
 
     def sees_as(self, other: Situation) -> bool:
         """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
@@ -288,7 +292,7 @@ def examine(
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen = seen_flight(history, td)
+    seen = find_seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
     at = (
@@ -321,17 +325,17 @@ def examine(
         )
     if within is not None and flight.source == "energy":
         from d2rpick.vibration.modal_span import (
-            inner_window,
+            get_inner_window,
         )  # not above: better evidence does without it
 
-        inner = inner_window(history, within)
+        inner = get_inner_window(history, within)
         within = inner if inner.start < td <= inner.end else within
     models = find_models(
         history,
         around,
         within,
         settled,
-        lambda: doubtful(situation.whole),
+        lambda: is_doubtful(situation.whole),
         fits,
         situation.together,
     )
@@ -380,9 +384,9 @@ def _flight_at(
     if seen.held:
         return flight
     if settings.after is not None:
-        flight = begun_at(history, flight, td, settings.after, described)
+        flight = start_flight_at(history, flight, td, settings.after, described)
     if settings.landing is not None:
-        flight = landed_at(history, flight, td, settings.landing)
+        flight = end_flight_at(history, flight, td, settings.landing)
     return _between_supports(history, flight, td)
 
 
@@ -422,11 +426,13 @@ def _oscillator(
     if settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
-        span = span_of(history, td, fit, bounds) if fit.describes_record else None
+        span = find_span(history, td, fit, bounds) if fit.describes_record else None
         return _with_hidden_share(history, fit, fits), span
     if settings.oscillator:
         given = fits.remembered("given", partial(judge_given, settings.oscillator))
-        span, fit = described_span(history, td, bounds, given, whole=whole, memory=fits)
+        span, fit = find_described_span(
+            history, td, bounds, given, whole=whole, memory=fits
+        )
         return fit, span
     every = fits.remembered("one", partial(identify, memory=fits))
     quickly = partial(every, quick=True)
@@ -438,7 +444,7 @@ def _oscillator(
         span, fit = most
     else:
         fitter = quickly if quick else every
-        span, fit = described_span(
+        span, fit = find_described_span(
             history, td, bounds, fitter, whole=whole, memory=fits
         )
     return _with_hidden_share(history, fit, fits), span
@@ -454,7 +460,7 @@ def _described_by_modes(
         find_described,
     )  # not above: most records need none
 
-    quiet, last = quiet_time(history, td), float(history.time[-1])
+    quiet, last = find_quiet_time(history, td), float(history.time[-1])
     guess = (
         None
         if quiet is None
@@ -473,7 +479,7 @@ def _with_hidden_share(
     window, mode = history.between(fit.start, fit.end), fit.mode
 
     def widened() -> Identification:
-        share = hidden_share(*window, mode)
+        share = estimate_hidden_share(*window, mode)
         return fit._replace(hidden_share=max(fit.hidden_share, share))
 
     return fits.once(("hidden", fit.start, fit.end, fit.rms), widened)

@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median, median_high
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from d2rpick.base.errors import (
     Caution,
     D2RPickError,
     RangeError,
-    listing,
-    one_line,
+    format_in_one_line,
+    list_names,
 )
 from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.quality import EQUALLY_GOOD
+from d2rpick.choice.grades import GRADES
+from d2rpick.choice.quality import EQUALLY_GOOD, grade_of_residual
 from d2rpick.choice.question import read
 from d2rpick.choice.windows import (
     acceptable_windows,
@@ -34,13 +35,14 @@ from d2rpick.choice.windows import (
     error_profile,
 )
 from d2rpick.histories.names import Selection
-from d2rpick.histories.samples import outline
+from d2rpick.histories.samples import draw_outline
 from d2rpick.histories.source import expand
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.answers import Suggestion
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
@@ -98,10 +100,11 @@ class StudyRow:
 
     ``status``: "ok"; "none", nothing can be recommended; "unreadable"; "out-of-range", the record does not reach td or
     is too short to choose; "failed", its process died; "internal-error", the program failed on it.  ``message`` says
-    why it is not "ok"; ``warnings`` are codes.  ``td`` is that of the run; ``acceptable`` are its windows of
-    acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile``
-    the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of the energy,
-    shape (2, k), where one was asked for.
+    why it is not "ok"; ``warnings`` are codes.
+    ``quality`` to ``cure`` are what `suggest` says of its pair.  ``td`` is that of the run; ``acceptable`` are its
+    windows of acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr,
+    ``profile`` the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of
+    the energy, shape (2, k), where one was asked for.
     """
 
     source: str
@@ -117,6 +120,10 @@ class StudyRow:
     warnings: tuple[str, ...] = ()
     td: float | None = None
     record_end: float | None = None
+    quality: str | None = None
+    verdict: str | None = None
+    verdict_reason: str | None = None
+    cure: str | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -173,6 +180,17 @@ class Study:
         return sum(row.judged for row in self.runs)
 
     @property
+    def grade(self) -> str | None:
+        """Grade of the common tr: that of the worst run, by its own pair and by its error at this tr; None without."""
+        if self.common.tr is None:
+            return None
+        grades = [row.quality for row in self.runs if row.quality]
+        for row, error in zip(self.runs, self.common.errors, strict=True):
+            if error is not None and row.basis != "energy":
+                grades.append(grade_of_residual(error))
+        return min(grades, key=GRADES.index, default=None)
+
+    @property
     def objection(self) -> bool:
         """Whether a run has no tr, or all have none in common."""
         return self.common.tr is None or any(row.status != OK for row in self.runs)
@@ -206,7 +224,7 @@ def ask(question: Question, source: str) -> StudyRow:
         )
         return StudyRow(source, status, text, files=files, record_end=end)
     time, energy = reference.history.time, reference.history.energy
-    curve = outline(time, energy, _STRETCHES) if question.curve else None
+    curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
     return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
 
 
@@ -242,13 +260,26 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         tr_low=best.tr_low,
         tr_high=best.tr_high,
         residual=best.residual,
+        **_decided(answer.decision),
     )
+
+
+def _decided(decision: Decision | None) -> dict[str, Any]:
+    """Give what is said of the pair of a run."""
+    if decision is None:
+        return {}
+    return {
+        "quality": decision.grade,
+        "verdict": decision.verdict,
+        "verdict_reason": decision.reason,
+        "cure": decision.cure,
+    }
 
 
 def failed(source: str, error: BaseException) -> StudyRow:
     """StudyRow of a run whose process did not come back with one."""
     status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
-    return StudyRow(source, status, f"{source}: {one_line(error)}")
+    return StudyRow(source, status, f"{source}: {format_in_one_line(error)}")
 
 
 def stamps(source: str) -> tuple[Stamp, ...]:
@@ -302,12 +333,12 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     if left and judged:
         found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
         yield Caution(
-            "runs-left-out", f"{found} and are left out: {listing(left, most=NAMED)}"
+            "runs-left-out", f"{found} and are left out: {list_names(left, most=NAMED)}"
         )
     if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
         yield Caution(
             "cut-runs",
-            f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}",
+            f"{len(cut)} of {runs_of(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
         found = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
@@ -336,7 +367,7 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
         named = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
-            f"in {len(named)} of {runs_of(len(judged))}: {listing(named, most=NAMED)}",
+            f"in {len(named)} of {runs_of(len(judged))}: {list_names(named, most=NAMED)}",
         )
 
 
@@ -432,7 +463,7 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
     left = [row.source for row in judged if not _holds(row.acceptable, tr)]
     return (
         f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "
-        f"not in {listing(left, most=NAMED)}"
+        f"not in {list_names(left, most=NAMED)}"
     )
 
 

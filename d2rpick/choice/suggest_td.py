@@ -15,14 +15,15 @@ from d2rpick.choice.quality import (
     MOST_GOOD,
     ROUNDING,
     candidates_at,
+    certainty,
     like_quality,
 )
 from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.digits import not_after, sum_as_read
-from d2rpick.histories.samples import union
+from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
+from d2rpick.histories.samples import merge_times
 from d2rpick.vibration.measures import kinetic_share, vertices
 from d2rpick.vibration.span import Fits
 
@@ -100,6 +101,8 @@ _FEWEST_TD, _MOST_TD = 3, 1000
 STEPS: Final = 200
 # Decimals of an error that people read.
 _READ: Final = 3
+# Of the record: a shorter window saves less than a restart costs, as plan has it.
+_SHORTEST: Final = 0.05
 # Rigid time that is given up for quality is told from this share of the window on.
 _MUCH: Final = 0.1
 # An energy that stays on its level may hide the vibration of many modes, which moves the landing by more than what the
@@ -140,10 +143,11 @@ def choose_td(
     """Choose td in ``window``, for None in the longest flight up to the margin, for a tr not before ``since``.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
-    longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
-    energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
-    from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
-    A td of ``times``, by default an even grid, whose pair beats that in both error and rigid time takes its place.
+    longest rigid window wins, of those whose tr is known best.  Where deformations are known, a residual within
+    0.02 of the smallest is alike; on the energy alone, a level within the tolerance of the best one, which is twice
+    the mean energy.  td keeps the margin from the contact, unless the whole window lies in it.  Without an acceptable
+    peak the ends of the window are tried.  A td of ``times``, by default an even grid, whose pair beats that in both
+    error and rigid time takes its place.
     Where nothing vibrates, any td is as good, and the last one saves the most.
 
     Raises
@@ -196,7 +200,7 @@ def offered_times(
         order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
-    times = union(grid, peaks)
+    times = merge_times(grid, peaks)
     return times[times < situation.history.time[-1]], set(
         peaks.tolist()
     )  # a run that ends at td is no use
@@ -246,7 +250,10 @@ def _unbeaten(
     for there, _ in sorted(
         better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))
     ):
-        if _beating(own, [look(there.td)]):
+        longer = look(there.td)
+        if _beating(own, [longer]) and _certainty_of_tr(longer) >= _certainty_of_tr(
+            own[0]
+        ):
             return there.td
     return td
 
@@ -296,22 +303,24 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
     low, high = window
     margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
-    latest = sum_as_read(end, -margin)
+    latest = sum_times_as_read(end, -margin)
     latest = latest if latest > low else situation.latest_td
-    return min(high, max(low, latest if np.isinf(latest) else not_after(latest)))
+    return min(
+        high, max(low, latest if np.isinf(latest) else round_down_as_read(latest))
+    )
 
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
     history, flight = situation.history, situation.flight
     last = min(
-        window[1], not_after(float(history.time[-2]))
+        window[1], round_down_as_read(float(history.time[-2]))
     )  # a run that ends at td is no use
     spread = situation.expected_margin.spread
     return (
         last
         if flight.end is None or not spread
-        else min(last, not_after(flight.end - _HIDDEN * spread))
+        else min(last, round_down_as_read(flight.end - _HIDDEN * spread))
     )
 
 
@@ -347,7 +356,24 @@ def _by_residual(
         situation
     )
     alike = [pair for pair in pairs if pair[1].error <= limit]
-    return _td(_longest(alike)), _td(_longest(pairs))
+    return _td(_longest(_surest(alike))), _td(_longest(pairs))
+
+
+def _surest(pairs: Sequence[Choice]) -> list[Choice]:
+    """Give the pairs whose tr is known best, of those that are long enough to be planned, if there are any."""
+    if not pairs:
+        return []
+    record = pairs[0][0].history.time
+    shortest = _SHORTEST * float(record[-1] - record[0])
+    long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
+    known = [_certainty_of_tr(situation) for situation, _ in long]
+    return [pair for pair, its in zip(long, known, strict=True) if its == max(known)]
+
+
+def _certainty_of_tr(situation: Situation) -> int:
+    """How well the tr is known that is recommended at a td, as `certainty` says; 0 without one."""
+    best = next(candidates_at([situation], in_flight=True)).chosen
+    return 0 if best is None else certainty(best)
 
 
 def _by_modes(

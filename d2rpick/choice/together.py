@@ -22,10 +22,10 @@ class Together:
     def beside(self) -> Beside:
         """Parts that vibrate with the chosen ones and were not chosen."""
         from d2rpick.flight.vibrating import (
-            vibrating_beside,
+            find_vibrating_parts,
         )  # not above: an oscillator does without it
 
-        return vibrating_beside(self._history, self._flight)
+        return find_vibrating_parts(self._history, self._flight)
 
     @property
     def complete(self) -> bool:
@@ -36,7 +36,7 @@ class Together:
     def kinetic(self) -> tuple[Samples, Samples] | None:
         """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
         from d2rpick.flight.vibrating import (
-            kinetic_energy_of,
+            extract_kinetic_energy,
         )  # not above: an oscillator does without it
 
-        return kinetic_energy_of(self._history, self._flight)
+        return extract_kinetic_energy(self._history, self._flight)

@@ -24,7 +24,7 @@ from d2rpick.choice.suggest_td import (
     within_flight,
 )
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.digits import round_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.aftermath import Kept
     from d2rpick.choice.candidates import Candidate, Candidates, Pair
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
@@ -97,7 +98,12 @@ class Offer(OfTd):
             known = next(candidates_at([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=known)
 
-    @cached_property
+    @property
+    def decision(self) -> Decision | None:
+        """Whether to use the recommended pair, and why."""
+        return self.answer.decision
+
+    @property
     def quality(self) -> Quality | None:
         """How good the recommended pair is."""
         return self.answer.quality
@@ -245,7 +251,7 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
         ]
         least, longest = np.inf, np.inf
         read = {
-            one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error))
+            one.td: (-round_as_read(one.rigid_time or 0.0), as_printed(one.error))
             for one in group
         }
         for one in sorted(group, key=lambda one: read[one.td]):

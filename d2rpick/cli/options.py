@@ -22,7 +22,7 @@ from d2rpick.api.request import (
     options_of,
 )
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.settings import nearest_settings
+from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
@@ -40,7 +40,7 @@ RESULT: Final = ("output_format", "exit_zero", *FILES)
 HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
-ANSWER: Final = ("plot", "report", *CARDS, "min_quality", *RESULT)
+ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
     "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
     "and which of them become one rigid body"
@@ -69,6 +69,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
             "min_mean_energy",
             "strict",
             "keep_vibration",
+            "min_quality",
         ),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
@@ -79,7 +80,6 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
         "limit",
         "plot",
         "report",
-        "min_quality",
         *RESULT,
         "verbose",
         "show_settings",
@@ -104,7 +104,7 @@ class Command(Documented):
         """Read the command line; what neither it nor the environment gives, the settings may."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
-        table, source, ctx.meta["d2rpick.unused"] = nearest_settings(os.curdir)
+        table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
             without = click.Context(

@@ -22,7 +22,7 @@ from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.rules.judgement import faults_of
+from d2rpick.rules.judgement import find_faults
 from tests import paper
 from tests.command import BOX as T01, ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
@@ -130,7 +130,7 @@ def test_verify_measures_what_suggest_measures() -> None:
     judged = verify(paper.history(), best.tr, paper.TD, PLAIN)
     for name in [
         "energy",
-        "energy_ratio",
+        "level_ratio",
         "lock_in_error",
         "residual",
         "sign_match",
@@ -140,7 +140,10 @@ def test_verify_measures_what_suggest_measures() -> None:
         assert getattr(judged.candidate, name) == pytest.approx(
             getattr(best, name), rel=1e-9, abs=1e-9
         )
-    assert judged.verified
+    assert judged.tr_ok
+    assert judged.admissible
+    assert not judged.verified
+    assert judged.decision.verdict == "do not use"
     assert judged.td_ok is False  # a kinetic share of 0.92
 
 
@@ -214,7 +217,7 @@ def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
     """Whether a pair is verified; none is."""
     if pair is None:
         return True
-    return verify(history, pair.tr, pair.td, asked).verified
+    return verify(history, pair.tr, pair.td, asked).admissible
 
 
 @settings(max_examples=8)
@@ -311,7 +314,7 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
 
 def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
     verdict = verify_of(read([GLSTAT]), 0.02, 0.0687, PLAIN)
-    assert any("suits this td" in fault.message for fault in faults_of(verdict))
+    assert any("suits this td" in fault.message for fault in find_faults(verdict))
 
 
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.flight.chosen import find_flight
-from d2rpick.flight.flight import Flight, seen_flight
+from d2rpick.flight.flight import Flight, find_seen_flight
 from d2rpick.flight.position_error import (
     MOST_OF_PATH,
     Bodies,
     Drift,
     RigidBody,
-    bodies_in_flight,
-    drift_in_flight,
-    drift_of,
+    find_bodies_in_flight,
+    find_drift,
+    find_drift_in_flight,
 )
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, History, Momenta, Samples
@@ -77,8 +77,10 @@ def make_slides(path: Samples, part: int = ENGINE) -> Samples:
     return slides
 
 
-def find_drift(momenta_of_body: Momenta, masses: Samples = MASSES) -> Drift:
-    return sure(drift_of(Flying(momenta_of_body, masses, range(masses.size), *FLIGHT)))
+def find_drift_of_body(momenta_of_body: Momenta, masses: Samples = MASSES) -> Drift:
+    return sure(
+        find_drift(Flying(momenta_of_body, masses, range(masses.size), *FLIGHT))
+    )
 
 
 @pytest.mark.slow
@@ -88,7 +90,7 @@ def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
 ) -> None:
     """Within a tenth of how far the slide pushes it: what of a slide looks like a circle may be the arm of the part."""
     slides = make_slides(0.02 * path)
-    drift_found = find_drift(make_momenta(6.0 * turn, slides))
+    drift_found = find_drift_of_body(make_momenta(6.0 * turn, slides))
     first, last = (
         np.array([np.interp(t, TIME, axis) for axis in slides[:, ENGINE].T])
         for t in (start, 0.095)
@@ -105,7 +107,7 @@ def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
 def test_without_rotation_a_slow_slide_is_not_taken_for_an_arc() -> None:
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.5 * TIME
-    drift_found = find_drift(make_momenta(np.zeros(3), slides))
+    drift_found = find_drift_of_body(make_momenta(np.zeros(3), slides))
     ways = np.array([0.035, 0.015])
     np.testing.assert_allclose(
         drift_found.errors(np.array([0.02, 0.06]), 0.09),
@@ -117,7 +119,7 @@ def test_two_engines_that_slide_together_add_up() -> None:
     slides = make_slides(np.array([0.02, 0.0, 0.0])) + make_slides(
         np.array([0.02, 0.0, 0.0]), part=0
     )
-    drift_found = find_drift(make_momenta(np.array([5.0, 0.5, 0.5]), slides))
+    drift_found = find_drift_of_body(make_momenta(np.array([5.0, 0.5, 0.5]), slides))
     tr = TIME[np.argmax(slides[:, ENGINE, 0])]
     td = TIME[np.argmin(slides[:, ENGINE, 0])]
     assert drift_found.errors(np.array([tr]), float(td))[0] == pytest.approx(
@@ -135,7 +137,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 def test_beyond_the_flight_nothing_is_known() -> None:
     drift_found = sure(
-        drift_of(
+        find_drift(
             Flying(
                 make_momenta(np.zeros(3), make_slides(np.ones(3) / 100)),
                 MASSES,
@@ -168,7 +170,7 @@ def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
     momenta_of_body = make_momenta(
         np.ones(3), make_slides(np.ones(3) / 50), known_masses
     )
-    assert drift_of(Flying(momenta_of_body, masses, members, *FLIGHT)) is None
+    assert find_drift(Flying(momenta_of_body, masses, members, *FLIGHT)) is None
 
 
 def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
@@ -176,7 +178,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
         300 * TIME[:, None, None] + PLACES
     )
     assert (
-        drift_of(Flying(make_momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT))
+        find_drift(Flying(make_momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT))
         is None
     )
 
@@ -205,7 +207,7 @@ def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
 def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.02 * np.sin(np.pi * TIME / TIME[-1])
-    assert not find_drift(make_momenta(np.zeros(3), slides)).at_least
+    assert not find_drift_of_body(make_momenta(np.zeros(3), slides)).at_least
 
 
 @cache
@@ -213,7 +215,7 @@ def read_computed_drift(name: str, parts: str, flight: tuple[float, float]) -> D
     """By the momenta of a run that a solver computed."""
     history = solved(name, parts).history
     return sure(
-        drift_of(
+        find_drift(
             Flying(
                 history.momenta[0],
                 sure(history.masses),
@@ -303,17 +305,17 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
     None
 ):
     history = solved("carT01.gz", "1-17").history
-    flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
-    drift_found = sure(drift_in_flight(history, flight))
+    flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    drift_found = sure(find_drift_in_flight(history, flight))
     assert drift_found.part.title == "engine"
     assert drift_found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(
         2.2e-3, abs=1e-3
     )
-    assert drift_in_flight(history, flight, [drift_found.part]) is None
-    assert drift_in_flight(history, flight._replace(parts=None)) is None
+    assert find_drift_in_flight(history, flight, [drift_found.part]) is None
+    assert find_drift_in_flight(history, flight._replace(parts=None)) is None
     assert (
-        drift_in_flight(
-            history, find_flight(history, 0.2, seen_flight(history, 0.2), None)
+        find_drift_in_flight(
+            history, find_flight(history, 0.2, find_seen_flight(history, 0.2), None)
         )
         is None
     )
@@ -391,7 +393,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 @cache
 def read_car(parts: str) -> tuple[History, Flight]:
     history = solved("carT01.gz", parts).history
-    return history, find_flight(history, 0.14, seen_flight(history, 0.14), None)
+    return history, find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
@@ -399,8 +401,10 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
     with results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])
-    alone = bodies_in_flight(*read_car("12-14"), make_rigid_bodies((12,), (13,), (14,)))
-    together = bodies_in_flight(*read_car("12-14"), None)
+    alone = find_bodies_in_flight(
+        *read_car("12-14"), make_rigid_bodies((12,), (13,), (14,))
+    )
+    together = find_bodies_in_flight(*read_car("12-14"), None)
     assert alone.errors(tr, td)[0] == pytest.approx(
         1e-3 * float(run["dcentre_td_mm"]), abs=1e-3
     )
@@ -411,10 +415,10 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
 @pytest.mark.slow
 def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     frame = (*range(1, 12), 13)
-    all_bodies = bodies_in_flight(
+    all_bodies = find_bodies_in_flight(
         *read_car("1-14"), make_rigid_bodies(frame, (12,), (14,))
     )
-    alone = bodies_in_flight(*read_car("1-11,13"), make_rigid_bodies(frame))
+    alone = find_bodies_in_flight(*read_car("1-11,13"), make_rigid_bodies(frame))
     tr = np.array([0.04, 0.0496, 0.09])
     np.testing.assert_allclose(all_bodies.errors(tr, 0.1464), alone.errors(tr, 0.1464))
     worst = sure(all_bodies.worst(0.0496, 0.1464))
@@ -424,18 +428,22 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
 
 @pytest.mark.parametrize("body", [(1, 2), (99,), (1, 99)])
 def test_what_is_not_known_of_a_body_is_not_zero(body: tuple[int, ...]) -> None:
-    drift_found = bodies_in_flight(*read_car("1-14"), make_rigid_bodies((12,), body))
+    drift_found = find_bodies_in_flight(
+        *read_car("1-14"), make_rigid_bodies((12,), body)
+    )
     assert drift_found.unknown == make_rigid_bodies(body)
     assert np.isnan(drift_found.errors(np.array([0.05]), 0.14)).all()
 
 
 def test_a_part_in_pieces_and_one_that_does_not_fly_are_not_known() -> None:
     history, flight = read_car("12-14")
-    assert bodies_in_flight(history, flight, [RigidBody((14,), whole=False)]).unknown
-    assert bodies_in_flight(
+    assert find_bodies_in_flight(
+        history, flight, [RigidBody((14,), whole=False)]
+    ).unknown
+    assert find_bodies_in_flight(
         history, flight._replace(refusal="no flight"), make_rigid_bodies((14,))
     ).unknown
     other_parts = tuple(part for part in flight.parts or () if part.id != 14)
-    assert bodies_in_flight(
+    assert find_bodies_in_flight(
         history, flight._replace(parts=other_parts), make_rigid_bodies((14,))
     ).unknown
