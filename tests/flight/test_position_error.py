@@ -129,7 +129,7 @@ def test_two_engines_that_slide_together_add_up() -> None:
 
 
 def test_a_rigid_body_is_where_it_should_be() -> None:
-    drift_found = find_drift(
+    drift_found = find_drift_of_body(
         make_momenta(np.array([5.0, 1.0, -2.0]), np.zeros((TIME.size, *PLACES.shape)))
     )
     assert drift_found.errors(TIME[10:-10:10], 0.095).max() < 1e-5
@@ -197,7 +197,7 @@ def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
     slides[:, ENGINE] = np.outer(
         np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016)
     )
-    drift_found = find_drift(
+    drift_found = find_drift_of_body(
         make_momenta(4.0 * turn + np.array([2.0, 0.0, 0.0]), slides)
     )
     assert drift_found.slow is (periods < 1)
