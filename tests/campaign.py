@@ -31,10 +31,10 @@ from d2rpick.histories.opening import Selection, Source, open_run
 from tests.command import DECK
 from tests.damaged_files import FILES
 from tests.faults import Fault, damage
-from tests.hdf5_files import plain, written
+from tests.hdf5_files import plain, write_hdf5
 from tests.histories.formats import test_curves, test_faults_text
-from tests.made_d3plot import D3plotWriter, states
-from tests.reading import run_of, states_of
+from tests.made_d3plot import D3plotWriter, make_states
+from tests.reading import list_states, open_contents
 from tests.relations import RELATIONS, check_relation
 
 _CHUNK: Final = 200  # inputs for each task
@@ -43,13 +43,13 @@ _SHOWN: Final = 5  # faults printed for each format
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
-_D3PLOT_STATES: Final = states([0.125 * state for state in range(6)], walls=1)
+_D3PLOT_STATES: Final = make_states([0.125 * state for state in range(6)], walls=1)
 _CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
     b"%.3f,%.5e,%.4f\n" % (state / 8, state**3 - 10, state) for state in range(40)
 )
 
 
-def faults(random: Random) -> list[Fault]:
+def draw_faults(random: Random) -> list[Fault]:
     """Draw one to three faults at random places of a file."""
     return [
         (
@@ -64,12 +64,12 @@ def faults(random: Random) -> list[Fault]:
 
 def glstat(random: Random) -> bool:
     """Damage a glstat; return True if it could be read."""
-    return test_faults_text.check_glstat(faults(random))
+    return test_faults_text.check_glstat(draw_faults(random))
 
 
 def matsum(random: Random) -> bool:
     """Damage a matsum with three or four lines for each part; return True if it could be read."""
-    return test_faults_text.check_matsum(faults(random), random.choice((3, 4)))
+    return test_faults_text.check_matsum(draw_faults(random), random.choice((3, 4)))
 
 
 def binout(random: Random) -> bool:
@@ -90,19 +90,19 @@ def restructured(random: Random, *names: str) -> bool:
 
 def csv(random: Random) -> bool:
     """Damage a table; return True if it could be read. Each state that is read must be in one line of the table."""
-    return _table(damage(_CSV, faults(random), []))
+    return _table(damage(_CSV, draw_faults(random), []))
 
 
 def curves(random: Random) -> bool:
     """Damage a file of curves; return True if it could be read."""
     text = random.choice((test_curves.CURVEPLOT, test_curves.T_HIS)).encode()
-    return _table(damage(text, faults(random), []))
+    return _table(damage(text, draw_faults(random), []))
 
 
 def hdf5(random: Random) -> bool:
     """Damage an HDF5 file; return True if it could be read. Its numbers carry no mark, so they are not checked."""
-    data = damage(_hdf5(), faults(random), [])
-    return bool(_read(lambda: run_of(hdf5_file, data).history(Selection())))
+    data = damage(_hdf5(), draw_faults(random), [])
+    return bool(_read(lambda: open_contents(hdf5_file, data).history(Selection())))
 
 
 def d3plot(random: Random) -> bool:
@@ -112,7 +112,7 @@ def d3plot(random: Random) -> bool:
         _d3plot().file(_D3PLOT_STATES[3:]),
     ]
     file_number = random.randrange(2)
-    contents[file_number] = damage(contents[file_number], faults(random), [])
+    contents[file_number] = damage(contents[file_number], draw_faults(random), [])
     sources = [
         Source(name, data)
         for name, data in zip(("d3plot", "d3plot01"), contents, strict=True)
@@ -132,7 +132,7 @@ def deck(random: Random) -> bool:
     """Damage a deck; return True if it could be read."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "deck.k")
-        file.write_bytes(damage(Path(DECK).read_bytes(), faults(random), []))
+        file.write_bytes(damage(Path(DECK).read_bytes(), draw_faults(random), []))
         return bool(_read(lambda: list(read_deck(str(file)).cards)))
 
 
@@ -144,7 +144,7 @@ def companions(random: Random) -> bool:
             "matsum": test_faults_text.MATSUM[4],
         }
         for name in random.choice((("glstat",), ("matsum",), ("glstat", "matsum"))):
-            contents[name] = damage(contents[name], faults(random), [])
+            contents[name] = damage(contents[name], draw_faults(random), [])
         for name, content in contents.items():
             Path(folder, name).write_bytes(content)
         parts = random.choice(((), ("12",), ("1", "12", "13")))
@@ -164,12 +164,12 @@ CHECKS: Final[dict[str, Callable[[Random], bool]]] = {
 }
 
 
-def case(form: str, seed: int, number: int) -> str:
+def run_case(form: str, seed: int, number: int) -> str:
     """Return the outcome of one input, or of one history and a relation: ``read``, ``refused``, or the fault."""
-    return outcome(CHECKS[form], Random(f"{form} {seed} {number}"), number)
+    return find_outcome(CHECKS[form], Random(f"{form} {seed} {number}"), number)
 
 
-def outcome(check: Callable[[Random], bool], random: Random, number: int) -> str:
+def find_outcome(check: Callable[[Random], bool], random: Random, number: int) -> str:
     """Return the outcome of one check, which draws an input from random numbers and reads it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -179,10 +179,10 @@ def outcome(check: Callable[[Random], bool], random: Random, number: int) -> str
             return f"number {number}: {type(error).__name__}: {' '.join(str(error).split())[:150]}"
 
 
-def chunk(seed: int, task: tuple[str, range]) -> tuple[str, Counter[str]]:
+def count_outcomes(seed: int, task: tuple[str, range]) -> tuple[str, Counter[str]]:
     """Count the outcomes of some inputs of one format."""
     form, numbers = task
-    return form, Counter(case(form, seed, number) for number in numbers)
+    return form, Counter(run_case(form, seed, number) for number in numbers)
 
 
 def main() -> int:
@@ -194,7 +194,7 @@ def main() -> int:
     parser.add_argument("--relations", action="store_true")
     options = parser.parse_args()
     if options.only:
-        print(case(options.only[0], options.seed, int(options.only[1])))
+        print(run_case(options.only[0], options.seed, int(options.only[1])))
         return 0
     forms = [*(RELATIONS if options.relations else FORMATS)]
     inputs_per_format = -(-options.inputs // len(forms))
@@ -206,7 +206,7 @@ def main() -> int:
     ]
     outcomes: dict[str, Counter[str]] = {form: Counter() for form in forms}
     with choose_farm(count_cores(), "tests.faults") as farm:
-        for answer in farm.answers(partial(chunk, options.seed), tasks):
+        for answer in farm.answers(partial(count_outcomes, options.seed), tasks):
             form, numbers = tasks[answer.number]
             outcomes[form] += (
                 Counter({f"{numbers}: {answer.error}": 1})
@@ -248,12 +248,12 @@ def _read(reader: Callable[[], object]) -> object:
 
 def _table(data: bytes) -> bool:
     """Return True if a table could be read; each state must be in one line, with either decimal sign."""
-    history = _read(lambda: run_of(csv_table, data).history(Selection()))
+    history = _read(lambda: open_contents(csv_table, data).history(Selection()))
     if not isinstance(history, History):
         return False
     text = data.decode("latin-1")
     lines = [set(_numbers(line)) for line in re.split(r"[\r\n]+", text)]
-    for time, energy in states_of(history):
+    for time, energy in list_states(history):
         assert any({time, energy} <= line for line in lines), (
             f"({time}, {energy}) stands in no line"
         )
@@ -272,7 +272,7 @@ def _d3plot() -> D3plotWriter:
 
 @cache
 def _hdf5() -> bytes:
-    return written(plain).getvalue()
+    return write_hdf5(plain).getvalue()
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ def run(
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     if not any(
-        _changes(folder)
+        _is_temporary(folder)
         for folder in (
             Path.cwd(),
             *(Path(arg).absolute() for arg in args if "/" in arg),
@@ -89,7 +89,7 @@ def put(path: Path, content: str | bytes) -> Path:
     return path
 
 
-def refused(*args: str) -> str:
+def read_refusal(*args: str) -> str:
     """Return the error message of a command that failed; it must be one line on stderr and the only output."""
     result = run(*args)
     assert (result.exit_code, result.stdout) == (2, ""), result.stderr
@@ -98,7 +98,7 @@ def refused(*args: str) -> str:
     return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
 
 
-def _changes(path: Path) -> bool:
+def _is_temporary(path: Path) -> bool:
     """Return True if a file may change: it is in a temporary folder, not in the repository."""
     path = Path(os.path.normpath(path))
     return not path.is_relative_to(ROOT) and (
@@ -106,13 +106,13 @@ def _changes(path: Path) -> bool:
     )
 
 
-def unwrapped(text: str) -> str:
+def join_wrapped_lines(text: str) -> str:
     """Join the lines of a text that was wrapped."""
     return " ".join(text.split())
 
 
 @contextmanager
-def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
+def start_program(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
     """Start the program in a session of its own, and end it after the block or the time limit.
 
     It can be interrupted even if this process cannot, for example in the background of a shell.
@@ -125,21 +125,21 @@ def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
         **options,
     }
     with subprocess.Popen(command, start_new_session=True, **popen_options) as process:
-        watch = Timer(TIME_LIMIT, _end, [process.pid])
+        watch = Timer(TIME_LIMIT, _end_group, [process.pid])
         watch.start()
         try:
             yield process
         finally:
             watch.cancel()
-            _end(process.pid)
+            _end_group(process.pid)
 
 
-def _end(group: int) -> None:
+def _end_group(group: int) -> None:
     with suppress(ProcessLookupError):
         os.killpg(group, signal.SIGKILL)
 
 
-def answer(*args: str) -> dict[str, Any]:
+def run_json(*args: str) -> dict[str, Any]:
     """Run a command with JSON output and return the document; exit code 1 (problems found) is allowed."""
     result = run(*args, "-f", "json")
     assert result.exit_code in (0, 1), result.stderr
@@ -147,7 +147,7 @@ def answer(*args: str) -> dict[str, Any]:
     return document
 
 
-def replayed(form: str, *options: str, v0: str = "6") -> bytes:
+def make_replay_file(form: str, *options: str, v0: str = "6") -> bytes:
     """Return the content of a file with 0.15 s of the paper's oscillator, one state each 0.1 ms, in this format."""
     times = ("--t-end", "0.15", "--dt", "1e-4", "--write-as", form)
     result = run("replay", *OSCILLATOR[:-1], v0, *times, *options)
@@ -155,6 +155,6 @@ def replayed(form: str, *options: str, v0: str = "6") -> bytes:
     return result.stdout_bytes
 
 
-def codes(document: dict[str, Any]) -> set[str]:
+def list_warning_codes(document: dict[str, Any]) -> set[str]:
     """Return the codes of the warnings of an answer."""
     return {warning["code"] for warning in document["warnings"]}

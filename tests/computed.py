@@ -11,27 +11,27 @@ from tests.command import ROOT
 DATA = ROOT / "tests" / "data"
 
 
-def stored(name: str) -> str:
+def locate_stored(name: str) -> str:
     """Return the path of a file in tests/data."""
     return str(DATA / name)
 
 
-def results(name: str) -> Path:
+def locate_results(name: str) -> Path:
     """Return the path of the table with the results of the switched runs."""
     return ROOT / "validation" / "results" / name
 
 
-def starter(model: str) -> bytes:
+def read_starter(model: str) -> bytes:
     """Return the content of the starter deck of a model."""
-    return unpacked(str(ROOT / "validation" / "decks" / f"{model}_0000.rad.gz"))
+    return read_unpacked(str(ROOT / "validation" / "decks" / f"{model}_0000.rad.gz"))
 
 
-def unpacked(name: str) -> bytes:
+def read_unpacked(name: str) -> bytes:
     """Return the content of a gzip file."""
     return gzip.decompress(Path(name).read_bytes())
 
 
-def columns(name: str, energy: str) -> tuple[Samples, Samples]:
+def read_columns(name: str, energy: str) -> tuple[Samples, Samples]:
     """Read the columns ``time_s`` and ``energy`` of a table."""
     table = np.genfromtxt(name, delimiter=",", names=True)
     return table["time_s"], table[energy]

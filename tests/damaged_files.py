@@ -16,8 +16,15 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.binout import Binout
 from d2rpick.histories.formats.radioss_th import TimeHistory
-from tests.made_binout import GLSTAT, LsdaWriter, binout, values
-from tests.made_t01 import MadePart, T01TextWriter, T01Writer, real, t01, value
+from tests.made_binout import GLSTAT, LsdaWriter, compute_value, make_binout
+from tests.made_t01 import (
+    MadePart,
+    T01TextWriter,
+    T01Writer,
+    format_real,
+    make_t01,
+    make_value,
+)
 
 Read = TypeVar("Read")
 
@@ -28,50 +35,55 @@ MEMORY = (
 )  # far above what the small files need, far below what a damaged length field may demand
 
 
-def true_binout(data: bytes) -> list[tuple[int, bool]]:
+def check_binout(data: bytes) -> list[tuple[int, bool]]:
     """Check that all numbers read are true; return the number of states of each column, and if the file is complete."""
-    run = refused_or(lambda: Binout([("binout", data)]))
+    run = read_or_refuse(lambda: Binout([("binout", data)]))
     if run is not None and run.complete and not run.notes:
         assert {"time", *run.channels} == {*GLSTAT}, "a lost variable is told"
-        for times in (refused_or(lambda: run.time), refused_or(lambda: run.part_time)):
+        for times in (
+            read_or_refuse(lambda: run.time),
+            read_or_refuse(lambda: run.part_time),
+        ):
             assert times is None or times[:1].tolist() in ([], [1 / 8]), (
                 "a lost first state is told"
             )
-    return true_columns(
-        lambda: Binout([("binout", data)]), ("internal_energy", "z_momentum"), values
+    return check_columns(
+        lambda: Binout([("binout", data)]),
+        ("internal_energy", "z_momentum"),
+        compute_value,
     )
 
 
-def t01_value(name: str, state: int, part: int = 0) -> float:
-    return value(state, part, {"internal_energy": 1, "z_momentum": 5}[name])
+def compute_t01_value(name: str, state: int, part: int = 0) -> float:
+    return make_value(state, part, {"internal_energy": 1, "z_momentum": 5}[name])
 
 
-def true_t01(
-    data: bytes, value_of: Callable[..., float] = t01_value
+def check_t01(
+    data: bytes, value_of: Callable[..., float] = compute_t01_value
 ) -> list[tuple[int, bool]]:
     """Read a binary T01 in the same way as `true_binout`."""
-    return true_columns(
+    return check_columns(
         lambda: TimeHistory(data, "runT01"),
         ("internal_energy", "z_momentum"),
         value_of,
     )
 
 
-def true_text(data: bytes) -> list[tuple[int, bool]]:
+def check_text_t01(data: bytes) -> list[tuple[int, bool]]:
     """Read a text T01 in the same way as `true_binout`."""
-    return true_t01(
-        data, lambda name, state, part=0: printed(t01_value(name, state, part))
+    return check_t01(
+        data, lambda name, state, part=0: printed(compute_t01_value(name, state, part))
     )
 
 
 def printed(number: float) -> float:
-    return float(real(number))
+    return float(format_real(number))
 
 
-def true_columns(
+def check_columns(
     opened: Callable[[], Database], names: tuple[str, ...], true: Callable[..., float]
 ) -> list[tuple[int, bool]]:
-    run = refused_or(opened)
+    run = read_or_refuse(opened)
     if run is None:
         return []
     assert all("\n" not in note for note in run.notes)
@@ -87,7 +99,7 @@ def true_columns(
             for id_ in PARTS
         ]
         for times, numbers, of_state in columns:
-            time, column = refused_or(times), refused_or(numbers)
+            time, column = read_or_refuse(times), read_or_refuse(numbers)
             if time is not None and column is not None:
                 states = [round(t * 8) for t in time.tolist()]
                 assert time.tolist() == [state / 8 for state in states]
@@ -96,7 +108,7 @@ def true_columns(
     return columns_read
 
 
-def refused_or(reader: Callable[[], Read]) -> Read | None:
+def read_or_refuse(reader: Callable[[], Read]) -> Read | None:
     """Return the result of ``reader``, or None if it raises a d2rpick error of one line."""
     try:
         return reader()
@@ -107,7 +119,7 @@ def refused_or(reader: Callable[[], Read]) -> Read | None:
 
 
 @contextmanager
-def bounded_memory() -> Iterator[None]:
+def limit_memory() -> Iterator[None]:
     tracemalloc.start()
     try:
         yield
@@ -185,14 +197,14 @@ class Damaged:
 
 
 FILES = {
-    "binout": Damaged(binout(range(1, STATES + 1), PARTS), true_binout),
-    "long binout": Damaged(binout(range(1, 200), PARTS), true_binout),
-    "T01": Damaged(t01(STATES, [MadePart(id_, f"part {id_}") for id_ in PARTS]), true_t01, per_state=5),
+    "binout": Damaged(make_binout(range(1, STATES + 1), PARTS), check_binout),
+    "long binout": Damaged(make_binout(range(1, 200), PARTS), check_binout),
+    "T01": Damaged(make_t01(STATES, [MadePart(id_, f"part {id_}") for id_ in PARTS]), check_t01, per_state=5),
     "T01 as text": Damaged(
-        t01(
+        make_t01(
             3, [MadePart(id_, f"part {id_}", (1, 5)) for id_ in PARTS], globals_=5, subset_variables=0,
             writer=T01TextWriter(),
         ),
-        true_text, 3, per_state=4,
+        check_text_t01, 3, per_state=4,
     ),
 }  # fmt: skip

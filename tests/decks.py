@@ -12,14 +12,14 @@ from d2rpick.rules import check_deck
 MAIN = "main.k"
 
 
-def wide(*fields: object, width: int = 10) -> str:
+def pad(*fields: object, width: int = 10) -> str:
     """Return a line of fields, each right-aligned in its columns."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
-def row(*ids: int, width: int = 8) -> str:
+def make_row(*ids: int, width: int = 8) -> str:
     """Return a line of a mesh of LS-DYNA."""
-    return wide(*ids, width=width)
+    return pad(*ids, width=width)
 
 
 def write(
@@ -47,12 +47,12 @@ def windows(deck: Deck) -> Windows:
     return find_windows(read_switching(deck), read_parts(deck))
 
 
-def spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
+def list_spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
     """Return part, tr and td of every window of a deck."""
     return [(window.part, window.tr, window.td) for window in windows(deck).windows]
 
 
-def found(
+def count_findings(
     folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None
 ) -> Counter[str]:
     """Count the findings of each rule."""

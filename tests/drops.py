@@ -28,7 +28,7 @@ def drop(
     )
 
 
-def written(record: Record, folder: Path) -> list[str]:
+def write_run_files(record: Record, folder: Path) -> list[str]:
     """Write the matsum and glstat of a run and return their names."""
     folder.mkdir(parents=True, exist_ok=True)
     names = []

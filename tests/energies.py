@@ -15,32 +15,34 @@ from tests.command import ROLLOVER
 T = TypeVar("T")
 
 
-def sure(value: T | None) -> T:
+def require(value: T | None) -> T:
     """Return ``value``, which must not be None."""
     assert value is not None
     return value
 
 
-def codes(answer: Suggestion) -> set[str]:
+def list_codes(answer: Suggestion) -> set[str]:
     return {caution.code for caution in answer.cautions}
 
 
-def of(energy: np.ndarray, time: np.ndarray) -> History:
+def make_energy_history(energy: np.ndarray, time: np.ndarray) -> History:
     return History(time, energy, source=("test",), format="csv", channel="E")
 
 
-def rollover() -> History:
+def read_rollover() -> History:
     table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
-    return of(table["boxIE_J"], table["time_s"])
+    return make_energy_history(table["boxIE_J"], table["time_s"])
 
 
-def vibration(step: float = 0.01, decay: float = 0.0) -> History:
+def make_vibration_energy(step: float = 0.01, decay: float = 0.0) -> History:
     """Return the energy of one mode whose deformation has period 1, undamped by default."""
     time = np.arange(0, 4, step)
-    return of(np.exp(-decay * time) * np.sin(2 * np.pi * time) ** 2, time)
+    return make_energy_history(
+        np.exp(-decay * time) * np.sin(2 * np.pi * time) ** 2, time
+    )
 
 
-def reference(history: History) -> Reference:
+def make_reference(history: History) -> Reference:
     """Wrap a history made in memory as a reference run without databases."""
     bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
     return Reference(cast("Run", bare), history)
@@ -53,4 +55,4 @@ def suggest_in_window(
     fits: Fits | None = None,
 ) -> Suggestion:
     """Choose tr and td in a history made in memory."""
-    return suggest_of(reference(history), window, settings, fits=fits)
+    return suggest_of(make_reference(history), window, settings, fits=fits)

@@ -39,12 +39,12 @@ class Session(NamedTuple):
     shown: str
 
 
-def text_of(page: str) -> str:
+def read_page(page: str) -> str:
     """Return the text of a page, given its path from the root of the repository."""
     return PAGES[page].read_text("utf-8")
 
 
-def blocks(text: str, language: str) -> list[str]:
+def find_blocks(text: str, language: str) -> list[str]:
     """Return the fenced blocks in a language."""
     return [
         block
@@ -53,19 +53,19 @@ def blocks(text: str, language: str) -> list[str]:
     ]
 
 
-def languages(text: str) -> set[str]:
+def find_languages(text: str) -> set[str]:
     """Return the languages of the fenced blocks."""
     return {block_language for block_language, _ in _FENCED.findall(text)}
 
 
-def prose(text: str) -> str:
+def strip_blocks(text: str) -> str:
     """Return the text without its fenced blocks."""
     return _FENCED.sub("", text)
 
 
-def sessions(text: str) -> Iterator[Session]:
+def find_sessions(text: str) -> Iterator[Session]:
     """Yield the sessions of a page in order."""
-    for block in blocks(text, "console"):
+    for block in find_blocks(text, "console"):
         assert block.startswith(_PROMPT), block
         yield from (
             Session(command, shown_output.rstrip("\n"))
@@ -73,14 +73,14 @@ def sessions(text: str) -> Iterator[Session]:
         )
 
 
-def printed(command: str) -> str:
+def run_shown_command(command: str) -> str:
     """Run a command line and return its output."""
     _, *args = shlex.split(command.replace("\\\n", ""))
     result = run(*args)
     return f"{result.stderr}{result.stdout}".rstrip("\n")
 
 
-def rounded(text: str) -> str:
+def round_numbers(text: str) -> str:
     """Drop the digits that depend on the machine: the last ones at full precision, and errors close to zero."""
     text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.11g}", text)
     return _NEXT_TO_NOTHING.sub(lambda number: f"{float(number[0]):.3g}", text)
@@ -91,8 +91,8 @@ def renewed(text: str) -> str:
 
     def run_again(match: re.Match[str]) -> str:
         command, shown_output = match[1], match[2]
-        printed_now = printed(command)
-        if rounded(printed_now) == rounded(shown_output.rstrip("\n")):
+        printed_now = run_shown_command(command)
+        if round_numbers(printed_now) == round_numbers(shown_output.rstrip("\n")):
             return match[0]
         return f"$ {command}\n{printed_now}\n" if printed_now else f"$ {command}\n"
 
@@ -103,7 +103,7 @@ def renewed(text: str) -> str:
 
 
 @contextlib.contextmanager
-def folder_of_a_reader() -> Iterator[None]:
+def enter_reader_folder() -> Iterator[None]:
     """Change to a folder that contains only the sample data."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "sample_data", Path(folder) / "sample_data")
@@ -113,6 +113,6 @@ def folder_of_a_reader() -> Iterator[None]:
 
 if __name__ == "__main__":
     for path in PAGES.values():
-        with folder_of_a_reader():
+        with enter_reader_folder():
             new = renewed(path.read_text("utf-8"))
         path.write_text(new, "utf-8")

@@ -14,7 +14,7 @@ Item = TypeVar("Item")
 _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))
 
 
-def cases(count: int) -> settings:
+def make_settings(count: int) -> settings:
     """Return hypothesis settings for this number of examples, which may be slow and large."""
     return settings(
         max_examples=count * _MORE,
@@ -23,24 +23,24 @@ def cases(count: int) -> settings:
     )
 
 
-def inputs(count: int) -> int:
+def count_inputs(count: int) -> int:
     """Return the number of inputs: ``count`` in a thorough run of 20, proportionally fewer in other runs."""
     return count * _MORE // 20 if _MORE > 1 else count // 3000
 
 
-def some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
+def choose_some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
     """Return all items in a thorough run, otherwise every ``step``-th; ``step`` must not divide the file's period."""
     return items if _MORE > 1 else items[::step]
 
 
-def cuts(text: bytes) -> list[int]:
+def list_cuts(text: bytes) -> list[int]:
     """Return offsets to cut a text at: near all line ends and some between; every offset in a thorough run."""
     ends = {
         line_end.end() + shift
         for line_end in re.finditer(rb"\n|$", text)
         for shift in (-2, -1, 0, 1)
     }
-    return sorted({*some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
+    return sorted({*choose_some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
 
 
 # A fault: its kind, its start and its size (as shares of the file), and the byte it writes.
@@ -95,7 +95,9 @@ def number(field: bytes) -> float | None:
     return value if abs(value) < float("inf") else None
 
 
-def states_of(text: bytes, start: bytes, width: int) -> list[tuple[bytes, list[bytes]]]:
+def split_states(
+    text: bytes, start: bytes, width: int
+) -> list[tuple[bytes, list[bytes]]]:
     """Return the time field and the lines of each state, from complete lines only."""
     lines = text[: text.rfind(b"\n") + 1].split(b"\n")[:-1]
     if len(lines) > 1 and b"ls-dyna" in lines[1]:
@@ -112,14 +114,14 @@ def states_of(text: bytes, start: bytes, width: int) -> list[tuple[bytes, list[b
     ]
 
 
-def value(field: bytes, width: int) -> float | None:
+def parse_value(field: bytes, width: int) -> float | None:
     """Return the number at the beginning of ``field``, or None if its columns are wrong."""
     if len(field) < width or field[width : width + 1].strip():
         return None
     return number(field[:width])
 
 
-def glstat_states(text: bytes) -> list[State]:
+def read_glstat_states(text: bytes) -> list[State]:
     def is_energy(line: bytes) -> bool:
         return (
             line[31:32] == b"."
@@ -127,19 +129,22 @@ def glstat_states(text: bytes) -> list[State]:
         )
 
     return [
-        (value(time, 14), [value(line[32:], 14) for line in lines if is_energy(line)])
-        for time, lines in states_of(text, b" time".ljust(32, b"."), 14)
+        (
+            parse_value(time, 14),
+            [parse_value(line[32:], 14) for line in lines if is_energy(line)],
+        )
+        for time, lines in split_states(text, b" time".ljust(32, b"."), 14)
     ]
 
 
-def matsum_states(text: bytes, id_: int) -> list[State]:
+def read_matsum_states(text: bytes, id_: int) -> list[State]:
     label = b" mat.#=%5d             inten=" % id_
     return [
         (
-            value(time, 13),
-            [value(line[31:], 13) for line in lines if line.startswith(label)],
+            parse_value(time, 13),
+            [parse_value(line[31:], 13) for line in lines if line.startswith(label)],
         )
-        for time, lines in states_of(text, b" time =", 13)
+        for time, lines in split_states(text, b" time =", 13)
     ]
 
 

@@ -18,7 +18,7 @@ SCHEMAS = ROOT / "d2rpick" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def documents() -> dict[str, Document]:
+def list_documents() -> dict[str, Document]:
     """Return the documents of all results by the names of their schemas, for example ``suggest-1``."""
     document_types = (
         reproduction.DOCUMENT,
@@ -30,18 +30,18 @@ def documents() -> dict[str, Document]:
     }
 
 
-def shipped(name: str) -> dict[str, Any]:
+def read_shipped(name: str) -> dict[str, Any]:
     """Read a schema of the package."""
     schema: dict[str, Any] = json.loads((SCHEMAS / f"{name}.json").read_text("utf-8"))
     return schema
 
 
-def schema_of(document: Document) -> dict[str, Any]:
+def make_schema(document: Document) -> dict[str, Any]:
     """Generate the schema of a document, including the definitions it refers to."""
     defined: dict[str, Any] = {}
-    whole = _plain(document.whole.schema, defined, document.closed)
+    whole = _make_plain(document.whole.schema, defined, document.closed)
     for kind in document.also:
-        _plain(kind, defined, document.closed)
+        _make_plain(kind, defined, document.closed)
     about = {
         "$schema": DRAFT,
         "title": f"d2rpick {document.name.split('/')[1]}",
@@ -50,10 +50,10 @@ def schema_of(document: Document) -> dict[str, Any]:
     return {**about, **whole, **({"$defs": defined} if defined else {})}
 
 
-def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
+def _make_plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
     """Convert kinds and fields to JSON schema; put each named kind into ``defined`` and refer to it."""
     if isinstance(schema, Field):
-        plain = _plain(kind_of(schema.kind), defined, closed)
+        plain = _make_plain(kind_of(schema.kind), defined, closed)
         described = (
             defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else plain
         )
@@ -61,28 +61,30 @@ def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
         return plain
     if isinstance(schema, Kind):
         if not schema.name:
-            return _plain(schema.schema, defined, closed)
+            return _make_plain(schema.schema, defined, closed)
         defined[schema.name] = {
-            **_plain(schema.schema, defined, closed),
+            **_make_plain(schema.schema, defined, closed),
             **defined.get(schema.name, {}),
         }
         return {"$ref": f"#/$defs/{schema.name}"}
     if isinstance(schema, Mapping):
-        plain = {key: _plain(value, defined, closed) for key, value in schema.items()}
+        plain = {
+            key: _make_plain(value, defined, closed) for key, value in schema.items()
+        }
         return (
             {**plain, "additionalProperties": False}
             if closed and "properties" in plain
             else plain
         )
     return (
-        [_plain(element, defined, closed) for element in schema]
+        [_make_plain(element, defined, closed) for element in schema]
         if isinstance(schema, (list, tuple))
         else schema
     )
 
 
 if __name__ == "__main__":
-    for name, document in documents().items():
+    for name, document in list_documents().items():
         (SCHEMAS / f"{name}.json").write_text(
-            f"{json.dumps(schema_of(document), indent=1)}\n", "utf-8"
+            f"{json.dumps(make_schema(document), indent=1)}\n", "utf-8"
         )

@@ -12,7 +12,7 @@ KINETIC = np.array([4.0, 3.0, 2.0, 1.0])
 PARTS = np.array([[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]])
 
 
-def written(write: Callable[[h5py.File], None]) -> io.BytesIO:
+def write_hdf5(write: Callable[[h5py.File], None]) -> io.BytesIO:
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         write(file)

@@ -8,31 +8,31 @@ from typing import Any
 
 import jsonschema
 
-from tests.command import answer
+from tests.command import run_json
 
 
 def check_by_schema(document: dict[str, Any]) -> None:
     """Validate an answer by the schema of the package that it names."""
     _, command, version = document["schema"].split("/")
-    _holder(f"{command}-{version}").validate(document)
+    _make_validator(f"{command}-{version}").validate(document)
 
 
-def checked(*args: str) -> dict[str, Any]:
+def run_json_checked(*args: str) -> dict[str, Any]:
     """Run a command as `answer` does, and validate the document."""
-    check_by_schema(document := answer(*args))
+    check_by_schema(document := run_json(*args))
     return document
 
 
 def check_by_definition(document: Any, schema: str, definition: str) -> None:
     """Validate a part of an answer by a definition of the schema ``schema``."""
-    _holder(schema, definition).validate(document)
+    _make_validator(schema, definition).validate(document)
 
 
-def junit_is_valid(text: str) -> None:
+def check_junit(text: str) -> None:
     _junit().validate(text)
 
 
-def sarif_is_valid(text: str) -> None:
+def check_sarif(text: str) -> None:
     _sarif().validate(json.loads(text))
 
 
@@ -54,7 +54,7 @@ def _sarif() -> jsonschema.Draft4Validator:
 
 
 @cache
-def _holder(
+def _make_validator(
     name: str, definition: str | None = None
 ) -> jsonschema.Draft202012Validator:
     schema = json.loads(

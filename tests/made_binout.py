@@ -99,7 +99,7 @@ class LsdaWriter:
         self._dirty = {}
 
 
-def values(name: str, state: int, part: int = 0) -> float:
+def compute_value(name: str, state: int, part: int = 0) -> float:
     """Return a number that is unique to a variable, state and part, and exact in single precision up to state 4000."""
     names = [*GLSTAT, *MATSUM]
     return (
@@ -107,7 +107,7 @@ def values(name: str, state: int, part: int = 0) -> float:
     )
 
 
-def binout(
+def make_binout(
     states: Sequence[int],
     parts: Sequence[int] = (7, 3),
     *,
@@ -145,21 +145,21 @@ def binout(
             )
             writer.put("cycle", [state], "i4")
             for name in GLSTAT:
-                writer.put(name, [values(name, state + shift)], style.real)
+                writer.put(name, [compute_value(name, state + shift)], style.real)
         if state % matsum_every == 0:
             number = state // matsum_every  # each branch counts its own states
             writer.cd(
                 f"/matsum/d{number:06d}",
                 f"../../matsum/d{number:06d}" if relative else None,
             )
-            writer.put("time", [values("time", state + shift)], style.real)
+            writer.put("time", [compute_value("time", state + shift)], style.real)
             state_parts = parts_of(state) if parts_of else parts
             if parts_of:
                 writer.put("ids", state_parts, "i4")
             for name in MATSUM:
                 writer.put(
                     name,
-                    [values(name, state + shift, id_) for id_ in state_parts],
+                    [compute_value(name, state + shift, id_) for id_ in state_parts],
                     style.real,
                 )
         if tables:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from d2rpick.histories.history import Samples
-from tests.made_t01 import MadePart, headed
+from tests.made_t01 import MadePart, write_head
 
 BODY: Final = (1, 2, 3, 4, 5, 6)
 WHEELS: Final = (7, 8, 9)
@@ -29,7 +29,7 @@ TIME: Final = np.arange(801) * 2.5e-4
 _CODES: Final = (1, 2, 3, 4, 5, 6)  # energies, momentum, mass
 
 
-def quads() -> Iterator[tuple[int, tuple[int, int, int, int]]]:
+def list_quads() -> Iterator[tuple[int, tuple[int, int, int, int]]]:
     """Return part id and nodes of each element: six that share nodes, and a hub and a tyre for each of two wheels."""
     yield from (
         (part, (n, n + 1, n + 5, n + 4))
@@ -42,7 +42,7 @@ def quads() -> Iterator[tuple[int, tuple[int, int, int, int]]]:
         )
 
 
-def places() -> dict[int, tuple[float, float, float]]:
+def place_nodes() -> dict[int, tuple[float, float, float]]:
     """Return the node coordinates [m]; the body is not planar, so that its parts show its rotation."""
     coordinates = {
         1 + x + 4 * y: (1.2 * x, 0.8 * y, 0.3 * (x - 1) * (y - 1))
@@ -58,15 +58,15 @@ def places() -> dict[int, tuple[float, float, float]]:
     return coordinates
 
 
-def centres() -> Samples:
+def compute_centres() -> Samples:
     """Return the part centres, shape (parts, 3): the means of their elements."""
-    coordinates = places()
+    coordinates = place_nodes()
     return np.array(
         [
             np.mean(
                 [
                     coordinates[n]
-                    for part_id, nodes in quads()
+                    for part_id, nodes in list_quads()
                     if part_id == part
                     for n in nodes
                 ],
@@ -77,13 +77,13 @@ def centres() -> Samples:
     )
 
 
-def momenta(periods: float, wheels_land: float = WHEELS_LAND) -> Samples:
+def compute_momenta(periods: float, wheels_land: float = WHEELS_LAND) -> Samples:
     """Return the part momenta over `TIME`, shape (n, parts, 3).
 
     The engine oscillates ``periods`` times until the landing; the wheels fly away.
     """
     body, masses = len(BODY), MASSES[: len(BODY)]
-    inside = np.repeat(centres()[np.newaxis, :body], TIME.size, axis=0)
+    inside = np.repeat(compute_centres()[np.newaxis, :body], TIME.size, axis=0)
     inside[:, ENGINE] += np.outer(
         0.02 * np.sin(2 * np.pi * periods * TIME / LANDS), (0.2, 0.6, 0.8)
     )
@@ -108,12 +108,12 @@ def momenta(periods: float, wheels_land: float = WHEELS_LAND) -> Samples:
     return np.asarray(velocity * MASSES[:, np.newaxis])
 
 
-def t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
+def write_t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
     """Write the time history and return its name."""
-    moved = momenta(periods, wheels_land)
+    moved = compute_momenta(periods, wheels_land)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * 90 * TIME) * np.exp(-10 * TIME)
     parts = [MadePart(part, title, _CODES) for part, title in TITLES.items()]
-    writer = headed(parts, globals_=len(_CODES))
+    writer = write_head(parts, globals_=len(_CODES))
     for i in range(TIME.size):
         rows = [
             [energy[i] * m / 100, p @ p / (2 * m), *p, m]
@@ -130,10 +130,11 @@ def t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
     return str(name)
 
 
-def starter(folder: Path, extra_text: str = "") -> str:
+def write_starter(folder: Path, extra_text: str = "") -> str:
     """Write the Radioss starter deck and return its name."""
     nodes = "".join(
-        f"{node:10d}{x:20g}{y:20g}{z:20g}\n" for node, (x, y, z) in places().items()
+        f"{node:10d}{x:20g}{y:20g}{z:20g}\n"
+        for node, (x, y, z) in place_nodes().items()
     )
     text = f"#RADIOSS STARTER\n/BEGIN\nMADE\n      2022         0\n/NODE\n{nodes}"
     text += "/MAT/ELAST/1\nsteel\n              7800.0\n         210000000000                 0.3\n"
@@ -141,7 +142,7 @@ def starter(folder: Path, extra_text: str = "") -> str:
     for part, title in TITLES.items():
         rows = (
             _row(n, *nodes)
-            for n, (part_id, nodes) in enumerate(quads(), 1)
+            for n, (part_id, nodes) in enumerate(list_quads(), 1)
             if part_id == part
         )
         text += f"/PART/{part}\n{title}\n{_row(1, 1)}/SHELL/{part}\n{''.join(rows)}"
@@ -151,7 +152,7 @@ def starter(folder: Path, extra_text: str = "") -> str:
     return str(name)
 
 
-def keywords(folder: Path, extra_text: str = "") -> str:
+def write_keywords(folder: Path, extra_text: str = "") -> str:
     """Write the same model as an LS-DYNA deck and return its name."""
     text = "*KEYWORD\n" + "".join(
         f"*PART\n{title}\n{_row(part, 1, 1)}" for part, title in TITLES.items()
@@ -159,10 +160,11 @@ def keywords(folder: Path, extra_text: str = "") -> str:
     text += f"*SECTION_SHELL\n{_row(1, 2)}     0.001     0.001     0.001     0.001\n"
     text += "*MAT_ELASTIC\n         1    7800.0    2.1e11       0.3\n*NODE\n"
     text += "".join(
-        f"{node:8d}{x:16g}{y:16g}{z:16g}\n" for node, (x, y, z) in places().items()
+        f"{node:8d}{x:16g}{y:16g}{z:16g}\n" for node, (x, y, z) in place_nodes().items()
     )
     rows = (
-        _row(n, part, *nodes, width=8) for n, (part, nodes) in enumerate(quads(), 1)
+        _row(n, part, *nodes, width=8)
+        for n, (part, nodes) in enumerate(list_quads(), 1)
     )
     name = folder / "made.k"
     text += (

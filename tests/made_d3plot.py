@@ -51,7 +51,7 @@ class State:
         return [self.time, *whole, *parts, *self.walls]
 
 
-def states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
+def make_states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
     """Make states whose values all differ."""
     states_made = []
     for number, time in enumerate(times, start=1):

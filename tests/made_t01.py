@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 
-def packed(kind: str, numbers: Sequence[float]) -> bytes:
+def pack_numbers(kind: str, numbers: Sequence[float]) -> bytes:
     """Return numbers of four bytes; without numpy, because the fake solver starts anew for each restart segment."""
     return struct.pack(f">{len(numbers)}{kind}", *numbers)
 
@@ -24,18 +24,18 @@ class T01Writer:
     def titled(
         self, first: Sequence[int], title: str, last: Sequence[int] = ()
     ) -> None:
-        self.record(packed("i", first) + title.encode() + packed("i", last))
+        self.record(pack_numbers("i", first) + title.encode() + pack_numbers("i", last))
 
     def integers(self, *numbers: int) -> None:
         if numbers:
-            self.record(packed("i", numbers))
+            self.record(pack_numbers("i", numbers))
 
     def setting(self, number: int) -> None:
         self.integers(number)
 
     def reals(self, numbers: Sequence[float]) -> None:
         if numbers:
-            self.record(packed("f", numbers))
+            self.record(pack_numbers("f", numbers))
 
     def state(
         self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2,
@@ -90,7 +90,7 @@ class T01TextWriter(T01Writer):
         self._numbers("I", [f"{number:5d}"], 1)
 
     def reals(self, numbers: Sequence[float]) -> None:
-        self._numbers("R", [real(number) for number in numbers], 5)
+        self._numbers("R", [format_real(number) for number in numbers], 5)
 
     def _numbers(self, kind: str, fields: Sequence[str], per_line: int) -> None:
         if fields:
@@ -104,7 +104,7 @@ def _five(number: int) -> str:
     return f"{number:5d}" if number < 10**5 else "*****"
 
 
-def real(number: float) -> str:
+def format_real(number: float) -> str:
     """Return a number as 1PE15.8 after a blank; Fortran drops the E if the exponent has three digits."""
     mantissa, _, exponent = f"{number:.8E}".partition("E")
     return f"{mantissa + exponent if len(exponent) > 3 else f'{number:.8E}':>16}"
@@ -128,12 +128,12 @@ class MadeGroup:
     variables: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
 
 
-def value(state: int, part: int, code: int) -> float:
+def make_value(state: int, part: int, code: int) -> float:
     """Return a number that is unique to a state, part (0: globals) and variable, and exact in single precision."""
     return state + part * 16384.0 + code / 64
 
 
-def t01(
+def make_t01(
     states: int,
     parts: Sequence[MadePart] = (MadePart(3, "box"), MadePart(12, "step")),
     *,
@@ -144,7 +144,7 @@ def t01(
     start: int = 0,
     writer: T01Writer | None = None,
 ) -> T01Writer:
-    writer = headed(
+    writer = write_head(
         parts,
         globals_=globals_,
         code=code,
@@ -153,15 +153,15 @@ def t01(
         writer=writer,
     )
     for state in range(start, start + states):
-        globals_of = [value(state, 0, code) for code in range(1, globals_ + 1)]
+        globals_of = [make_value(state, 0, code) for code in range(1, globals_ + 1)]
         of_parts = [
-            value(state, part.id, code) for part in parts for code in part.codes
+            make_value(state, part.id, code) for part in parts for code in part.codes
         ]
         writer.state(state / 8, globals_of, of_parts, subset_variables)
     return writer
 
 
-def headed(
+def write_head(
     parts: Sequence[MadePart],
     *,
     globals_: int,

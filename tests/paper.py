@@ -202,14 +202,18 @@ REFERENCE = (
 )
 
 
-def energy(time: Samples) -> Samples:
+def compute_energy(time: Samples) -> Samples:
     """Return the internal energy of the paper's oscillator in the reference run."""
     return OSCILLATOR.internal_energy(OSCILLATOR.free(START, time))
 
 
-def history(step: float = 1e-4, end: float = 0.15) -> History:
+def make_history(step: float = 1e-4, end: float = 0.15) -> History:
     """Return the energy history of the paper's example."""
     time = step * np.arange(round(end / step) + 1, dtype=np.float64)
     return History(
-        time, energy(time), source=("paper",), format="csv", channel="internal_energy"
+        time,
+        compute_energy(time),
+        source=("paper",),
+        format="csv",
+        channel="internal_energy",
     )

@@ -14,7 +14,7 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
 from tests.command import ROOT
-from tests.computed import stored
+from tests.computed import locate_stored
 
 
 class InPieces(OnDisk):
@@ -23,7 +23,7 @@ class InPieces(OnDisk):
     block, gap, window = 256, 32, 64
 
 
-def run_of(
+def open_contents(
     reader: Reader,
     *contents: bytes | str,
     selection: Selection | None = None,
@@ -46,7 +46,7 @@ def run_of(
     return Run(tuple(names), (Legs(legs),))
 
 
-def history_of(
+def read_contents(
     reader: Reader,
     *contents: bytes | str,
     selection: Selection | None = None,
@@ -54,7 +54,9 @@ def history_of(
 ) -> History:
     """Read the selected history, by default the internal energy."""
     selection = selection or Selection()
-    return run_of(reader, *contents, selection=selection, name=name).history(selection)
+    return open_contents(reader, *contents, selection=selection, name=name).history(
+        selection
+    )
 
 
 def read(
@@ -74,9 +76,9 @@ def read(
 _opened = cache(open_run)
 
 
-def solved(name: str, *parts: str) -> Reference:
+def read_solved(name: str, *parts: str) -> Reference:
     """Read a run computed by a solver from tests/data, and the energy of these parts."""
-    return read([stored(name)], Selection(parts=parts))
+    return read([locate_stored(name)], Selection(parts=parts))
 
 
 def read_history(
@@ -86,7 +88,7 @@ def read_history(
     return read(names, selection, input_format).history
 
 
-def on_disk(file: Path, disk_type: type[OnDisk] = InPieces) -> OnDisk:
+def open_on_disk(file: Path, disk_type: type[OnDisk] = InPieces) -> OnDisk:
     """Open a file so that it stays on disk, however small it is."""
     with file.open("rb", buffering=0) as opened:
         state = read_at_rest(str(file), opened, FormatError, may_grow=True)
@@ -94,16 +96,16 @@ def on_disk(file: Path, disk_type: type[OnDisk] = InPieces) -> OnDisk:
         return disk_type(str(file), os.dup(opened.fileno()), state)
 
 
-def run_of_file(file: Path) -> Run:
+def open_file(file: Path) -> Run:
     """Open a file; a small file is held in memory."""
     return open_run([str(file)])
 
 
-def run_on_disk(file: Path) -> Run:
+def open_run_on_disk(file: Path) -> Run:
     """Open a file and leave it on disk."""
-    return open_sources([Source(str(file), on_disk(file))])
+    return open_sources([Source(str(file), open_on_disk(file))])
 
 
-def states_of(history: History) -> list[tuple[float, float]]:
+def list_states(history: History) -> list[tuple[float, float]]:
     """Return time and energy of each state."""
     return list(zip(history.time.tolist(), history.energy.tolist(), strict=True))

@@ -37,13 +37,13 @@ TIME: Samples = np.linspace(0.0, 0.15, 1501)
 ENERGY: Samples = MODE.energy(TIME)
 
 
-def vibration(parameters: Samples) -> Mode:
+def make_mode(parameters: Samples) -> Mode:
     """Return a mode without plastic work and preload, given omega, alpha and the cosine and sine amplitudes."""
     omega, alpha, cosine, sine = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, 0.0)
 
 
-def table(
+def make_table(
     time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None
 ) -> History:
     """Return an energy history, with momenta and energies of the model if they are given."""
@@ -52,7 +52,7 @@ def table(
     )
 
 
-def until(history: History, time: float) -> History:
+def cut_history(history: History, time: float) -> History:
     """Return the history as it was when the run had reached ``time``."""
 
     def cut(record: Record) -> Record:
@@ -65,23 +65,23 @@ def until(history: History, time: float) -> History:
     return replace(cut(history), evidence=Given(momenta, balance, history.masses))
 
 
-def printed(values: Samples, digits: int = 6) -> Samples:
+def round_as_printed(values: Samples, digits: int = 6) -> Samples:
     """Return ``values`` rounded to this number of significant digits, as a file stores them."""
     return np.array([float(f"{value:.{digits - 1}e}") for value in values])
 
 
-def noisy(values: Samples, share: float, seed: int) -> Samples:
+def add_noise(values: Samples, share: float, seed: int) -> Samples:
     """Return ``values`` with white noise whose standard deviation is ``share`` of their maximum."""
     noise = np.random.default_rng(seed).standard_normal(values.size)
     return values + share * float(np.max(values)) * noise
 
 
-def energy_of(modes: Sequence[Mode], time: Samples) -> Samples:
+def sum_energies(modes: Sequence[Mode], time: Samples) -> Samples:
     """Return the sum of the internal energies of the modes, in the shape of ``time``."""
     return np.asarray(sum(mode.energy(time) for mode in modes))
 
 
-def level_crossings(modes: Sequence[Mode], td: float, start: float) -> Samples:
+def find_level_crossings(modes: Sequence[Mode], td: float, start: float) -> Samples:
     """Return the times in (start, td) at which the energy of these modes equals its level at ``td``, shape (n,)."""
     per_period = 2000  # samples per period of the fastest mode: linear interpolation is then exact to 1e-7 of a period
     fastest = max(mode.omega for mode in modes)
@@ -89,12 +89,12 @@ def level_crossings(modes: Sequence[Mode], td: float, start: float) -> Samples:
         start, td, int((td - start) * fastest / (2 * np.pi) * per_period) + 2
     )
     crossings = find_crossings(
-        time, energy_of(modes, time), float(energy_of(modes, np.array([td]))[0])
+        time, sum_energies(modes, time), float(sum_energies(modes, np.array([td]))[0])
     )[0]
     return np.asarray(crossings[crossings < td])
 
 
-def replayed_residual(
+def compute_replayed_residual(
     modes: Mode | Sequence[Mode], tr: Samples, td: Samples | float
 ) -> Samples:
     """Replay each tr of shape (n,) up to ``td`` and return the residual of all modes together there [-].

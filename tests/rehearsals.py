@@ -16,8 +16,8 @@ from d2rpick.models.box_run import (
     simulate,
 )
 from d2rpick.report import history_files
-from tests.command import answer, put
-from tests.energies import sure
+from tests.command import put, run_json
+from tests.energies import require
 
 T_END = 0.55
 # td is this much before the landing [s], rounded to 1 ms; as in the published study.
@@ -89,19 +89,19 @@ def rehearse(
 ) -> Rehearsal:
     """Compute one set of parameters; the scan uses every ``stride``-th tr."""
     reference = simulate(parameters, T_END, interval=interval)
-    until_landing = reference.time <= sure(reference.landed) + 0.04
-    td = round(sure(reference.landed) - BEFORE_LANDING, 3)
+    until_landing = reference.time <= require(reference.landed) + 0.04
+    td = round(require(reference.landed) - BEFORE_LANDING, 3)
     file = put(
         folder / "reference.matsum",
         history_files.BOX_WRITERS["matsum"](
             _until(reference, int(until_landing.sum()))
         ),
     )
-    suggestion = answer("suggest", "--td", str(td), "--part", "box", str(file))
+    suggestion = run_json("suggest", "--td", str(td), "--part", "box", str(file))
     tr = suggestion["recommended"]["tr"] if suggestion["recommended"] else None
     flight = suggestion["flight"]
     times = sorted(
-        {*scan_times(sure(reference.released), td)[::stride], *([tr] if tr else [])}
+        {*scan_times(require(reference.released), td)[::stride], *([tr] if tr else [])}
     )
     outcomes = tuple(scan(parameters, reference, times, td, jobs=1))
     chosen = next((outcome for outcome in outcomes if outcome.tr == tr), None)

@@ -24,8 +24,8 @@ from d2rpick.choice.question import Settings, read
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
 from tests.made_binout import LsdaWriter
-from tests.made_t01 import MadePart, headed
-from tests.text_files import glstat_text, matsum_text
+from tests.made_t01 import MadePart, write_head
+from tests.text_files import make_glstat_text, make_matsum_text
 
 _IDS: Final = (7, 3)  # part ids: the first part vibrates, the second is elsewhere
 _ROUNDED: Final = (
@@ -133,7 +133,7 @@ def make_run(random: Random) -> MadeRun:
 # Writers of a run.
 
 
-def csv(
+def write_csv(
     folder: Path,
     columns: Mapping[str, Samples],
     name: str = "run.csv",
@@ -153,11 +153,11 @@ def csv(
     return [str(file)]
 
 
-def columns_of(run: MadeRun) -> dict[str, Samples]:
+def list_columns(run: MadeRun) -> dict[str, Samples]:
     return {"time": run.time, "internal_energy": run.internal}
 
 
-def hdf5(folder: Path, columns: Mapping[str, Samples]) -> list[str]:
+def write_hdf5(folder: Path, columns: Mapping[str, Samples]) -> list[str]:
     with h5py.File(folder / "run.h5", "w") as file:
         for name, column in columns.items():
             file[name] = column
@@ -169,11 +169,11 @@ def put(folder: Path, name: str, content: bytes) -> list[str]:
     return [str(folder / name)]
 
 
-def asked(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
+def make_question(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
     return Asked(names, run.td, run.load_end, run.landing, parts)
 
 
-def rounded(run: MadeRun, digits: int) -> MadeRun:
+def round_run(run: MadeRun, digits: int) -> MadeRun:
     """Return a run as a text with this number of digits stores it."""
 
     def printed(column: Samples) -> Samples:
@@ -184,7 +184,7 @@ def rounded(run: MadeRun, digits: int) -> MadeRun:
     )
 
 
-def single(run: MadeRun) -> MadeRun:
+def store_in_single_precision(run: MadeRun) -> MadeRun:
     """Return a run as a file in single precision stores it."""
 
     def stored(column: Samples) -> Samples:
@@ -195,7 +195,7 @@ def single(run: MadeRun) -> MadeRun:
     )
 
 
-def binout(folder: Path, run: MadeRun) -> list[str]:
+def write_binout(folder: Path, run: MadeRun) -> list[str]:
     """Write the energies of two parts as LS-DYNA does in a binout in single precision; return the file names."""
     writer = LsdaWriter()
     writer.cd("/matsum/metadata")
@@ -208,10 +208,10 @@ def binout(folder: Path, run: MadeRun) -> list[str]:
     return put(folder, "binout", bytes(writer.data))
 
 
-def time_history(folder: Path, run: MadeRun) -> list[str]:
+def write_time_history(folder: Path, run: MadeRun) -> list[str]:
     """Write the energies of two parts as Radioss does; return the file names."""
     parts = [MadePart(id_, f"part {id_}", (1,)) for id_ in _IDS]
-    writer = headed(parts, globals_=2)
+    writer = write_head(parts, globals_=2)
     for time, internal, second_energy in zip(
         run.time, run.internal, run.other, strict=True
     ):
@@ -219,14 +219,16 @@ def time_history(folder: Path, run: MadeRun) -> list[str]:
     return put(folder, "runT01", bytes(writer.data))
 
 
-def matsum(
+def write_matsum(
     folder: Path, run: MadeRun, ids: Sequence[int] = _IDS, name: str = "matsum"
 ) -> list[str]:
     energies = dict(zip(_IDS, (run.internal, run.other), strict=True))
     return put(
         folder,
         name,
-        matsum_text(run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)),
+        make_matsum_text(
+            run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)
+        ),
     )
 
 
@@ -241,21 +243,24 @@ def same_numbers(
     """Return a change that writes a table and another format with the same numbers."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-        table = csv(folder, columns_of(as_stored(run)))
-        return asked(run, table), asked(run, write(folder, run), parts=parts)
+        table = write_csv(folder, list_columns(as_stored(run)))
+        return make_question(run, table), make_question(
+            run, write(folder, run), parts=parts
+        )
 
     return change
 
 
 def in_single_precision(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, columns_of(single(run)), "single.csv")
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run,
+        write_csv(folder, list_columns(store_in_single_precision(run)), "single.csv"),
     )
 
 
 def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    turned = matsum(folder, run, _IDS[::-1], "matsum_turned")
-    return asked(run, matsum(folder, run), parts=_IDS[0]), asked(
+    turned = write_matsum(folder, run, _IDS[::-1], "matsum_turned")
+    return make_question(run, write_matsum(folder, run), parts=_IDS[0]), make_question(
         run, turned, parts=_IDS[0]
     )
 
@@ -263,19 +268,19 @@ def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, 
 def further_columns(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
     extra_columns = {
         "pressure": np.array([random.gauss(0, 1) for _ in run.time]),
-        **columns_of(run),
+        **list_columns(run),
         "status": run.other,
     }
     in_front = {"time": run.time, **extra_columns}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, in_front, "more.csv")
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, in_front, "more.csv")
     )
 
 
 def kinetic_energy_too(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    extra_columns = {**columns_of(run), "kinetic_energy": run.kinetic}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, extra_columns, "more.csv")
+    extra_columns = {**list_columns(run), "kinetic_energy": run.kinetic}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, extra_columns, "more.csv")
     )
 
 
@@ -291,20 +296,21 @@ def scaled(
             "internal_energy": energy * run.internal,
         }
         again = Asked(
-            csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
+            write_csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
             time * run.landing + later,
         )  # fmt: skip
-        return asked(run, csv(folder, columns_of(run))), again
+        return make_question(run, write_csv(folder, list_columns(run))), again
 
     return change
 
 
 def doubled_last_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     doubled = {
-        name: np.append(column, column[-1]) for name, column in columns_of(run).items()
+        name: np.append(column, column[-1])
+        for name, column in list_columns(run).items()
     }
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, doubled, "doubled.csv")
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, doubled, "doubled.csv")
     )
 
 
@@ -312,9 +318,9 @@ def cut_after_the_landing(
     run: MadeRun, folder: Path, random: Random
 ) -> tuple[Asked, Asked]:
     end = np.searchsorted(run.time, run.landing) + random.randrange(1, 6)
-    cut = {name: column[:end] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, cut, "cut.csv")
+    cut = {name: column[:end] for name, column in list_columns(run).items()}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, cut, "cut.csv")
     )
 
 
@@ -328,17 +334,17 @@ def legs_in_another_order(
     ):
         leg = {
             name: column[max(begin - 2, 0) : end]
-            for name, column in columns_of(run).items()
+            for name, column in list_columns(run).items()
         }
-        names += csv(folder, leg, f"leg{number}.csv")
+        names += write_csv(folder, leg, f"leg{number}.csv")
     turned = random.sample(names, len(names))
-    return asked(run, names), asked(run, turned)
+    return make_question(run, names), make_question(run, turned)
 
 
 def every_second_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    thinned = {name: column[::2] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, thinned, "thinned.csv")
+    thinned = {name: column[::2] for name, column in list_columns(run).items()}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, thinned, "thinned.csv")
     )
 
 
@@ -353,41 +359,54 @@ def other_names(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Aske
             ".hidden",
         )
     )
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, columns_of(run), name)
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, list_columns(run), name)
     )
 
 
 def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    other_file = csv(folder, columns_of(run), "other.txt", random.choice((";", "\t")))
-    return asked(run, csv(folder, columns_of(run))), asked(run, other_file)
+    other_file = write_csv(
+        folder, list_columns(run), "other.txt", random.choice((";", "\t"))
+    )
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, other_file
+    )
 
 
 def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    names = matsum(folder, run)
+    names = write_matsum(folder, run)
     table, _notes = extracted(open_files(names).files, Selection(parts=(str(_IDS[0]),)))
     columns = {name: table[name] for name in ("time", "internal_energy")}
-    return asked(run, names, parts=_IDS[0]), asked(run, csv(folder, columns))
+    return make_question(run, names, parts=_IDS[0]), make_question(
+        run, write_csv(folder, columns)
+    )
 
 
 RELATIONS: Final[Mapping[str, Relation]] = {
     "hdf5": Relation(
-        same_numbers(lambda folder, run: hdf5(folder, columns_of(run)), lambda run: run)
+        same_numbers(
+            lambda folder, run: write_hdf5(folder, list_columns(run)), lambda run: run
+        )
     ),
     "glstat": Relation(
         same_numbers(
             lambda folder, run: put(
-                folder, "glstat", glstat_text(run.time, run.internal)
+                folder, "glstat", make_glstat_text(run.time, run.internal)
             ),
-            lambda run: rounded(run, 6),
+            lambda run: round_run(run, 6),
         ),
         exact=False,
     ),
     "matsum": Relation(
-        same_numbers(matsum, lambda run: rounded(run, 5), _IDS[0]), exact=False
+        same_numbers(write_matsum, lambda run: round_run(run, 5), _IDS[0]), exact=False
     ),
-    "binout": Relation(same_numbers(binout, single, _IDS[0]), exact=False),
-    "radioss-th": Relation(same_numbers(time_history, single, _IDS[0]), exact=False),
+    "binout": Relation(
+        same_numbers(write_binout, store_in_single_precision, _IDS[0]), exact=False
+    ),
+    "radioss-th": Relation(
+        same_numbers(write_time_history, store_in_single_precision, _IDS[0]),
+        exact=False,
+    ),
     "single precision": Relation(in_single_precision, exact=False),
     "order of parts": Relation(other_order_of_parts),
     "further columns": Relation(further_columns),
@@ -434,7 +453,9 @@ def choose(question: Asked) -> Chosen:
     )
 
 
-def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
+def find_difference(
+    relation: Relation, run: MadeRun, first: Chosen, second: Chosen
+) -> str:
     """Describe how the second answer breaks the relation; empty if it does not."""
     if relation.may_lose and (second.tr is None or second.basis != first.basis):
         return ""
@@ -470,6 +491,6 @@ def check_relation(name: str, random: Random) -> bool:
         first, second = (
             choose(question) for question in relation.change(run, Path(folder), random)
         )
-    fault = difference(relation, run, first, second)
+    fault = find_difference(relation, run, first, second)
     assert not fault, fault
     return first.tr is not None and second.tr is not None

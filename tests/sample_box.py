@@ -26,7 +26,7 @@ _T01_PART: Final = (1, 2, 3, 4, 5, 6)  # internal and kinetic energy, momentum, 
 _TITLE: Final = "rollover box"
 
 
-def files(record: Record) -> Mapping[str, bytes]:
+def make_files(record: Record) -> Mapping[str, bytes]:
     """Return the contents of all files by file name."""
     suffixes = {"csv": "csv", "hdf5": "h5", "glstat": "glstat", "matsum": "matsum"}
     return {
@@ -34,14 +34,14 @@ def files(record: Record) -> Mapping[str, bytes]:
             f"rollover_box.{suffixes[form]}": write(record)
             for form, write in BOX_WRITERS.items()
         },
-        "rollover_box.binout": binout(record),
-        "rollover_boxT01": t01(record),
-        "rollover_box.d3plot": d3plot(record, family=1),
-        "rollover_box.d3thdt": d3plot(record, family=3),
+        "rollover_box.binout": make_binout(record),
+        "rollover_boxT01": make_t01(record),
+        "rollover_box.d3plot": make_d3plot(record, family=1),
+        "rollover_box.d3thdt": make_d3plot(record, family=3),
     }
 
 
-def binout(record: Record) -> bytes:
+def make_binout(record: Record) -> bytes:
     """Return the branches glstat and matsum in single precision, without symbol tables, as a killed run leaves them."""
     writer = LsdaWriter()
     for branch in ("glstat", "matsum"):
@@ -81,7 +81,7 @@ def _of_parts(record: Record) -> dict[str, Samples]:
     }  # fmt: skip
 
 
-def t01(record: Record) -> bytes:
+def make_t01(record: Record) -> bytes:
     """Return the time history of the model and of both parts.
 
     Radioss has no terms for rigid walls and for damping: their energy counts as work of external forces.
@@ -113,7 +113,7 @@ def t01(record: Record) -> bytes:
     return bytes(writer.data)
 
 
-def d3plot(record: Record, family: int) -> bytes:
+def make_d3plot(record: Record, family: int) -> bytes:
     """Return a family of one file in double precision, without nodes and elements."""
     nothing = dict.fromkeys(("numnp", "nel8", "nel4", "nel2", "nelt"), 0)
     ids = tuple(range(1, len(PARTS) + 1))
@@ -162,7 +162,7 @@ def _masses() -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    for name, content in files(
+    for name, content in make_files(
         simulate(Parameters(), T_END, interval=INTERVAL)
     ).items():
         (ROOT / "sample_data" / name).write_bytes(content)

@@ -69,12 +69,12 @@ class _Mesh:
         return self.nodes.setdefault(key, len(self.nodes) + 1)
 
 
-def deck() -> str:
+def make_deck() -> str:
     """Return the text of the LS-DYNA deck."""
     return "\n".join(_lines(_mesh())) + "\n"
 
 
-def radioss() -> dict[str, str]:
+def make_radioss_files() -> dict[str, str]:
     """Return the texts of the starter and of two engine files by file name."""
     step = "/VERS/2022\n/DT\n0.9 0.0\n/DTIX\n5e-05 5e-05\n"
     run_time_cards = "/TFILE/4\n0.001\n/PRINT/-2000\n/MON/ON\n"
@@ -157,7 +157,7 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    DECK.write_text(deck(), "utf-8")
+    DECK.write_text(make_deck(), "utf-8")
     FLYING.mkdir(exist_ok=True)
-    for name, text in radioss().items():
+    for name, text in make_radioss_files().items():
         (FLYING / name).write_text(text, "utf-8")

@@ -17,7 +17,7 @@ import pytest
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import Cluster
 from tests import variants
-from tests.command import ROOT, refused, run
+from tests.command import ROOT, read_refusal, run
 
 pytestmark = pytest.mark.skipif(
     not find_spec("distributed"), reason="needs the extra 'dask'"
@@ -85,7 +85,7 @@ def cluster(
 def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> None:
     from distributed import Client  # slow
 
-    sources = variants.variants(tmp_path)
+    sources = variants.write_variants(tmp_path)
     expected = json.loads(
         run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout
     )
@@ -191,14 +191,14 @@ def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
         "--scheduler",
         "nonsense://x",
     )
-    assert refused(*arguments).startswith(f"nonsense://x: {message}")
+    assert read_refusal(*arguments).startswith(f"nonsense://x: {message}")
 
 
 def test_without_the_package_its_name_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert "pip install distributed" in refused(
+    assert "pip install distributed" in read_refusal(
         "study",
         "--td",
         "0.064",

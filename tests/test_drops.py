@@ -17,7 +17,7 @@ from d2rpick.choice.question import Settings, read
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate
-from tests.drops import written
+from tests.drops import write_run_files
 
 SETS = tuple(
     Parameters(
@@ -45,10 +45,12 @@ class Outcome(NamedTuple):
         )
 
 
-def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
+def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
     """Plan a run with these parameters, and compute it switched in the supported windows."""
     with tempfile.TemporaryDirectory() as folder:
-        files = written(simulate(parameters, T_END, interval=interval), Path(folder))
+        files = write_run_files(
+            simulate(parameters, T_END, interval=interval), Path(folder)
+        )
         windows = plan_of(read(files, BOX), Settings()).windows
     switched = simulate(
         parameters,
@@ -65,7 +67,7 @@ def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
 
 @pytest.mark.slow
 def test_supported_windows_end_before_the_landing_of_the_switched_run() -> None:
-    drop_outcome = outcome(
+    drop_outcome = compute_outcome(
         SETS[12], interval=3e-4
     )  # at most two time steps of the model per state
     assert drop_outcome.windows
@@ -74,7 +76,7 @@ def test_supported_windows_end_before_the_landing_of_the_switched_run() -> None:
 
 if __name__ == "__main__":
     for number, parameters in enumerate(SETS, start=1):
-        found = outcome(parameters)
+        found = compute_outcome(parameters)
         pairs = zip(found.windows, found.landings, strict=True)
         told = "; ".join(
             f"{tr:.4f} to {td:.4f}, contact {at if at is None else round(at, 4)}"

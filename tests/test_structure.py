@@ -37,23 +37,23 @@ LAYERS = (
 RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for types
 
 
-def name_of(path: Path) -> str:
+def name_module(path: Path) -> str:
     """Return the name of a module within the package."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(part for part in parts if part != "__init__") or "d2rpick"
 
 
-MODULES = {name_of(path): path for path in PACKAGE.rglob("*.py")}
+MODULES = {name_module(path): path for path in PACKAGE.rglob("*.py")}
 
 
-def parsed(module: str) -> ast.Module:
+def parse_module(module: str) -> ast.Module:
     """Return the syntax tree of a module."""
     return ast.parse(MODULES[module].read_text("utf-8"))
 
 
-def statements(module: str) -> Iterator[ast.AST]:
+def list_statements(module: str) -> Iterator[ast.AST]:
     """Yield all statements of a module, nested ones included, without their expressions."""
-    nodes_to_visit: list[ast.AST] = [parsed(module)]
+    nodes_to_visit: list[ast.AST] = [parse_module(module)]
     while nodes_to_visit:
         yield (node := nodes_to_visit.pop())
         nodes_to_visit += [
@@ -64,13 +64,13 @@ def statements(module: str) -> Iterator[ast.AST]:
 
 
 @cache
-def imports(module: str) -> frozenset[str]:
+def list_imports(module: str) -> frozenset[str]:
     """Return the names of all modules that a module imports, also for type checking; without the package's name."""
     return frozenset(_imports(module))
 
 
 def _imports(module: str) -> Iterator[str]:
-    for node in statements(module):
+    for node in list_statements(module):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -89,13 +89,13 @@ INNER = sorted(
 )  # the public names are above all layers
 
 
-def folder(module: str) -> str:
+def name_folder(module: str) -> str:
     """Return the top folder of a module in the package."""
     return module.partition(".")[0]
 
 
 def test_every_folder_has_its_layer() -> None:
-    assert {folder(module) for module in INNER} == {*LAYER}
+    assert {name_folder(module) for module in INNER} == {*LAYER}
 
 
 def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
@@ -103,28 +103,28 @@ def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
     wrong_imports = {
         (module, name)
         for module in INNER
-        for name in imports(module) & inner
-        if folder(name) != folder(module)
-        and LAYER[folder(name)] >= LAYER[folder(module)]
+        for name in list_imports(module) & inner
+        if name_folder(name) != name_folder(module)
+        and LAYER[name_folder(name)] >= LAYER[name_folder(module)]
     }
     assert not wrong_imports
     assert not [
-        module for module in INNER if "d2rpick" in imports(module)
+        module for module in INNER if "d2rpick" in list_imports(module)
     ]  # the public names are above all layers
 
 
 def test_the_command_line_knows_the_library_results_and_base_alone() -> None:
     known_folders = {
-        folder(name)
+        name_folder(name)
         for module in INNER
-        if folder(module) == "cli"
-        for name in imports(module) & {*INNER}
+        if name_folder(module) == "cli"
+        for name in list_imports(module) & {*INNER}
     }
     assert known_folders == {"cli", "api", "report", "base"}
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph = {module: (imports(module) & {*INNER}) - {module} for module in INNER}
+    graph = {module: (list_imports(module) & {*INNER}) - {module} for module in INNER}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
 
 
@@ -133,22 +133,22 @@ def test_a_library_stays_behind_its_module(library: str) -> None:
     importing = {
         module
         for module in MODULES
-        if library in {folder(name) for name in imports(module)}
+        if library in {name_folder(name) for name in list_imports(module)}
     }
     assert importing
-    assert {folder(module) for module in importing} <= {*RESERVED[library]}
+    assert {name_folder(module) for module in importing} <= {*RESERVED[library]}
 
 
 def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
     importing = {
         module
         for module in MODULES
-        if "validation" in {folder(name) for name in imports(module)}
+        if "validation" in {name_folder(name) for name in list_imports(module)}
     }
     assert importing == {"cli.models"}
     top = [
         ast.unparse(node)
-        for node in parsed("cli.models").body
+        for node in parse_module("cli.models").body
         if not isinstance(node, ast.FunctionDef)
     ]
     assert not [text for text in top if "import" in text and "validation" in text]
@@ -161,8 +161,8 @@ def test_only_the_command_line_prints_and_exits() -> None:
     called = {
         (module, ast.unparse(node.func))
         for module, path in MODULES.items()
-        if folder(module) != "cli" and PRINTS.search(path.read_text("utf-8"))
-        for node in ast.walk(parsed(module))
+        if name_folder(module) != "cli" and PRINTS.search(path.read_text("utf-8"))
+        for node in ast.walk(parse_module(module))
         if isinstance(node, ast.Call)
     }
     assert not {
@@ -175,7 +175,7 @@ def test_only_the_command_line_prints_and_exits() -> None:
 SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
 
 
-def swapped(tree: ast.Module) -> Iterator[str]:
+def list_swapped(tree: ast.Module) -> Iterator[str]:
     """Yield the first name of each expression whose attributes or entries a test module replaces by monkeypatch."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and SWAP.search(ast.unparse(node.func)):
@@ -195,16 +195,16 @@ def test_tests_swap_names_of_the_standard_library_alone() -> None:
             if node.module in sys.stdlib_module_names
             for name in node.names
         }
-        assert {*swapped(tree)} <= theirs | sys.stdlib_module_names, path
+        assert {*list_swapped(tree)} <= theirs | sys.stdlib_module_names, path
 
 
 def test_no_file_is_mapped_into_memory() -> None:
     """If another program cuts a mapped file, the system kills the process."""
-    assert not [module for module in MODULES if "mmap" in imports(module)]
+    assert not [module for module in MODULES if "mmap" in list_imports(module)]
 
 
 @cache
-def loaded(*args: str) -> frozenset[str]:
+def list_loaded(*args: str) -> frozenset[str]:
     """Return the modules that a call of the program has loaded when it ends."""
     code = (
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
@@ -223,14 +223,12 @@ def loaded(*args: str) -> frozenset[str]:
 
 
 @cache
-def beside(libraries: str) -> frozenset[str]:
+def list_loaded_beside(libraries: str) -> frozenset[str]:
     """Return the modules of a process that imports only these libraries."""
-    return frozenset(
-        printed_by(f"import sys, {libraries}; print(*sys.modules)").split()
-    )
+    return frozenset(run_code(f"import sys, {libraries}; print(*sys.modules)").split())
 
 
-def share(modules: frozenset[str]) -> float:
+def compute_share(modules: frozenset[str]) -> float:
     """Return the share of the package that these modules are, by source size [bytes]."""
     size = {name: path.stat().st_size for name, path in MODULES.items()}
     loaded = {name.removeprefix("d2rpick.") for name in modules}
@@ -300,15 +298,15 @@ def test_a_command_loads_only_what_its_answer_needs(
     args: tuple[str, ...], libraries: str, module_limit: float
 ) -> None:
     """No other library, and at most this share of the package: a further module must be justified."""
-    libraries_beside = beside(libraries)
+    libraries_beside = list_loaded_beside(libraries)
     assert "d2rpick" not in libraries_beside
-    mine = loaded(*args) - libraries_beside
-    own_modules = frozenset(name for name in mine if folder(name) == "d2rpick")
-    assert {folder(name) for name in mine - own_modules} <= {
+    mine = list_loaded(*args) - libraries_beside
+    own_modules = frozenset(name for name in mine if name_folder(name) == "d2rpick")
+    assert {name_folder(name) for name in mine - own_modules} <= {
         *sys.stdlib_module_names,
         *re.findall(r"\w+", libraries),
     }
-    assert share(own_modules) <= module_limit
+    assert compute_share(own_modules) <= module_limit
 
 
 @pytest.mark.parametrize(
@@ -325,15 +323,15 @@ def test_a_command_loads_only_what_its_answer_needs(
     ],
 )
 def test_an_answer_needs_little_of_what_python_has(args: tuple[str, ...]) -> None:
-    mine = loaded(*args) - beside("click, numpy")
+    mine = list_loaded(*args) - list_loaded_beside("click, numpy")
     assert not mine & (UNNEEDED if args[-1] == ENERGY else UNNEEDED - {"array"})
 
 
 def test_a_small_deck_needs_little_of_what_python_has() -> None:
-    assert not (loaded("check", DECK) - beside("click")) & UNNEEDED
+    assert not (list_loaded("check", DECK) - list_loaded_beside("click")) & UNNEEDED
 
 
-def printed_by(code: str) -> str:
+def run_code(code: str) -> str:
     """Return the output of a fresh interpreter."""
     result = subprocess.run(
         [sys.executable, "-c", code],
@@ -349,7 +347,7 @@ def printed_by(code: str) -> str:
 def test_the_package_alone_imports_nothing() -> None:
     """Otherwise garbage collection scans the objects of typing and the like, unless the command line comes first."""
     code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
-    assert {*printed_by(code).split()} <= {
+    assert {*run_code(code).split()} <= {
         "d2rpick",
         "d2rpick.api",
         "d2rpick.base",
@@ -362,7 +360,7 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
         "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()) < gc.get_freeze_count()));"
         "sys.argv = ['d2rpick', '--help']; from d2rpick.__main__ import main; main()"
     )
-    assert printed_by(code).splitlines()[-1] == "True"
+    assert run_code(code).splitlines()[-1] == "True"
 
 
 def test_the_command_line_offers_the_formats_of_models_there_are() -> None:

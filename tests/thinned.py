@@ -66,22 +66,22 @@ TABLES = {
 
 def thin(data: bytes, selection: Thinned) -> bytes:
     """Return a time history with only the selected states and part variables, and without groups."""
-    records, writer = bodies(data), T01Writer()
+    records, writer = split_records(data), T01Writer()
     for _ in range(2):
         writer.record(next(records))
     counts = next(records)
     if len(counts) == 4:  # written by newer codes
-        for record in (counts, *islice(records, *integers(counts))):
+        for record in (counts, *islice(records, *read_integers(counts))):
             writer.record(record)
         counts = next(records)
-    parts, materials, properties, subsets, groups, variables = integers(counts)
+    parts, materials, properties, subsets, groups, variables = read_integers(counts)
     writer.integers(parts, materials, properties, subsets, 0, variables)
     if variables:
         writer.record(next(records))
     first_position, positions = 0, list[int]()
     for _ in range(parts):
         head = next(records)
-        codes = integers(next(records)) if integers(head)[-1] else ()
+        codes = read_integers(next(records)) if read_integers(head)[-1] else ()
         own_positions = [
             position for position, code in enumerate(codes) if code in selection.codes
         ]
@@ -112,7 +112,7 @@ def thin(data: bytes, selection: Thinned) -> bytes:
 def copy_subset(records: Iterator[bytes], writer: T01Writer) -> int:
     """Copy a subset without its variables; return their number."""
     head = next(records)
-    children, parts, variables = integers(head[8:20])
+    children, parts, variables = read_integers(head[8:20])
     writer.record(head[:16] + bytes(4) + head[20:])
     for record in islice(records, bool(children) + bool(parts)):
         writer.record(record)
@@ -123,13 +123,13 @@ def copy_subset(records: Iterator[bytes], writer: T01Writer) -> int:
 
 def skip_group(records: Iterator[bytes]) -> int:
     """Skip a group; return how many numbers of it a state has."""
-    elements, variables = integers(next(records)[12:20])
+    elements, variables = read_integers(next(records)[12:20])
     for _ in range(elements + bool(variables)):
         next(records)
     return elements * variables
 
 
-def bodies(data: bytes) -> Iterator[bytes]:
+def split_records(data: bytes) -> Iterator[bytes]:
     """Yield the contents of the Fortran records."""
     offset = 0
     while offset < len(data):
@@ -138,11 +138,11 @@ def bodies(data: bytes) -> Iterator[bytes]:
         offset += 8 + length
 
 
-def integers(record: bytes) -> tuple[int, ...]:
+def read_integers(record: bytes) -> tuple[int, ...]:
     return tuple(np.frombuffer(record, ">i4").tolist())
 
 
-def columns_of(text: str, names: tuple[str, ...]) -> str:
+def choose_columns(text: str, names: tuple[str, ...]) -> str:
     """Return a table of the named columns, each cell as it was written."""
     table_text = io.StringIO()
     writer = csv.DictWriter(
@@ -163,7 +163,9 @@ def main(folder: Path) -> None:
     for name, columns in TABLES.items():
         write(
             f"{name}.csv.gz",
-            columns_of((folder / f"{name}.csv").read_text("ascii"), columns).encode(),
+            choose_columns(
+                (folder / f"{name}.csv").read_text("ascii"), columns
+            ).encode(),
         )
 
 

@@ -12,7 +12,7 @@ TD = 0.0687534  # a peak of the paper's energy [s]
 STUDY = ("study", "--td", str(TD), "--jobs", "1")
 
 
-def variant(rate: float = 1.0, size: float = 1.0) -> Mode:
+def make_variant(rate: float = 1.0, size: float = 1.0) -> Mode:
     """Return the paper's oscillator with another frequency and amplitude."""
     return Mode(
         rate * OMEGA_2, MODE.alpha, size * MODE.cosine, size * MODE.sine, MODE.origin
@@ -22,7 +22,7 @@ def variant(rate: float = 1.0, size: float = 1.0) -> Mode:
 def write(path: Path, mode: Mode | None = None, end: float = 0.15) -> str:
     """Write the history of an oscillator as a table; return the file name."""
     time = TIME[: int(np.searchsorted(TIME, end, side="right"))]
-    table = np.stack([time, (mode or variant()).energy(time)], axis=1)
+    table = np.stack([time, (mode or make_variant()).energy(time)], axis=1)
     np.savetxt(
         path,
         table,
@@ -34,9 +34,11 @@ def write(path: Path, mode: Mode | None = None, end: float = 0.15) -> str:
     return str(path)
 
 
-def variants(folder: Path, rates: tuple[float, ...] = (1.0, 1.001, 0.999)) -> list[str]:
+def write_variants(
+    folder: Path, rates: tuple[float, ...] = (1.0, 1.001, 0.999)
+) -> list[str]:
     """Write runs with different frequencies; return the file names."""
     return [
-        write(folder / f"run{i}.csv", variant(rate))
+        write(folder / f"run{i}.csv", make_variant(rate))
         for i, rate in enumerate(rates, start=1)
     ]

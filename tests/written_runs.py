@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from tests.made_binout import LsdaWriter
-from tests.made_t01 import MadePart, headed
-from tests.text_files import HEAD, glstat_line, matsum_head
+from tests.made_t01 import MadePart, write_head
+from tests.text_files import HEAD, format_glstat_line, make_matsum_head
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -77,10 +77,10 @@ def as_glstat(run: Written, folder: Path, *, kinetic: bool = True) -> str:
             % (24 * state + 1)
         )
         lines = [
-            glstat_line(name.replace("_", " "), float(values[state]))
+            format_glstat_line(name.replace("_", " "), float(values[state]))
             for name, values in columns.items()
         ]
-        blocks += [head, glstat_line("time", time), *lines, b"\n\n"]
+        blocks += [head, format_glstat_line("time", time), *lines, b"\n\n"]
     path = folder / "glstat"
     path.write_bytes(b"".join(blocks))
     return str(path)
@@ -125,7 +125,7 @@ def as_t01(run: Written, folder: Path, *, kinetic: bool = True) -> str:
         MadePart(part_index + 1, f"mass {part_index + 1}", names)
         for part_index in range(run.masses.size)
     ]
-    writer = headed(parts, globals_=12)
+    writer = write_head(parts, globals_=12)
     momentum, still = run.momentum.sum(axis=1), [0.0] * 5
     for state, time in enumerate(run.time.tolist()):
         energies = [float(run.internal[state].sum()), float(run.kinetic[state].sum())]
@@ -155,7 +155,7 @@ def as_t01(run: Written, folder: Path, *, kinetic: bool = True) -> str:
 def as_matsum(run: Written, folder: Path) -> str:
     """Write a matsum with one part for each mass."""
     count = run.masses.size
-    text = [matsum_head(range(1, count + 1))]
+    text = [make_matsum_head(range(1, count + 1))]
     still = f"{0.0:13.4E}"
     for state, time in enumerate(run.time.tolist()):
         text.append(f" time ={time:13.4E}\n".encode())

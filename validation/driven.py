@@ -63,7 +63,7 @@ TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells th
 _AFTER: Final = 2e-4  # behind td the body is looked at [s]
 
 
-def driven(name: str, folder: Path) -> Drive:
+def drive_model(name: str, folder: Path) -> Drive:
     """Drive a model to its end, or give what an earlier call has."""
     model, deck = MODELS[name], folder / "deck"
     deck.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def driven(name: str, folder: Path) -> Drive:
         return driving.answer(driver, ())
 
 
-def reference(name: str, folder: Path, solver: Path) -> list[str]:
+def compute_reference(name: str, folder: Path, solver: Path) -> list[str]:
     """Compute a model without switching, unless that is done."""
     done = folder / "reference" / f"{name}T01"
     return (
@@ -86,7 +86,7 @@ def reference(name: str, folder: Path, solver: Path) -> list[str]:
     )
 
 
-def places(
+def locate_nodes(
     names: Sequence[str], deck: Path, count: int, time: float
 ) -> NDArray[np.float64]:
     """Where the first nodes that are watched are at a time, shape (count, 3) [m]."""
@@ -103,7 +103,7 @@ def places(
     }
     leg = next(
         run_names
-        for run_names in map(_history, reversed(names))
+        for run_names in map(_read_history, reversed(names))
         if run_names.time[0] <= time
     )
     record = leg._head.counts.index(6 * len(wanted))
@@ -115,11 +115,11 @@ def places(
     return np.asarray(reference_positions + [where[node] for node in wanted[:count]])
 
 
-def _history(name: str) -> TimeHistory:
+def _read_history(name: str) -> TimeHistory:
     return TimeHistory(Path(name).read_bytes(), name)
 
 
-def angle(
+def compute_angle(
     first_positions: NDArray[np.float64], second_positions: NDArray[np.float64]
 ) -> float:
     """Angle between two places (n, 3) of a body [degrees]."""
@@ -138,14 +138,14 @@ def angle(
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def held(
+def measure_model(
     name: str, folder: Path, solver: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
     """Give what is measured, its value, its limit, and whether it is within that."""
     goal, run_driven, names = (
         GOALS[name],
-        driven(name, folder),
-        reference(name, folder, solver),
+        drive_model(name, folder),
+        compute_reference(name, folder, solver),
     )
     ours = [
         str(path) for path in sorted((folder / "driven").glob(f"{name}T[0-9][0-9]"))
@@ -167,14 +167,14 @@ def held(
             shift <= goal.landing,
         )
         for window in (item for item in switched if start < item.td < end):
-            yield from _window(
+            yield from _measure_window(
                 window, goal, (names, ours), folder / "deck" / f"{name}_0000.rad"
             )
     took = read_timing(str(folder / "reference" / f"{name}_0001.out")).total
     # a reference takes the same for each second; two runs differ by 15 % on a machine that others use
     for until, limit in ((lands, goal.cost), (history.time[-1], _MOST)):
         cost = (
-            sum(_cost(item, until) for item in run_driven.legs)
+            sum(_measure_cost(item, until) for item in run_driven.legs)
             / took
             * history.time[-1]
             / until
@@ -187,7 +187,7 @@ def held(
         )
 
 
-def _cost(leg: Leg, until: float) -> float:
+def _measure_cost(leg: Leg, until: float) -> float:
     """Processor time of a leg, up to a time if it is deformable [s]."""
     cost_before = until - leg.order.start
     return (
@@ -198,7 +198,7 @@ def _cost(leg: Leg, until: float) -> float:
     )
 
 
-def _window(
+def _measure_window(
     window: Window, goal: Goal, runs: tuple[Sequence[str], Sequence[str]], deck: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
     prefix, (theirs, ours) = (
@@ -216,11 +216,11 @@ def _window(
             comparison.mean_ratio >= goal.energy,
         )
     reference_positions, driven_positions = (
-        places(names, deck, goal.nodes, window.td + _AFTER) for names in runs
+        locate_nodes(names, deck, goal.nodes, window.td + _AFTER) for names in runs
     )
     position_error, turned = (
         float(np.linalg.norm((driven_positions - reference_positions).mean(axis=0))),
-        angle(reference_positions, driven_positions),
+        compute_angle(reference_positions, driven_positions),
     )
     yield (
         f"{prefix}out of place [mm]",
@@ -231,7 +231,7 @@ def _window(
     yield f"{prefix}turned [degrees]", turned, goal.angle, turned <= goal.angle
 
 
-def refused(name: str, folder: Path) -> bool:
+def is_refused(name: str, folder: Path) -> bool:
     """Whether a wait below half of a period that the deck tells is refused."""
     try:
         Driving(
@@ -262,13 +262,13 @@ def main() -> int:
     missed = False
     for name in options.names or GOALS:
         folder = options.folder / name
-        for quantity, value, limit, good in held(name, folder, Path(solver)):
+        for quantity, value, limit, good in measure_model(name, folder, Path(solver)):
             print(
                 f"{name:6} {quantity:45} {value:8.3g}   goal {limit:<6.3g} {'' if good else 'MISSED'}"
             )
             missed |= not good
         if name == "CAR":
-            good = refused(name, folder)
+            good = is_refused(name, folder)
             print(
                 f"{name:6} {'--wait 0.002':45} {'refused' if good else 'taken: MISSED'}"
             )

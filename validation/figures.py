@@ -38,14 +38,14 @@ _VIBRATING: Final = {
 _ABSORBS: Final = 0.05  # least share of the rise of the total energy in a part whose energy is compared
 
 
-def table(name: str) -> NDArray[Any]:
+def read_results(name: str) -> NDArray[Any]:
     """Read a table of results; empty cells are nan."""
     return np.genfromtxt(
         RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
     )
 
 
-def oscillators() -> Figure:
+def draw_oscillators() -> Figure:
     """Residuals that were predicted beside those of the solver, for one and for two modes."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     left_axes, right_axes = figure.subplots(1, 2)
@@ -62,9 +62,9 @@ def oscillators() -> Figure:
         xlabel="tr, td [ms]",
     )
     left_axes.set_title("oscillator: vibration after td, OpenRadioss", fontsize="small")
-    rows = table("chain_scan")
+    rows = read_results("chain_scan")
     right_axes.plot([0, 2.2], [0, 2.2], color=FLIGHT, linewidth=1)
-    single = table("oscillators_scan")
+    single = read_results("oscillators_scan")
     right_axes.plot(
         rows["R_theory"],
         rows["R_sim"],
@@ -84,12 +84,12 @@ def oscillators() -> Figure:
     right_axes.set_title(
         "chain of two springs, and three oscillators", fontsize="small"
     )
-    return _done(figure)
+    return _finish_figure(figure)
 
 
-def rollover() -> Figure:
+def draw_rollover() -> Figure:
     """Roll at td and mean energy after td of the shell box, against tr."""
-    rows = np.sort(table("rollover_scan"), order="tr_s")
+    rows = np.sort(read_results("rollover_scan"), order="tr_s")
     tr = 1e3 * rows["tr_s"]
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     left_axes, right_axes = figure.subplots(1, 2)
@@ -113,12 +113,12 @@ def rollover() -> Figure:
         )
         axes.set_xlabel("tr [ms]")
         axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
-def car() -> Figure:
+def draw_car() -> Figure:
     """Angle at td and mean energy of the car, against tr and against the level."""
-    rows = table("car_runs")
+    rows = read_results("car_runs")
     rows = np.sort(rows[np.char.startswith(rows["run"], "car_a")], order="tr_s")
     tr = 1e3 * rows["tr_s"]
     flying = tr > 38.5
@@ -159,12 +159,12 @@ def car() -> Figure:
         xlabel="E(tr)/E(td)", ylabel="mean energy until the landing, over the reference"
     )
     right_axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
 def drop() -> Figure:
     """How far the contacts of the falling box move, run by run."""
-    rows = table("drop2_runs")
+    rows = read_results("drop2_runs")
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     axes = figure.subplots()
     numbers = np.arange(1, 8)
@@ -181,21 +181,21 @@ def drop() -> Figure:
         )
     axes.set(xlabel="contact", ylabel="contact comes later by [ms]")
     axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
-def absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
+def find_absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
     """Tell which rows of the vibration table are parts that take a fair share of the energy of the landing."""
     total = {row["case"]: row["rise_J"] for row in rows if row["energy"] == "total"}
     shares = rows["rise_J"] / [total[case] for case in rows["case"]]
     return np.asarray((rows["energy"] != "total") & (shares >= _ABSORBS))
 
 
-def vibration() -> Figure:
+def draw_vibration() -> Figure:
     """Residuals by all nodes against the predicted ones, and what differs after the landing against the worth."""
-    rows = table("vibration")
+    rows = read_results("vibration")
     switched = rows[~np.isnan(rows["tr_s"])]
-    absorbing = absorbing_parts(switched)
+    absorbing = find_absorbing_parts(switched)
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     left_axes, right_axes = figure.subplots(1, 2)
     left_axes.plot([0, 2], [0, 2], color=FLIGHT, linewidth=1)
@@ -235,22 +235,22 @@ def vibration() -> Figure:
     right_axes.set_title("dots: all parts, crosses: single parts", fontsize="small")
     left_axes.legend(fontsize="x-small")
     right_axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
 FIGURES: Final[Mapping[str, Callable[[], Figure]]] = {
-    "oscillators": oscillators, "rollover": rollover, "car": car, "drop": drop,
-    "vibration": vibration,
+    "oscillators": draw_oscillators, "rollover": draw_rollover, "car": draw_car, "drop": drop,
+    "vibration": draw_vibration,
 }  # fmt: skip
 
 
-def _done(figure: Figure) -> Figure:
+def _finish_figure(figure: Figure) -> Figure:
     for axes in figure.axes:
-        _grid(axes)
+        _show_grid(axes)
     return figure
 
 
-def _grid(axes: Axes) -> None:
+def _show_grid(axes: Axes) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.set_axisbelow(True)
 

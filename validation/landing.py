@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.histories.opening import Selection, open_run
 from validation.compare import read
-from validation.driven import angle
+from validation.driven import compute_angle
 from validation.nodes import interpolate, read_motion
 
 if TYPE_CHECKING:
@@ -160,5 +160,5 @@ def compare_landings(
         shift=switched.landing - reference.landing,
         impulse=impulses[0] / impulses[1],
         place=float(np.linalg.norm(moved)),
-        turned=angle(reference.places, switched.places),
+        turned=compute_angle(reference.places, switched.places),
     )

@@ -99,11 +99,11 @@ def read_nodes(deck: Path) -> Nodes:
 
 def read_motion(legs: Sequence[Path], nodes: Nodes, start: float, end: float) -> Motion:
     """Read the motion between two times [time] from the time histories of a run."""
-    motions = [_motion_of_leg(leg, nodes, start, end) for leg in sorted(legs)]
+    motions = [_read_motion_of_leg(leg, nodes, start, end) for leg in sorted(legs)]
     return Motion(*(np.concatenate(pieces) for pieces in zip(*motions, strict=True)))
 
 
-def _motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
+def _read_motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
     count = len(nodes.places)
     history = TimeHistory(leg.read_bytes(), str(leg))
     inside = (history.time >= start) & (history.time <= end)
@@ -174,7 +174,7 @@ def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
     return np.asarray(moving - np.cross(spin[:, np.newaxis], arms))
 
 
-def vibration_energy(motion: Motion, nodes: Nodes) -> float:
+def compute_vibration_energy(motion: Motion, nodes: Nodes) -> float:
     """Mean energy of the vibration [energy]: twice its kinetic energy, as far as the times cover whole periods."""
     moving = remove_rigid_motion(motion, nodes)
     return float(np.einsum("n,tnx,tnx->", nodes.masses, moving, moving) / len(moving))

@@ -27,12 +27,12 @@ from tests.command import (
     MATSUM,
     ROLLOVER,
     ROOT,
-    answer,
     put,
     run,
     run as run_command,
+    run_json,
 )
-from tests.energies import sure
+from tests.energies import require
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 TD = "0.0687534"
@@ -90,7 +90,7 @@ def test_the_library_and_the_command_line_say_the_same(
     run = d2.read(file)
     suggestion, verdict = d2.suggest(run, td), d2.verify(run, tr, td, margin=0.01)
     assert_same_document(
-        suggestion.to_dict(), answer("suggest", "--td", repr(td), str(file))
+        suggestion.to_dict(), run_json("suggest", "--td", repr(td), str(file))
     )
     if suggestion.candidates:
         assert_frame_holds(suggestion.to_frame(), suggestion.to_dict()["candidates"])
@@ -102,7 +102,7 @@ def test_the_library_and_the_command_line_say_the_same(
     )
     assert_same_document(
         verdict.to_dict(),
-        answer(
+        run_json(
             "verify", "--tr", repr(tr), "--td", repr(td), "--margin", "0.01", str(file)
         ),
     )
@@ -129,7 +129,7 @@ def test_arguments_mean_what_options_mean(
     suggestion = d2.suggest(d2.read(BOX), td=0.37, replay=False, **arguments)
     assert_same_document(
         suggestion.to_dict(),
-        answer("suggest", "--td", "0.37", "--no-verify", *options, BOX),
+        run_json("suggest", "--td", "0.37", "--no-verify", *options, BOX),
     )
 
 
@@ -157,17 +157,17 @@ def test_a_deck_means_what_it_means_on_the_command_line(
     run, by_deck = d2.read(BOX), {"deck": SAMPLE_DECK, "replay": False, **arguments}
     cost = ("--no-verify", "--deck", str(SAMPLE_DECK), *options, BOX)
     chosen = d2.suggest(run, td=0.37, **by_deck)
-    assert_same_document(chosen.to_dict(), answer("suggest", "--td", "0.37", *cost))
+    assert_same_document(chosen.to_dict(), run_json("suggest", "--td", "0.37", *cost))
     assert_same_document(
         d2.verify(run, 0.1, 0.37, **by_deck).to_dict(),
-        answer("verify", "--tr", "0.1", "--td", "0.37", *cost),
+        run_json("verify", "--tr", "0.1", "--td", "0.37", *cost),
     )
     planned = d2.plan(run, **by_deck)
-    assert_same_document(planned.to_dict(), answer("plan", *cost))
+    assert_same_document(planned.to_dict(), run_json("plan", *cost))
     for suggestion in (
         (chosen, planned) if arguments in ({}, {"parts": "recommended"}) else ()
     ):
-        assert_same_document(suggestion.to_dict(), answer(*suggestion.command))
+        assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
     assert (planned.to_dict()["run_time_share"] is None) == (not arguments)
 
 
@@ -194,7 +194,7 @@ def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_ar
     tmp_path: Path,
 ) -> None:
     calibration = d2.calibrate("sample_data/flying_box")
-    assert calibration.to_dict() == answer(*calibration.command) | {
+    assert calibration.to_dict() == run_json(*calibration.command) | {
         "command": list(calibration.command)
     }
     assert calibration.to_frame()["weight"].tolist() == [
@@ -231,7 +231,7 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
     suggestion = d2.suggest(
         d2.read(ENERGY), td_window=(0.06, 0.07), oscillator=oscillator, v0=6.0
     )
-    assert_same_document(suggestion.to_dict(), answer(*suggestion.command))
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
     assert suggestion.to_dict()["command"] == list(suggestion.command)
 
 
@@ -344,7 +344,7 @@ def test_the_recommended_pair_is_no_better_pair() -> None:
         for arguments in ({"td_window": (0.06, 0.07)}, {"td": 0.064})
     )
     assert chosen.better_pair is None
-    assert sure(bad.better_pair).td == pytest.approx(sure(chosen.recommended).td)
+    assert require(bad.better_pair).td == pytest.approx(require(chosen.recommended).td)
     assert "no-better-td" not in [warning.code for warning in chosen.warnings]
 
 
@@ -352,7 +352,7 @@ def test_an_open_file_is_read() -> None:
     with Path(ENERGY).open("rb") as file:
         assert_same_document(
             d2.suggest(d2.read(file), 0.064).to_dict(),
-            answer("suggest", "--td", "0.064", ENERGY),
+            run_json("suggest", "--td", "0.064", ENERGY),
         )
     with pytest.raises(TypeError, match="opened as text"):
         loose.read(io.StringIO("time,energy\n"))
@@ -365,7 +365,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
     verdict = d2.verify(
-        d2.read(ENERGY), tr=sure(suggestion.recommended).tr, td=float(TD)
+        d2.read(ENERGY), tr=require(suggestion.recommended).tr, td=float(TD)
     )
     assert verdict.plot().axes
     assert '<span class="badge use">use</span>' in verdict.report(
@@ -377,7 +377,7 @@ def test_the_command_of_a_study_runs_whatever_was_asked() -> None:
     study_answer = loose.study(
         [ENERGY], td=0.0687534, tolerance=0.1, cost_share=0.8, step_ratio=2.0
     )
-    assert_same_document(study_answer.to_dict(), answer(*study_answer.command))
+    assert_same_document(study_answer.to_dict(), run_json(*study_answer.command))
 
 
 def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(
@@ -389,7 +389,7 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(
     channels = {"x_momentum": "a7", "z_momentum": "a8"}
     suggestion = d2.suggest(d2.read(tmp_path / "run.csv", channels=channels), td=0.37)
     assert suggestion.flight.source == "momentum"
-    assert_same_document(suggestion.to_dict(), answer(*suggestion.command))
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
     assert (
         suggestion.to_frame()["tr"].tolist()
         == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
@@ -416,7 +416,9 @@ def test_the_format_that_was_named_is_in_the_command_that_repeats_it(
         d2.study([file], td, **reading),
         d2.check(DECK, history=run),
     ):
-        assert_same_document(library_answer.to_dict(), answer(*library_answer.command))
+        assert_same_document(
+            library_answer.to_dict(), run_json(*library_answer.command)
+        )
     assert "--input-format" not in d2.suggest(d2.read(ENERGY), td).command
 
 
@@ -437,7 +439,7 @@ def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:
     suggestion = d2.suggest(
         d2.read(ENERGY), np.float64(TD), margin=np.float64(0.001), tolerance=1
     )
-    assert_same_document(suggestion.to_dict(), answer(*suggestion.command))
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
 
 
 @pytest.mark.parametrize(
@@ -447,7 +449,7 @@ def test_a_check_names_the_command_that_repeats_it(rules: dict[str, Any]) -> Non
     check_report = d2.check(
         DECK, history=d2.read(ENERGY, energy="internal_energy"), **rules
     )
-    assert check_report.to_dict() == answer(*check_report.command) | {
+    assert check_report.to_dict() == run_json(*check_report.command) | {
         "command": list(check_report.command)
     }
     arguments = [
@@ -493,7 +495,7 @@ def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
         assert "\n" not in repr(library_answer)
     assert repr(plan) == f"Plan({plan_sentence(plan)})"
     assert plan_sentence(plan) in plan._repr_html_()
-    assert f"tr = {sure(chosen.recommended).tr:.6g}" in repr(chosen)
+    assert f"tr = {require(chosen.recommended).tr:.6g}" in repr(chosen)
     assert "... and 9 more" in study._repr_html_()
     assert verdict.reasons[0] in verdict._repr_html_().replace("&gt;", ">")
 
@@ -531,7 +533,7 @@ def test_cards_are_those_of_the_command_line() -> None:
     for library_answer in (chosen, plan):
         card, (name, *words) = library_answer.card(**ids), library_answer.command
         assert str(card) == run_command(name, *words[:-1], *options).stdout
-        assert sure(card).verified
+        assert require(card).verified
     times = ["--tr", "0.1", "--td", "0.37", "--part", "box"]
     alone = d2.card([(0.1, 0.37)], run=run, parts="box", margin=0.001)
     assert (

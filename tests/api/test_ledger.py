@@ -133,7 +133,7 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(
 ) -> None:
     name, ledger, row = keep_run_in_ledger(tmp_path)
     whole = Path(ledger).read_bytes()
-    other_file = variants.write(tmp_path / "other.csv", variants.variant(1.01))
+    other_file = variants.write(tmp_path / "other.csv", variants.make_variant(1.01))
     next_row = ask(QUESTION, other_file)
     for cut in range(0, len(whole) - 1, 97):
         Path(ledger).write_bytes(whole + whole[:cut])

@@ -8,13 +8,13 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.choice.cost import Weights
-from tests.command import ENERGY, MATSUM, answer, run
+from tests.command import ENERGY, MATSUM, run, run_json
 from tests.sample_deck import DECK
 
 
 def test_the_same_as_the_command() -> None:
     part_table = d2.parts(d2.read(MATSUM), deck=DECK, td=0.37, replay=False)
-    assert part_table.to_dict() == answer(*part_table.command) | {
+    assert part_table.to_dict() == run_json(*part_table.command) | {
         "command": list(part_table.command)
     }
     assert json.loads(part_table.to_json()) == part_table.to_dict()
@@ -82,7 +82,7 @@ def test_explore_takes_a_deck_as_suggest_does() -> None:
         "replay": False,
     }
     exploration = d2.explore(record, td=0.36, steps=5, **arguments)
-    assert exploration.to_dict() == answer(*exploration.command) | {
+    assert exploration.to_dict() == run_json(*exploration.command) | {
         "command": list(exploration.command)
     }
     chosen = d2.suggest(record, **arguments)
@@ -120,9 +120,12 @@ def test_arguments_mean_what_options_mean(
     arguments: dict[str, Any], options: tuple[str, ...]
 ) -> None:
     planned = d2.plan(d2.read(MATSUM), replay=False, **arguments)
-    theirs = answer("plan", "--no-verify", *options, MATSUM)
+    theirs = run_json("plan", "--no-verify", *options, MATSUM)
     assert {**planned.to_dict(), "command": None} == {**theirs, "command": None}
-    assert {**answer(*planned.command), "command": None} == {**theirs, "command": None}
+    assert {**run_json(*planned.command), "command": None} == {
+        **theirs,
+        "command": None,
+    }
     assert [
         (row["tr"], row["td"])
         for row in theirs["windows"]

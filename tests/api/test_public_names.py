@@ -12,7 +12,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.api.arguments import Choosing
 from tests.command import ENERGY, ROOT
-from tests.examples import PAGES, text_of
+from tests.examples import PAGES, read_page
 
 
 @pytest.mark.parametrize("name", d2.__all__)
@@ -37,7 +37,7 @@ def test_what_the_docs_call_public_is_there_and_every_function_is_in_the_docs() 
     documented_names = {
         name
         for page in PAGES
-        for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", text_of(page))
+        for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", read_page(page))
     }
     assert documented_names <= {*d2.__all__}
     assert {

@@ -25,7 +25,7 @@ from tests.benchmarks.timing import (
     read_output,
 )
 from tests.records import MODE
-from tests.text_files import matsum_text
+from tests.text_files import make_matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -465,7 +465,7 @@ def _write_matsum(parts: int) -> Path:
         swing = np.sin(2 * np.pi * 5 * cycles * time[:, np.newaxis] + phases) ** 2
         energies = sizes * np.exp(-5 * time)[:, np.newaxis] * swing
         energies += 1e-3 * sizes * np.abs(rng.standard_normal(energies.shape))
-        file.write_bytes(matsum_text(time, range(2001, 2001 + parts), energies))
+        file.write_bytes(make_matsum_text(time, range(2001, 2001 + parts), energies))
     return file
 
 

@@ -17,7 +17,7 @@ from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
-from tests.records import printed
+from tests.records import round_as_printed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -174,14 +174,17 @@ CLASSES: Final = {
 def make_history(run: Flown, form: str) -> History:
     """Write a run in one of the `FORMS`."""
     precision = Precision(DIGITS)
-    kinetic, internal = printed(run.kinetic, DIGITS), printed(run.internal, DIGITS)
+    kinetic, internal = (
+        round_as_printed(run.kinetic, DIGITS),
+        round_as_printed(run.internal, DIGITS),
+    )
     momenta: tuple[Momenta, ...] = ()
     if form != "totals":
         values = (
             run.momentum if form == "parts" else run.momentum.sum(axis=1, keepdims=True)
         )
         values = np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)
-        values = printed(values.ravel(), DIGITS).reshape(values.shape)
+        values = round_as_printed(values.ravel(), DIGITS).reshape(values.shape)
         masses = run.masses if form == "parts" else run.masses.sum(keepdims=True)
         history_parts, chosen = (PARTS, (0, 1, 2)) if form == "parts" else (None, (0,))
         momenta = (

@@ -21,11 +21,11 @@ from tests.records import (
     ENERGY,
     MODE,
     TIME,
-    energy_of,
-    level_crossings,
-    printed,
-    replayed_residual,
-    vibration,
+    compute_replayed_residual,
+    find_level_crossings,
+    make_mode,
+    round_as_printed,
+    sum_energies,
 )
 
 if TYPE_CHECKING:
@@ -43,10 +43,10 @@ _NEAR = 1 / 8
 
 def to_scipy() -> float:
     """Time of one identification over time of one such fit: medians of interleaved runs, 6 digits."""
-    energy = printed(ENERGY)
+    energy = round_as_printed(ENERGY)
 
     def residuals(parameters: Samples) -> Samples:
-        return vibration(parameters).energy(TIME) - energy
+        return make_mode(parameters).energy(TIME) - energy
 
     def scipy_fit() -> float:
         return float(least_squares(residuals, _TRUTH).x[0])
@@ -107,7 +107,7 @@ def summarize_records(records: list[Stated]) -> tuple[float, float, float]:
 
 def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | None:
     truth, time, noise = _draw_modes(rng, least_share * 10 ** rng.uniform())
-    energy = energy_of(truth, time)
+    energy = sum_energies(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
     answer = suggest(
@@ -123,7 +123,7 @@ def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | No
     assert best.residual_high is not None
     assert best.tr_low is not None
     assert best.tr_high is not None
-    crossings = level_crossings(truth, td, -0.2)
+    crossings = find_level_crossings(truth, td, -0.2)
     is_crossing_seen = best.kind == "crossing" and bool(
         np.any(np.abs(crossings - best.tr) < _NEAR)
     )
@@ -132,7 +132,7 @@ def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | No
         if is_crossing_seen
         else None
     )
-    true = float(replayed_residual(truth, np.array([best.tr]), td)[0])
+    true = float(compute_replayed_residual(truth, np.array([best.tr]), td)[0])
     return Stated(best.residual, best.residual_high, true, held)
 
 

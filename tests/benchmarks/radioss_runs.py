@@ -26,7 +26,7 @@ from tests.deck.test_solver_listings import (
     write_merge,
     write_run,
 )
-from tests.decks import wide
+from tests.decks import pad
 
 PARTS = (1, 2, 3)
 
@@ -39,14 +39,17 @@ def write_group(chance: random.Random, part: int) -> tuple[int, str]:
     if kind == "PART":
         return part, ""
     if kind in ("NODE", "NODENS"):
-        return number, f"/GRNOD/{kind}/{number}\nnodes\n{wide(*nodes)}"
+        return number, f"/GRNOD/{kind}/{number}\nnodes\n{pad(*nodes)}"
     if kind == "GENE":
-        return number, f"/GRNOD/GENE/{number}\nnodes\n{wide(nodes[0], nodes[-1])}"
-    inner = f"/GRNOD/NODE/{number + 1}\ninner\n{wide(*nodes[:3])}"
-    outer = f"/GRNOD/NODE/{number + 2}\nrest\n{wide(nodes[3])}"
+        return (
+            number,
+            f"/GRNOD/GENE/{number}\nnodes\n{pad(nodes[0], nodes[-1])}",
+        )
+    inner = f"/GRNOD/NODE/{number + 1}\ninner\n{pad(*nodes[:3])}"
+    outer = f"/GRNOD/NODE/{number + 2}\nrest\n{pad(nodes[3])}"
     return (
         number,
-        f"{inner}{outer}/GRNOD/GRNOD/{number}\nboth\n{wide(number + 1, number + 2)}",
+        f"{inner}{outer}/GRNOD/GRNOD/{number}\nboth\n{pad(number + 1, number + 2)}",
     )
 
 
@@ -105,7 +108,7 @@ def draw_run(seed: int) -> Listed:
         group, text = write_group(chance, part)
         sensor = chance.choice([5, 7]) if sensed and part == parts[0] else 0
         starter += text + write_body(number, node, part, sensor).replace(
-            wide(part, 0, 0, 0), wide(group, 0, 0, 0), 1
+            pad(part, 0, 0, 0), pad(group, 0, 0, 0), 1
         )
     if sensed:
         starter += write_sensors(chance)

@@ -31,9 +31,9 @@ from tests.benchmarks.timing import (
     measure_seconds,
     read_output,
 )
-from tests.made_binout import GLSTAT, LsdaWriter, values
-from tests.made_d3plot import END, D3plotWriter, states as made_states
-from tests.text_files import glstat_text, matsum_text
+from tests.made_binout import GLSTAT, LsdaWriter, compute_value
+from tests.made_d3plot import END, D3plotWriter, make_states as made_states
+from tests.text_files import make_glstat_text, make_matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -91,7 +91,8 @@ def suggest_to_first() -> float | None:
     if then is None:
         return None
     file = _write_once(
-        "oscillator", glstat_text(time, (np.exp(-0.1 * time) * np.cos(20 * time)) ** 2)
+        "oscillator",
+        make_glstat_text(time, (np.exp(-0.1 * time) * np.cos(20 * time)) ** 2),
     )
 
     def suggesting(root: Path) -> Callable[[], object]:
@@ -418,7 +419,7 @@ def _write_once(name: str, content: bytes | bytearray) -> Path:
 @cache
 def _write_glstat() -> Path:
     energy = np.random.default_rng(1).normal(size=_STATES)
-    return _write_once("glstat", glstat_text(np.linspace(0, 9, _STATES), energy))
+    return _write_once("glstat", make_glstat_text(np.linspace(0, 9, _STATES), energy))
 
 
 @cache
@@ -426,7 +427,7 @@ def _write_matsum() -> Path:
     ids: Sequence[int] = [10 * part + 1 for part in range(_PARTS)]
     energies = np.random.default_rng(2).normal(size=(_PART_STATES, _PARTS))
     return _write_once(
-        "matsum", matsum_text(np.linspace(0, 1, _PART_STATES), ids, energies)
+        "matsum", make_matsum_text(np.linspace(0, 1, _PART_STATES), ids, energies)
     )
 
 
@@ -471,6 +472,6 @@ def _write_binout() -> Path:
         writer.cd(f"/glstat/d{state:06d}")
         writer.put("cycle", [state], "i4")
         for name in GLSTAT:
-            writer.put(name, [values(name, state)], "f4")
+            writer.put(name, [compute_value(name, state)], "f4")
         writer.table()
     return _write_once("binout", writer.data)

@@ -8,7 +8,7 @@ from d2rpick.choice.question import Settings, read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
-from tests.computed import stored
+from tests.computed import locate_stored
 from tests.energies import suggest_in_window
 
 SAMPLES = {
@@ -56,10 +56,10 @@ def made(name: str) -> History:
 
 
 def answer(
-    name: str, td: float | tuple[float, float], **asked: float | bool
+    name: str, td: float | tuple[float, float], **arguments: float | bool
 ) -> Suggestion:
     """Answer for a sample or a made-up record; a window of td is given by its two ends."""
-    settings = Settings(**asked)  # type: ignore[arg-type]
+    settings = Settings(**arguments)  # type: ignore[arg-type]
     if name in SAMPLES:
         file, selection = SAMPLES[name]
         return suggest_of(
@@ -67,7 +67,7 @@ def answer(
         )
     if name in COMPUTED:
         file, selection = COMPUTED[name]
-        return suggest_of(read([stored(file)], selection), td, settings)
+        return suggest_of(read([locate_stored(file)], selection), td, settings)
     return (
         suggest_in_window(made(name), td, settings)
         if isinstance(td, tuple)
@@ -193,8 +193,11 @@ OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "td", "asked", "old"), OLD)
+@pytest.mark.parametrize(("name", "td", "arguments", "old"), OLD)
 def test_an_old_answer_is_given_again(
-    name: str, td: float | tuple[float, float], asked: dict[str, float | bool], old: str
+    name: str,
+    td: float | tuple[float, float],
+    arguments: dict[str, float | bool],
+    old: str,
 ) -> None:
-    assert digest(answer(name, td, **asked)) == old
+    assert digest(answer(name, td, **arguments)) == old

@@ -10,7 +10,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
-from tests.records import table
+from tests.records import make_table
 
 TIME = np.linspace(0.0, 1.0, 1001)
 
@@ -20,7 +20,7 @@ def make_braked_block(until: float = 1.0) -> History:
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.minimum(TIME, until)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
-    return table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
+    return make_table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
 
 
 def find_warnings(history: History, td: float, **options: float) -> dict[str, str]:
@@ -72,7 +72,7 @@ def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warni
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.maximum(TIME - 0.6, 0)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
-    history = table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
+    history = make_table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
     for td in (0.5, 0.7):
         flight = examine(history, td, Settings(landing=0.8)).flight
         assert flight.end == 0.8
@@ -100,7 +100,7 @@ def test_a_message_advises_nothing_that_was_given() -> None:
     flown = np.full((TIME.size, 1, 3), 0.0)
     flown[:, 0, 0] = 50 * np.minimum(TIME, 0.1)
     whole = Momenta(TIME, flown, None, Precision(7), (0,))
-    history = table(
+    history = make_table(
         TIME,
         5 + 90 * TIME,
         whole,

@@ -16,9 +16,9 @@ from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from tests.command import ROOT, answer, codes, put
-from tests.energies import sure
-from tests.records import table
+from tests.command import ROOT, list_warning_codes, put, run_json
+from tests.energies import require
+from tests.records import make_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,7 +60,7 @@ def drop_momenta(history: History) -> History:
 def test_the_ends_of_a_flight_are_known_to_one_output_interval(
     load: float, landing: float, end: float, td: float
 ) -> None:
-    flight = sure(
+    flight = require(
         find_flight_around(
             td, make_contact((0.0, load)), make_contact((landing, end), name="ground")
         )
@@ -84,7 +84,7 @@ def test_what_always_or_never_acts_says_nothing_of_a_flight() -> None:
     """A tied contact holds parts together; a contact without a force may be that of other parts."""
     tied, idle = make_contact((0.0, 1.0), name="tied"), make_contact(name="idle")
     assert find_flight_around(0.5, tied, idle) is None
-    flight = sure(
+    flight = require(
         find_flight_around(0.5, tied, idle, make_contact((0.0, 0.2), (0.8, 1.0)))
     )
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
@@ -93,7 +93,7 @@ def test_what_always_or_never_acts_says_nothing_of_a_flight() -> None:
 
 def test_files_that_are_written_at_different_times_are_put_together() -> None:
     coarse = np.linspace(0, 0.9, 31)
-    flight = sure(
+    flight = require(
         find_flight_around(
             0.5,
             make_contact((0.0, 0.2)),
@@ -155,14 +155,14 @@ def compute_crash_energy(time: Samples) -> Samples:
 
 
 def make_history_with_forces(energy: Samples, *forces: ContactForce) -> History:
-    return replace(table(TIME, energy), evidence=Given((), None, None, forces))
+    return replace(make_table(TIME, energy), evidence=Given((), None, None, forces))
 
 
 def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
     history = make_history_with_forces(
         compute_crash_energy(TIME), make_contact((0.05, 0.3))
     )
-    flight = sure(find_flight_around(0.5, *history.evidence.forces))
+    flight = require(find_flight_around(0.5, *history.evidence.forces))
     assert is_deformed(history, flight)
     evidence = find_seen_flight(history, 0.5)
     assert evidence.flight is None or evidence.refusal or evidence.flight.start > 0.6
@@ -170,7 +170,7 @@ def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
         1 + 0.2 * np.sin(300 * TIME), make_contact((0.05, 0.3))
     )
     assert not is_deformed(calm, flight)
-    assert sure(find_seen_flight(calm, 0.5).flight).start == pytest.approx(
+    assert require(find_seen_flight(calm, 0.5).flight).start == pytest.approx(
         0.3, abs=1.1 * STEP
     )
 
@@ -180,14 +180,14 @@ def test_before_any_contact_has_ended_forces_alone_show_no_flight() -> None:
     history = make_history_with_forces(
         0.4 + 0.2 * np.sin(300 * TIME), make_contact((0.8, 0.85))
     )
-    assert sure(find_seen_flight(history, 0.6).refusal).startswith(
+    assert require(find_seen_flight(history, 0.6).refusal).startswith(
         "the contact force shows no free flight at td = 0.6"
     )
     work = Balance(TIME, internal=history.energy, external_work=np.zeros_like(TIME))
     forces_alone = replace(
         history, evidence=Given((), work, None, history.evidence.forces)
     )
-    assert sure(find_seen_flight(forces_alone, 0.6).flight).start == 0
+    assert require(find_seen_flight(forces_alone, 0.6).flight).start == 0
 
 
 def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None:
@@ -205,18 +205,18 @@ def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None
     file = put(
         tmp_path / "run.csv", f"time,internal energy,contact force\n{rows}".encode()
     )
-    suggestion = answer("suggest", "--td", "0.6", str(file))
+    suggestion = run_json("suggest", "--td", "0.6", str(file))
     assert suggestion["flight"]["source"] == "contact-force"
     assert suggestion["flight"]["start"] == pytest.approx(0.2, abs=1.1 * STEP)
     assert suggestion["flight"]["end"] == pytest.approx(0.8, abs=1.1 * STEP)
     assert not suggestion["flight"]["certain"]
-    assert "flight-uncertain" in codes(suggestion)
-    listed = answer("info", str(file))["flights"][0]
+    assert "flight-uncertain" in list_warning_codes(suggestion)
+    listed = run_json("info", str(file))["flights"][0]
     assert (listed["source"], listed["start"]) == (
         "contact-force",
         suggestion["flight"]["start"],
     )
-    in_load = answer("suggest", "--td", "0.1", "--exit-zero", str(file))
+    in_load = run_json("suggest", "--td", "0.1", "--exit-zero", str(file))
     assert "the contact force shows no free flight at td = 0.1" in str(
         in_load["warnings"]
     )
@@ -242,13 +242,15 @@ def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
         make_contact((0.1, 0.6), name="with itself"),
     )
     ground_with_contact = ground._replace(impulses=side * ground.impulses)
-    touches = sure(
+    touches = require(
         Touches.of(
             (ground_with_contact, inner), make_pushed_momenta(ground, velocity=velocity)
         )
     )
-    flight = sure(touches.flight_around(0.5))
+    flight = require(touches.flight_around(0.5))
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
     assert flight.end == pytest.approx(0.8, abs=1.1 * STEP)
-    counted = sure(Touches.of((ground_with_contact, inner)))  # of an unknown momentum
+    counted = require(
+        Touches.of((ground_with_contact, inner))
+    )  # of an unknown momentum
     assert counted.flight_around(0.5) is None

@@ -22,15 +22,24 @@ from d2rpick.histories.opening import open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from d2rpick.report.history_files import BOX_WRITERS
-from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run, unwrapped
-from tests.computed import columns, stored
-from tests.energies import sure
-from tests.json_schemas import checked
-from tests.records import table
-from tests.sample_box import t01
+from tests.command import (
+    BOX,
+    ENERGY,
+    ROLLOVER,
+    join_wrapped_lines,
+    list_warning_codes,
+    put,
+    run,
+    run_json,
+)
+from tests.computed import locate_stored, read_columns
+from tests.energies import require
+from tests.json_schemas import run_json_checked
+from tests.records import make_table
+from tests.sample_box import make_t01
 
 MILLISECOND = 1e-3
-CAR, DROP = stored("carT01.gz"), stored("drop2T01.gz")
+CAR, DROP = locate_stored("carT01.gz"), locate_stored("drop2T01.gz")
 
 
 class Rolled(NamedTuple):
@@ -46,7 +55,9 @@ class Rolled(NamedTuple):
         path = self.folder / f"run.{form}"
         if not path.exists():
             path.write_bytes(
-                t01(self.record) if form == "T01" else BOX_WRITERS[form](self.record)
+                make_t01(self.record)
+                if form == "T01"
+                else BOX_WRITERS[form](self.record)
             )
         return str(path)
 
@@ -72,8 +83,8 @@ def rolled(
     return Rolled(
         record,
         tmp_path_factory.mktemp("rolled"),
-        sure(record.released),
-        sure(record.landed),
+        require(record.released),
+        require(record.landed),
     )
 
 
@@ -84,14 +95,14 @@ def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_
 ) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
     arguments = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
-    document = answer(*arguments, str(round(rolled.end - 0.01, 3)))
+    document = run_json(*arguments, str(round(rolled.end - 0.01, 3)))
     flight = document["flight"]
     assert (flight["certain"], flight["source"]) == (True, "momentum")
     assert (flight["start"], flight["end"]) == pytest.approx(
         (rolled.start, rolled.end), abs=MILLISECOND
     )
     assert document["recommended"]["tr"] >= rolled.start - 2e-4
-    assert not codes(document) & {
+    assert not list_warning_codes(document) & {
         "contact-in-window",
         "work-in-window",
         "flight-sources-disagree",
@@ -125,7 +136,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
     velocity_table.to_csv(tmp_path / "run.csv", index=False)
     td = str(round(rolled.end - 0.01, 3))
     flight_dict, expected = (
-        answer("suggest", "--no-verify", "--td", td, *arguments, str(file))["flight"]
+        run_json("suggest", "--no-verify", "--td", td, *arguments, str(file))["flight"]
         for arguments, file in (
             (options, tmp_path / "run.csv"),
             ((), rolled.file("csv")),
@@ -140,16 +151,16 @@ def test_td_after_the_contact_is_refused_by_every_command(
     rolled: Rolled, tmp_path: Path
 ) -> None:
     file, td = rolled.file("glstat"), rolled.end + 0.02
-    judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
+    judged = run_json("verify", "--tr", "0.2", "--td", str(td), file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
-    rows = answer("study", "--td", str(td), file)["runs"]
+    rows = run_json("study", "--td", str(td), file)["runs"]
     assert [row["status"] for row in rows] == ["none"]
     assert "after the end of the flight" in rows[0]["message"]
     deck = put(
         tmp_path / "deck.k",
         run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout,
     )
-    check_report = answer("check", str(deck), "--history", file)
+    check_report = run_json("check", str(deck), "--history", file)
     assert "D2R204" in {finding["rule"] for finding in check_report["findings"]}
 
 
@@ -161,7 +172,9 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
     written = {
         name: getattr(whole.balance, name) for name in ("sliding", "external_work")
     }
-    history = table(whole.time, whole.energy, balance=Balance(whole.time, **written))
+    history = make_table(
+        whole.time, whole.energy, balance=Balance(whole.time, **written)
+    )
     flight = examine(history, rolled.end - 0.01, Settings()).flight
     assert flight.source == "contact-energy"
     assert (flight.start, flight.end) == pytest.approx(
@@ -179,17 +192,17 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
         name: getattr(whole.balance, name)[::2]
         for name in ("internal", "kinetic", "external_work")
     }
-    history = table(
+    history = make_table(
         time,
         energy,
-        balance=Balance(time, **written, precision=sure(whole.balance).precision),
+        balance=Balance(time, **written, precision=require(whole.balance).precision),
     )
     flight = examine(
         history, (rolled.start + rolled.end) / 2, Settings(replay=False)
     ).flight
     assert flight.source == "energy-balance"
     # damping bends the parabola of the work of gravity: less than the flight is found then, never more
-    start, end = sure(flight.start), sure(flight.end)
+    start, end = require(flight.start), require(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
     assert find_seen_flight(history, rolled.end + 0.02).refusal
 
@@ -198,7 +211,7 @@ def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
     rolled: Rolled,
 ) -> None:
     whole = read_history_of_parts(rolled.file("csv"))
-    history = table(whole.time, whole.energy)
+    history = make_table(whole.time, whole.energy)
     td = rolled.end - 0.01
     suggestion = suggest(history, td, Settings(replay=False))
     if suggestion.recommended:
@@ -245,7 +258,7 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
     history = read_history_of_parts(CAR)
     assert (
         0.0385
-        <= sure(examine(history, 0.146, Settings(replay=False)).flight.start)
+        <= require(examine(history, 0.146, Settings(replay=False)).flight.start)
         <= 0.0390
     )
 
@@ -254,31 +267,31 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     history = read_history_of_parts(DROP)
     suggestion = suggest(history, 0.2838, Settings())
-    assert (sure(suggestion.recommended).tr, suggestion.candidates[0].kind) == (
+    assert (require(suggestion.recommended).tr, suggestion.candidates[0].kind) == (
         0.0,
         "start",
     )
     assert "at-rest" in {caution.code for caution in suggestion.cautions}
-    assert sure(suggestion.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
+    assert require(suggestion.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
     assert all(verify_at(suggestion.situation, tr).verified for tr in (0.0, 0.1, 0.28))
-    alone = suggest(table(history.time, history.energy), 0.2838, Settings())
-    assert sure(alone.recommended).tr == 0.0
+    alone = suggest(make_table(history.time, history.energy), 0.2838, Settings())
+    assert require(alone.recommended).tr == 0.0
 
 
 @pytest.mark.parametrize(
     ("source", "energy", "start", "end"),
     [
         (ROLLOVER, "boxIE_J", 0.0908, 0.3819),
-        (stored("load_L1_ref.csv.gz"), "IE_J", 0.0200, 0.1),
-        (stored("load_L3_ref.csv.gz"), "IE_J", 0.0235, 0.1),
+        (locate_stored("load_L1_ref.csv.gz"), "IE_J", 0.0200, 0.1),
+        (locate_stored("load_L3_ref.csv.gz"), "IE_J", 0.0235, 0.1),
     ],
 )
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.9, 0.97])
 def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     source: str, energy: str, start: float, end: float, share: float
 ) -> None:
-    time, values = columns(source, energy)
-    quiet = find_quiet_time(table(time, values), start + share * (end - start))
+    time, values = read_columns(source, energy)
+    quiet = find_quiet_time(make_table(time, values), start + share * (end - start))
     assert quiet is None or quiet.start >= start
 
 
@@ -288,7 +301,7 @@ def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(
     part: str, share: float
 ) -> None:
     whole = read_history_of_parts(DROP, part)
-    history = table(whole.time, whole.energy)
+    history = make_table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
         quiet = find_quiet_time(history, start + share * (end - start))
         assert quiet is None or quiet.start >= start
@@ -301,7 +314,9 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
         -(((time - 0.8) / 0.01) ** 2)
     )  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = sure(find_quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
+    quiet = require(
+        find_quiet_time(make_table(time, np.where(time < 0.1, 0, energy)), 0.95)
+    )
     assert quiet.start > 0.81
 
 
@@ -317,7 +332,7 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
         balance = Balance(
             time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0)
         )
-        history = table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
+        history = make_table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
         assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
 
 
@@ -368,7 +383,7 @@ ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
     assert "(energy alone, not certain)" in run("suggest", *ALONE).stdout
-    suggestion = answer("suggest", *ALONE)
+    suggestion = run_json("suggest", *ALONE)
     assert (suggestion["flight"]["source"], suggestion["flight"]["certain"]) == (
         "energy",
         False,
@@ -378,7 +393,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     assert judged.startswith("use with care")
     assert (
         "how the deformations at tr and td lie to each other is unknown"
-        in unwrapped(judged)
+        in join_wrapped_lines(judged)
     )
     assert [
         run(*arguments, "--strict").exit_code
@@ -395,7 +410,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (
     None
 ):
-    suggestion = checked("suggest", *ALONE)
+    suggestion = run_json_checked("suggest", *ALONE)
     windows = suggestion["acceptable_windows"]
     (recommended_window,) = (window for window in windows if window["recommended"])
     assert (
@@ -413,12 +428,12 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
             (window["start"] + window["end"]) / 2,
             window["end"],
         ):
-            assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
+            assert run_json("verify", "--tr", repr(tr), *ALONE)["verified"]
     assert (
         f"{recommended_window['start']:.6g} to {recommended_window['end']:.6g}"
         in run("suggest", *ALONE).stdout
     )
-    assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
+    assert run_json("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
 
 
 @pytest.mark.slow

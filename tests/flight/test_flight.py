@@ -17,9 +17,9 @@ from d2rpick.histories.history import History
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Span, find_described_span
 from tests import paper
-from tests.computed import columns, stored
-from tests.energies import sure
-from tests.records import noisy, table
+from tests.computed import locate_stored, read_columns
+from tests.energies import require
+from tests.records import add_noise, make_table
 
 PERIOD = 2 * np.pi / paper.OMEGA_2
 
@@ -49,7 +49,7 @@ def integrate_oscillator(
         atol=1e-13,
         max_step=5e-4,
     )
-    return table(time, 330e3 * (solution.y[1] - solution.y[0]) ** 2)
+    return make_table(time, 330e3 * (solution.y[1] - solution.y[0]) ** 2)
 
 
 @cache
@@ -69,7 +69,7 @@ def push_with_noise(
 ) -> History:
     """The same, with white noise."""
     history = push_oscillator(alpha, contact)
-    return table(history.time, noisy(history.energy, noise, seed))
+    return make_table(history.time, add_noise(history.energy, noise, seed))
 
 
 def begins_after_load(flight: Flight) -> bool:
@@ -112,9 +112,9 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> (
     None
 ):
-    span, fit = find_described_span(paper.history(), paper.TD, Span(0.0, 0.15))
+    span, fit = find_described_span(paper.make_history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
-    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(
+    assert examine(paper.make_history(), paper.TD, Settings()).flight == Flight(
         0.0, None, "oscillator", described=True
     )
     assert fit.mode is not None
@@ -127,7 +127,9 @@ def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown
 @pytest.mark.parametrize("td", [0.064, 0.08])
 def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) -> None:
     flight = examine(
-        table(*columns(stored(f"{name}.csv.gz"), "IE_J")), td, Settings()
+        make_table(*read_columns(locate_stored(f"{name}.csv.gz"), "IE_J")),
+        td,
+        Settings(),
     ).flight
     assert flight.source == "oscillator"
     assert flight.start == pytest.approx(end_of_load + PERIOD / 4, abs=PERIOD / 10)
@@ -135,7 +137,7 @@ def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) ->
 
 def test_an_energy_that_never_was_above_its_band_shows_no_end_of_a_load() -> None:
     time = np.linspace(0, 1, 101)
-    assert find_end_of_load(table(time, time**2), 0.8) is None
+    assert find_end_of_load(make_table(time, time**2), 0.8) is None
 
 
 def test_a_start_that_is_given_replaces_the_start_only() -> None:
@@ -150,7 +152,9 @@ def test_a_start_that_is_given_replaces_the_start_only() -> None:
 def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     situation = examine(push_with_noise(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
-    assert sure(situation.evidence.span).start == pytest.approx(0.020, abs=PERIOD / 10)
+    assert require(situation.evidence.span).start == pytest.approx(
+        0.020, abs=PERIOD / 10
+    )
     assert situation.vibration.whole.energy(0.01) == pytest.approx(
         push_with_noise().energy_at(0.01)
     )
@@ -181,8 +185,8 @@ def test_where_no_oscillator_tells_the_sign_it_is_said_why(
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
     situation = examine(push_with_noise(), 0.064, Settings(fit_window=(0.03, 0.12)))
     assert (
-        sure(situation.evidence.fit).start,
-        sure(situation.evidence.fit).end,
+        require(situation.evidence.fit).start,
+        require(situation.evidence.fit).end,
     ) == pytest.approx((0.03, 0.12))
     assert situation.flight.start == pytest.approx(0.020 + PERIOD / 4, abs=PERIOD / 10)
 
@@ -238,20 +242,20 @@ def test_a_rising_energy_shows_no_end_of_a_load() -> None:
         + 0.1 * np.sin(300 * time) ** 2
         + np.where(time > 0.9, time - 0.9, 0) * 9
     )
-    fed = table(time, energy)
+    fed = make_table(time, energy)
     assert find_end_of_load(fed, 0.96) is None
     assert find_end_of_load(fed, 0.85) == pytest.approx(0.13, abs=0.05)
 
 
 @pytest.mark.slow
 def test_a_small_second_mode_makes_no_short_flights() -> None:
-    mode, time = to_mode(paper.OSCILLATOR, 6.0), paper.history().time
+    mode, time = to_mode(paper.OSCILLATOR, 6.0), paper.make_history().time
     energy = (
         mode.energy(time)
         + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2
     )
     for td in np.linspace(0.03, 0.12, 10).tolist():
-        span = examine(table(time, energy), td, Settings()).evidence.span
+        span = examine(make_table(time, energy), td, Settings()).evidence.span
         assert span is None or span.end - span.start > 1.25 * PERIOD
 
 
@@ -267,7 +271,9 @@ def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
     )
     energy = np.where(time < 0.15, free, push_twice().energy)
     situation = examine(
-        table(time, energy), 0.064, Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0))
+        make_table(time, energy),
+        0.064,
+        Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0)),
     )
     assert situation.basis == "oscillator"
     assert situation.flight.start == 0.0
@@ -277,16 +283,19 @@ def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
 def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_has_not() -> (
     None
 ):
-    record = paper.history()
-    answer = suggest(table(record.time, noisy(record.energy, 0.01, 3)), 0.1, Settings())
+    record = paper.make_history()
+    answer = suggest(
+        make_table(record.time, add_noise(record.energy, 0.01, 3)), 0.1, Settings()
+    )
     assert answer.recommended is None
     assert (
         float(
             min(
-                abs(sure(answer.better_pair).td - peak / 1e3) for peak, _ in paper.PEAKS
+                abs(require(answer.better_pair).td - peak / 1e3)
+                for peak, _ in paper.PEAKS
             )
         )
         < 1e-4
     )
     # in noise of 1 % a peak is not exact: the middle of what the noise leaves
-    assert 0 < sure(sure(answer.better_pair).residual) < 1e-3
+    assert 0 < require(require(answer.better_pair).residual) < 1e-3

@@ -29,8 +29,8 @@ from d2rpick.histories.history import (
 from d2rpick.histories.names import Part
 from d2rpick.histories.samples import integrate_by_trapezia
 from tests.benchmarks import falls, flights as campaign
-from tests.energies import sure
-from tests.records import printed, table
+from tests.energies import require
+from tests.records import make_table, round_as_printed
 from tests.written_runs import FALL_WRITERS
 
 PLAIN = Settings(replay=False)
@@ -58,7 +58,7 @@ def make_momenta(
 
 def make_energy_table(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
     """A table of energies."""
-    return table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
+    return make_table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -93,7 +93,7 @@ def test_the_flight_behind_a_load_that_fades_is_found(
     impulse = np.concatenate(
         [[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)]
     )
-    flight = sure(
+    flight = require(
         find_flight_around(make_momenta(impulse - 10.0 * gravity * TIME), 0.9)
     )
     start = int(np.searchsorted(TIME, flight.start))
@@ -136,7 +136,7 @@ def make_momenta_in_plane(along_x: Samples, along_z: Samples) -> Momenta:
     """Momentum of one body of mass 10 in a plane, with seven digits."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = along_x, along_z
-    values = printed(values.ravel(), 7).reshape(values.shape)
+    values = round_as_printed(values.ravel(), 7).reshape(values.shape)
     return Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
 
 
@@ -145,7 +145,7 @@ def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
     gravity: float,
 ) -> None:
     impulse = integrate_force(5e3 * (1 + TIME / 0.1) ** -3.1)
-    flight = sure(
+    flight = require(
         find_flight_around(
             make_momenta_in_plane(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME),
             0.95,
@@ -161,7 +161,7 @@ def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
     body = make_momenta_in_plane(
         0.8 * integrate_force(push), 0.6 * integrate_force(push) - 98.1 * TIME
     )
-    flight = sure(find_flight_around(body, 0.9))
+    flight = require(find_flight_around(body, 0.9))
     assert flight.start == pytest.approx(0.6, abs=0.02)
     assert not [
         td for td in np.linspace(0.02, 0.58, 29) if find_flight_around(body, td)
@@ -218,9 +218,9 @@ def make_accelerated_model(acceleration: float) -> History:
     """Velocity and energies of a model of 10 that is accelerated, in a glstat with six digits."""
     velocity = np.zeros((TIME.size, 1, 3))
     velocity[:, 0, 0] = 30 + acceleration * TIME
-    velocity = printed(velocity.ravel()).reshape(velocity.shape)
+    velocity = round_as_printed(velocity.ravel()).reshape(velocity.shape)
     ringing = 10 * np.sin(90 * TIME) ** 2
-    kinetic = printed(5 * (30 + acceleration * TIME) ** 2 + 10 - ringing)
+    kinetic = round_as_printed(5 * (30 + acceleration * TIME) ** 2 + 10 - ringing)
     energies = Balance(
         TIME, ringing, kinetic, velocity=velocity[:, 0], precision=Precision(6)
     )
@@ -233,7 +233,7 @@ def make_accelerated_model(acceleration: float) -> History:
         masses=np.array([np.nan]),
         velocity=True,
     )
-    return table(TIME, ringing, whole, balance=energies)
+    return make_table(TIME, ringing, whole, balance=energies)
 
 
 def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
@@ -243,9 +243,9 @@ def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
     )
     whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
     answer = suggest(
-        table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings()
+        make_table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings()
     )
-    assert sure(answer.quality).grade == "poor"
+    assert require(answer.quality).grade == "poor"
     assert "gravity-assumed" in {caution.code for caution in answer.cautions}
 
 
@@ -254,7 +254,7 @@ def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
     both_bodies = make_momenta(carried, falling, masses=(10.0, 40.0))
     assert find_flight_around(both_bodies.choosing((0,)), 0.6) is None
-    flight = sure(find_flight_around(both_bodies.choosing((1,)), 0.6))
+    flight = require(find_flight_around(both_bodies.choosing((1,)), 0.6))
     assert flight.gravity == pytest.approx(9.81, rel=1e-3)
 
 
@@ -270,7 +270,7 @@ def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
     hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
     body = make_momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
     assert find_bodies_apart(body, (0, 1)) == (0, 1)
-    flight = sure(find_flight_around(body, 0.7))
+    flight = require(find_flight_around(body, 0.7))
     assert flight.start == pytest.approx(0.4, abs=0.01)
     assert find_flight_around(body, 0.35) is None
 
@@ -303,7 +303,7 @@ def test_a_spring_to_ground_does_not_fly(spring_share: float) -> None:
     history = make_energy_table(
         internal, 100 - internal + spring_share - 10 * np.maximum(0.05 - TIME, 0)
     )
-    balance = sure(history.balance)
+    balance = require(history.balance)
     assert has_whole_motion(balance, 0.1, 1.0) is (spring_share > 0)
     assert bool(flights_of(history, PLAIN)) is (spring_share > 0)
 
@@ -387,8 +387,8 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
     internal: Samples, kinetic: Samples
 ) -> None:
     suggestion = suggest(make_energy_table(internal, kinetic), 0.8, PLAIN)
-    assert sure(suggestion.quality).grade == "poor"
-    assert "by gravity or by another load" in sure(suggestion.decision).reason
+    assert require(suggestion.quality).grade == "poor"
+    assert "by gravity or by another load" in require(suggestion.decision).reason
     assert suggestion.situation.flight.unknown_load
 
 
@@ -399,11 +399,11 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     values[0] = 0.0
     energies = Balance(TIME, 8e3 * wound, np.full(TIME.size, 3.75))
     whole = Momenta(TIME, values, None, Precision(7), (0,))
-    assert not flights_of(table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
+    assert not flights_of(make_table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
     stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
-    (flight,) = flights_of(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
-    assert sure(flight.start) == pytest.approx(
+    (flight,) = flights_of(make_table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
+    assert require(flight.start) == pytest.approx(
         0.4, abs=0.02
     )  # two bodies have hit each other
 
@@ -461,7 +461,7 @@ def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
 
 def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
     ringing = 2 + np.sin(300 * TIME) ** 2
-    history = table(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0))
+    history = make_table(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0))
     for td in (0.5, 0.8):
         flight = examine(history, td, Settings(after=0.1, replay=False)).flight
         assert flight.end == pytest.approx(0.6, abs=0.01)
@@ -475,7 +475,7 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
     two_bodies = make_momenta(
         np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5
     )
-    history = table(TIME, 1 + np.sin(300 * TIME) ** 2, two_bodies)
+    history = make_table(TIME, 1 + np.sin(300 * TIME) ** 2, two_bodies)
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal
@@ -498,7 +498,11 @@ def make_falling_damped_body(
     values[:, 0, 0], values[:, 0, 2] = np.sqrt(2 * 20 * pushed), -20 * 9.81 * since
     kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + remaining_pull * (1 - swing)
     momentum = Momenta(
-        TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,)
+        TIME,
+        round_as_printed(values.ravel(), 7).reshape(values.shape),
+        None,
+        Precision(7),
+        (0,),
     )
     written = {
         "internal": internal,
@@ -506,13 +510,13 @@ def make_falling_damped_body(
         "damping": vibration - remaining_pull,
     }
     columns = {
-        name: printed(column, 7)
+        name: round_as_printed(column, 7)
         for name, column in written.items()
         if name not in left_out
     }
     mass = np.array([np.nan if "kinetic" in left_out else 20.0])
     energies = replace(Balance(TIME, precision=Precision(7)), **columns)  # type: ignore[arg-type]
-    return table(
+    return make_table(
         TIME, columns["internal"], replace(momentum, masses=mass), balance=energies
     )
 
@@ -562,10 +566,10 @@ def make_body_deformed_in_flight(load_start: float, *left_out: str) -> History:
     balance = history.balance
     if balance is None or balance.kinetic is None:
         return history
-    kinetic = printed(balance.kinetic + 30 - done, 7)
+    kinetic = round_as_printed(balance.kinetic + 30 - done, 7)
     (momentum,) = history.momenta
     balance = replace(balance, kinetic=kinetic)
-    return table(TIME, history.energy, momentum, balance=balance)
+    return make_table(TIME, history.energy, momentum, balance=balance)
 
 
 @pytest.mark.parametrize("left_out", [(), ("damping",), ("kinetic", "damping")])

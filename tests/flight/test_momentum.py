@@ -28,11 +28,11 @@ from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Run, Selection, open_run
-from tests.command import BOX, ENERGY, GLSTAT, answer, refused, run
-from tests.computed import stored
-from tests.energies import sure
-from tests.reading import read, solved
-from tests.records import printed
+from tests.command import BOX, ENERGY, GLSTAT, read_refusal, run, run_json
+from tests.computed import locate_stored
+from tests.energies import require
+from tests.reading import read, read_solved
+from tests.records import round_as_printed
 from tests.written_runs import Written, as_momenta, as_momenta_alone, as_t01
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
@@ -114,7 +114,7 @@ def make_momenta_in_flight(
         driven[:, 0, 0] = sled * np.maximum(0, 1 - time / 0.08)
         p = np.concatenate([p, driven], axis=1)
     if digits < EXACT.digits:
-        p = printed(p.ravel(), digits).reshape(p.shape)
+        p = round_as_printed(p.ravel(), digits).reshape(p.shape)
     masses = np.array([*MASSES, 50.0])[: p.shape[1]]
     return Momenta(
         time, p, PARTS[: p.shape[1]], Precision(digits), chosen=(0,), masses=masses
@@ -160,7 +160,9 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
     turns = np.arange(1, waves + 1) * random.uniform(0.7, 1, waves)
     phases = 2 * np.pi * np.outer(time, turns) + random.uniform(0, 2 * np.pi, waves)
     values = np.zeros((1000, 1, 3))
-    values[:, 0, 0] = printed(np.sin(phases) @ random.normal(size=waves), digits)
+    values[:, 0, 0] = round_as_printed(
+        np.sin(phases) @ random.normal(size=waves), digits
+    )
     return Momenta(time, values, None, Precision(digits), chosen=(0,))
 
 
@@ -202,7 +204,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     momenta = make_momenta_in_flight(
         list_trip_pieces(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
     )  # fmt: skip
-    flight = sure(find_flight_around(momenta, td))
+    flight = require(find_flight_around(momenta, td))
     assert flight.parts == PARTS[:2]
     # In these times the forces change the momentum by two thousandths of its range.
     load, contact = 5e-3 * start, 5e-4
@@ -256,7 +258,7 @@ def test_the_set_that_flies_together_can_be_named() -> None:
     momenta_of_set = replace(
         make_momenta_in_flight(list_trip_pieces(), sled=1e3), flying=(0, 1)
     )
-    flight = sure(find_flight_around(momenta_of_set, TD))
+    flight = require(find_flight_around(momenta_of_set, TD))
     assert flight.parts == PARTS[:2]
     assert find_flight_around(replace(momenta_of_set, flying=(0,)), TD) is None
     assert (
@@ -275,7 +277,7 @@ def test_attached_parts_are_found_among_many() -> None:
     )
     parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
-    flight = sure(
+    flight = require(
         find_flight_around(
             Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD
         )
@@ -314,7 +316,7 @@ def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> Non
         for earlier_flight, next_one in pairwise(flights)
     )
     for flight in flights:
-        around = sure(find_flight_around(momenta, (flight.start + flight.end) / 2))
+        around = require(find_flight_around(momenta, (flight.start + flight.end) / 2))
         assert (around.start, around.end) == pytest.approx(
             (flight.start, flight.end), abs=1e-3
         )
@@ -364,7 +366,7 @@ def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
     )
     momenta = Momenta(
         light.time,
-        printed(braked.ravel(), 5).reshape(braked.shape),
+        round_as_printed(braked.ravel(), 5).reshape(braked.shape),
         PARTS[:1],
         Precision(5),
         (0,),
@@ -415,8 +417,13 @@ def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
 
 
 def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
-    suggestion = answer(
-        "suggest", "--td", "0.238", "--part", "1-2", stored("chain_referenceT01.gz")
+    suggestion = run_json(
+        "suggest",
+        "--td",
+        "0.238",
+        "--part",
+        "1-2",
+        locate_stored("chain_referenceT01.gz"),
     )
     assert suggestion["flight"] == {
         "start": 0.0,
@@ -431,10 +438,12 @@ def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> No
 def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
     run: str, start: float
 ) -> None:
-    table = np.genfromtxt(stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True)
+    table = np.genfromtxt(
+        locate_stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True
+    )
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
-    flight = sure(
+    flight = require(
         find_flight_around(
             Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1
         )
@@ -456,19 +465,19 @@ def list_titles(run_with_momenta: Run, *, flying: bool) -> set[str]:
 
 def test_the_box_and_the_step_on_it_fly_and_the_sled_does_not() -> None:
     assert list_titles(read([BOX]).run, flying=True) == {"box", "step"}
-    suggestion = answer("suggest", "--part", "flying", "--td", "0.37", BOX)
+    suggestion = run_json("suggest", "--part", "flying", "--td", "0.37", BOX)
     assert (
         suggestion["history"]["parts"]
-        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
+        == run_json("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
     )
     assert (
         suggestion["recommended"]
-        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
+        == run_json("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
     )
 
 
 def test_all_parts_of_the_car_fly_but_the_ground() -> None:
-    car = solved("carT01.gz").run
+    car = read_solved("carT01.gz").run
     everything = list_titles(car, flying=False)
     assert "ground" not in everything
     assert len(everything) == 17
@@ -485,7 +494,7 @@ def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
 @pytest.mark.parametrize("word", ["flying", "all"])
 def test_files_without_parts_say_so(word: str) -> None:
     for name in (ENERGY, GLSTAT):
-        assert "parts" in refused("suggest", "--part", word, "--td", "0.06", name)
+        assert "parts" in read_refusal("suggest", "--part", word, "--td", "0.06", name)
 
 
 def test_a_table_has_no_parts_that_could_fly() -> None:

@@ -21,9 +21,9 @@ from d2rpick.flight.position_error import (
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, History, Momenta, Samples
 from d2rpick.histories.names import Part
-from tests.computed import results
-from tests.energies import sure
-from tests.reading import solved
+from tests.computed import locate_results
+from tests.energies import require
+from tests.reading import read_solved
 
 TIME = np.linspace(0.0, 0.1, 401)
 FLIGHT = (0.0, 0.1)
@@ -78,7 +78,7 @@ def make_slides(path: Samples, part: int = ENGINE) -> Samples:
 
 
 def find_drift_of_body(momenta_of_body: Momenta, masses: Samples = MASSES) -> Drift:
-    return sure(
+    return require(
         find_drift(Flying(momenta_of_body, masses, range(masses.size), *FLIGHT))
     )
 
@@ -136,7 +136,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 
 def test_beyond_the_flight_nothing_is_known() -> None:
-    drift_found = sure(
+    drift_found = require(
         find_drift(
             Flying(
                 make_momenta(np.zeros(3), make_slides(np.ones(3) / 100)),
@@ -213,12 +213,12 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
 @cache
 def read_computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
     """By the momenta of a run that a solver computed."""
-    history = solved(name, parts).history
-    return sure(
+    history = read_solved(name, parts).history
+    return require(
         find_drift(
             Flying(
                 history.momenta[0],
-                sure(history.masses),
+                require(history.masses),
                 history.momenta[0].chosen,
                 *flight,
             )
@@ -238,7 +238,7 @@ def compute_errors(
 @pytest.mark.slow
 def test_the_car_is_as_far_off_as_computed() -> None:
     """All switched runs in flight: centre of twelve nodes of the body, within 30 % or 1 mm, seen over 1 to 7.5 mm."""
-    with results("car_runs.csv").open() as table:
+    with locate_results("car_runs.csv").open() as table:
         rows = [
             scan_row
             for scan_row in csv.DictReader(table)
@@ -304,9 +304,9 @@ def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:
 def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> (
     None
 ):
-    history = solved("carT01.gz", "1-17").history
+    history = read_solved("carT01.gz", "1-17").history
     flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
-    drift_found = sure(find_drift_in_flight(history, flight))
+    drift_found = require(find_drift_in_flight(history, flight))
     assert drift_found.part.title == "engine"
     assert drift_found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(
         2.2e-3, abs=1e-3
@@ -344,7 +344,7 @@ def test_the_largest_error_counts_with_its_part_and_its_body(
     )
     errors = [rate * (0.95 - tr) for rate in rates]
     assert largest.errors(np.array([tr]), 0.95)[0] == pytest.approx(max(errors))
-    worst = sure(largest.worst(tr, 0.95))
+    worst = require(largest.worst(tr, 0.95))
     assert worst.error == pytest.approx(max(errors))
     assert not worst.assumed
     if worst.error:
@@ -371,7 +371,7 @@ def test_one_body_that_is_not_known_leaves_all_open() -> None:
 
 
 def test_without_a_deck_one_body_is_assumed() -> None:
-    worst = sure(Bodies([make_moving_body(1, 1.0)], None).worst(0.1, 0.9))
+    worst = require(Bodies([make_moving_body(1, 1.0)], None).worst(0.1, 0.9))
     assert (worst.assumed, worst.body) == (True, None)
 
 
@@ -392,13 +392,13 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 
 @cache
 def read_car(parts: str) -> tuple[History, Flight]:
-    history = solved("carT01.gz", parts).history
+    history = read_solved("carT01.gz", parts).history
     return history, find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
     """Six bodies: the solver found the car 0.16 mm off; taken for one body it would be 1.8 mm."""
-    with results("car_runs.csv").open() as table:
+    with locate_results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])
     alone = find_bodies_in_flight(
@@ -421,7 +421,7 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     alone = find_bodies_in_flight(*read_car("1-11,13"), make_rigid_bodies(frame))
     tr = np.array([0.04, 0.0496, 0.09])
     np.testing.assert_allclose(all_bodies.errors(tr, 0.1464), alone.errors(tr, 0.1464))
-    worst = sure(all_bodies.worst(0.0496, 0.1464))
+    worst = require(all_bodies.worst(0.0496, 0.1464))
     assert worst.body == RigidBody(frame)
     assert worst.error < 1e-3  # without engine and wheels; with them 2.2 mm
 

@@ -20,10 +20,10 @@ from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from tests.command import put
-from tests.computed import results, starter
-from tests.energies import sure
+from tests.computed import locate_results, read_starter
+from tests.energies import require
 from tests.flight.test_position_error import ENGINE, MASSES, PLACES, TIME, vectors
-from tests.reading import solved
+from tests.reading import read_solved
 
 SPREAD = np.diag([0.10, 0.06, 0.03])  # second moments of each part over its mass [m2]
 LOOKED_AT = np.array([0.2, 0.1, 1.2])
@@ -159,12 +159,12 @@ def make_body_with_sliding_engine() -> Samples:
 
 
 def test_without_a_deck_the_angle_is_not_known() -> None:
-    drift_found = sure(find_drift_and_turn(make_body_with_sliding_engine(), None))
+    drift_found = require(find_drift_and_turn(make_body_with_sliding_engine(), None))
     assert np.isnan(drift_found.angles(TIME[80:120], 0.09)).all()
 
 
 def test_beyond_the_flight_no_angle_is_known() -> None:
-    drift_found = sure(
+    drift_found = require(
         find_drift_and_turn(make_body_with_sliding_engine(), make_placement())
     )
     assert np.isnan(drift_found.angles(np.array([0.005, 0.05]), 0.09)).tolist() == [
@@ -181,7 +181,7 @@ def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -
     )
     without.parts.pop(2)  # type: ignore[attr-defined]
     assert [
-        sure(find_drift_and_turn(make_body_with_sliding_engine(), deck)).turning
+        require(find_drift_and_turn(make_body_with_sliding_engine(), deck)).turning
         for deck in (moved_placement, without)
     ] == [
         None,
@@ -198,7 +198,7 @@ def test_what_flies_with_a_body_holds_it() -> None:
         inside - np.einsum("p,npi->ni", MASSES / MASSES.sum(), inside)[:, np.newaxis]
     )
     where += np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
-    without = sure(find_drift_and_turn(where, None, members=(0, 1, 2, 4)))
+    without = require(find_drift_and_turn(where, None, members=(0, 1, 2, 4)))
     expected = MASSES[ENGINE] / MASSES.sum() * 0.5 * 0.03
     assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(
         expected, rel=1e-3
@@ -216,7 +216,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
     where[:, :ENGINE, 2] += bends * np.outer(
         np.sin(40.0 * TIME), [1.0, -1.0, 1.0, -1.0]
     )  # it is twisted
-    drift_found = sure(find_drift_and_turn(where, make_placement()))
+    drift_found = require(find_drift_and_turn(where, make_placement()))
     assert drift_found.at_least is bound
 
 
@@ -225,9 +225,9 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
     tmp_path: Path,
 ) -> None:
     """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
-    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
     where = Placement(read_inventory(str(deck)))
-    with results("car_runs.csv").open() as table:
+    with locate_results("car_runs.csv").open() as table:
         rows = [
             row
             for row in csv.DictReader(table)
@@ -261,6 +261,6 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
 
 @cache
 def find_drift_of_car(parts: tuple[str, ...], where: Placement) -> Drift:
-    history = solved("carT01.gz", *parts).history
+    history = read_solved("carT01.gz", *parts).history
     flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
-    return sure(find_drift_in_flight(history, flight, None, where))
+    return require(find_drift_in_flight(history, flight, None, where))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.made_t01 import MadePart, headed
+from tests.made_t01 import MadePart, write_head
 
 PUSHES = (
     (0.0, 0.03),
@@ -73,7 +73,7 @@ def run_engine(deck: Path) -> None:
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
     step = int(begins)
-    history_head = headed(
+    history_head = write_head(
         [MadePart(1, "strip of shells", CODES)], globals_=len(CODES) + 1
     )
     if fault == "hang" and number == 2:

@@ -34,16 +34,16 @@ from d2rpick.running.sequence import (
     find_window,
     windows,
 )
-from tests.command import ROOT, put, refused, run
+from tests.command import ROOT, put, read_refusal, run
 from tests.deck.test_openradioss import ENGINE, write_starter
-from tests.decks import wide
+from tests.decks import pad
 
 FAKE = Path(__file__).with_name("fake_solver.py")
 GRAVITY = (
-    f"/FUNCT/1\ngravity\n{wide(0.0, -9.81, width=20)}{wide(10.0, -9.81, width=20)}"
-    f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 1)[:-1]}{wide(1.0, 1.0, width=20)}"
+    f"/FUNCT/1\ngravity\n{pad(0.0, -9.81, width=20)}{pad(10.0, -9.81, width=20)}"
+    f"/GRAV/1\ngravity\n{pad(1, 'Z', 0, 0, 1)[:-1]}{pad(1.0, 1.0, width=20)}"
 )
-WALL = "/RWALL/PLANE/8\nground\n" + wide(0, 0, 0, 0) + 3 * wide(0.0, 0.0, 1.0, width=20)
+WALL = "/RWALL/PLANE/8\nground\n" + pad(0, 0, 0, 0) + 3 * pad(0.0, 0.0, 1.0, width=20)
 WAIT, END, LANDS, LOADED = 0.02, 0.22, 0.17, 0.03
 
 
@@ -134,7 +134,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in result
     assert "no level at td is matched" in result
-    assert "--resume" in refused(*prepare_drive(folder))
+    assert "--resume" in read_refusal(*prepare_drive(folder))
     over = run(*prepare_drive(folder, "--resume"))
     assert f"resumed: legs that are over: {len(legs)}, the last at {END}" in over.stderr
     assert json.loads(over.stdout)["windows"] == outcome["windows"]
@@ -556,12 +556,12 @@ def test_what_a_run_lacks_is_told_before_anything_is_computed(
     text = deck.read_text()
     assert not old or old in text
     deck.write_text(text.replace(old, new) if old else text)
-    assert message in refused(*words, *options)
+    assert message in read_refusal(*words, *options)
     assert not (tmp_path / "run").exists()
     if "--engine" in options:
         assert "missing   /no/such/engine" in run(*words, *options, "--dry-run").stdout
     else:
-        assert message in refused(*words, *options, "--dry-run")
+        assert message in read_refusal(*words, *options, "--dry-run")
 
 
 def test_a_command_that_is_corrected_is_not_one_that_has_begun(tmp_path: Path) -> None:

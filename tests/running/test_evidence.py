@@ -20,8 +20,8 @@ from d2rpick.running.evidence import Evidence, highest_energy, quiet_times
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.witness import Quiet
 from tests.command import ROOT
-from tests.energies import sure
-from tests.records import table, until
+from tests.energies import require
+from tests.records import cut_history, make_table
 from tests.running.seen import take_whole_record
 
 # Windows of flights [s]: car with contacts at 2.3-11.8, 28.1-38.5 and 150.4 ms, box that lands at 285.8, 338.4 ms ...
@@ -92,7 +92,7 @@ def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
-    history = until(record(CAR), 0.14)
+    history = cut_history(record(CAR), 0.14)
     last = quiet_times(history, InnerMotion.of(history, 0.022).needed)[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
     assert last.wait == 0.022
@@ -103,7 +103,7 @@ def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
     quiet_spans = quiet_times(history, InnerMotion.of(history).needed)
     for time in history.time[[300, 640, 900]].tolist():
-        early = until(history, time)
+        early = cut_history(history, time)
         early_spans = quiet_times(early, InnerMotion.of(early).needed)
         assert [span[:2] for span in early_spans] == [
             span[:2] for span in quiet_spans if span.seen <= time
@@ -194,7 +194,7 @@ def make_pushed_body(tail: float, share: float) -> History:
     momentum = np.zeros((time.size, 1, 3))
     momentum[:, 0, 2] = push - decaying_push + landing - 98.1 * time
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.02)
-    return table(
+    return make_table(
         time,
         energy,
         Momenta(time, momentum, None, EXACT, (0,), masses=np.array([10.0])),
@@ -222,7 +222,7 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(
 def test_what_is_seen_does_not_depend_on_when_somebody_looked(
     name: str, sizes: list[int]
 ) -> None:
-    history = until(record(name), 0.35)
+    history = cut_history(record(name), 0.35)
     whole, motion = take_whole_record(history)
     evidence, grown, begin = Evidence(), InnerMotion(), 0
     for size in [*sizes, history.time.size]:
@@ -256,14 +256,14 @@ def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> No
     time = np.arange(0.0, 0.1, 5e-5)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.02)
     energy[0] = 0.0 if jump else energy[0]
-    longest_period = sure(InnerMotion.of(table(time, energy)).longest(0.1))
+    longest_period = require(InnerMotion.of(make_table(time, energy)).longest(0.1))
     assert longest_period.time == pytest.approx(0.02, rel=0.1)
 
 
 def test_a_swing_in_a_push_makes_no_wait_where_the_deck_tells_its_springs() -> None:
     of_deck = Wait(0.012, "deck", "of the deck", 0.01)
     motion = take_whole_record(record(BOX), None, of_deck)[1]
-    assert sure(motion.longest(0.28)) == of_deck  # it falls
+    assert require(motion.longest(0.28)) == of_deck  # it falls
     assert (
-        0.016 <= sure(motion.longest(0.7)).time <= 0.021
+        0.016 <= require(motion.longest(0.7)).time <= 0.021
     )  # the swing that was pushed at 302 ms took 24 ms

@@ -8,18 +8,16 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.deck.radioss_run import read_run
-from tests.decks import wide, write
-from tests.sprung import cubes
+from tests.decks import pad, write
+from tests.sprung import write_cubes
 
 REAL = 20
 ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/TFILE/4\n1e-5\n"
-CONTACT = "/INTER/TYPE7/6\nfloor\n" + wide(3, 1)
-TIED = "/INTER/TYPE2/9\ntied\n" + wide(3, 1)
-WALL = (
-    "/RWALL/PLANE/8\nground\n" + wide(0, 0, 0, 0) + 3 * wide(0.0, 0.0, 1.0, width=REAL)
-)
-GRAVITY = f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, 0)[:-1]}{wide(1.0, -9.81, width=REAL)}"
-THROWN = f"/GRNOD/PART/1\nall\n{wide(1, 2)}/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(1)}"
+CONTACT = "/INTER/TYPE7/6\nfloor\n" + pad(3, 1)
+TIED = "/INTER/TYPE2/9\ntied\n" + pad(3, 1)
+WALL = "/RWALL/PLANE/8\nground\n" + pad(0, 0, 0, 0) + 3 * pad(0.0, 0.0, 1.0, width=REAL)
+GRAVITY = f"/GRAV/5\ndown\n{pad(0, 'Z', 0, 0, 0)[:-1]}{pad(1.0, -9.81, width=REAL)}"
+THROWN = f"/GRNOD/PART/1\nall\n{pad(1, 2)}/INIVEL/TRA/3\nthrown\n{pad(10.0, 0.0, 0.0, width=REAL)[:-1]}{pad(1)}"
 MASS, STIFFNESS = 5.0, 1e6
 PERIOD = 2 * math.pi * math.sqrt(MASS / 2 / STIFFNESS)
 
@@ -27,7 +25,7 @@ PERIOD = 2 * math.pi * math.sqrt(MASS / 2 / STIFFNESS)
 def write_radioss_run(folder: Path, contents: str = CONTACT + THROWN + GRAVITY) -> str:
     folder.mkdir(exist_ok=True)
     (folder / "box_0001.rad").write_text(ENGINE)
-    deck = cubes((MASS, MASS), [(10, 20, STIFFNESS)]).replace(
+    deck = write_cubes((MASS, MASS), [(10, 20, STIFFNESS)]).replace(
         "/END\n", contents + "/END\n"
     )
     return write(folder, deck, name="box_0000.rad")
@@ -110,7 +108,7 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
         (CONTACT + "/CLOAD/4\npush\n", {}, "/CLOAD/4 pushes without a contact"),
         (
             CONTACT
-            + f"/BCS/1\nheld\n   111 000{wide(0, 7)[:20]}\n/GRNOD/NODE/7\nheld\n{wide(10)}",
+            + f"/BCS/1\nheld\n   111 000{pad(0, 7)[:20]}\n/GRNOD/NODE/7\nheld\n{pad(10)}",
             {},
             "part 1 is held",
         ),

@@ -11,9 +11,9 @@ from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.running.swing import find_swing
 from tests.command import ENERGY, ROOT, run
-from tests.energies import sure
-from tests.reading import read_history, solved
-from tests.records import table
+from tests.energies import require
+from tests.reading import read_history, read_solved
+from tests.records import make_table
 
 CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
@@ -22,14 +22,14 @@ FREE, TD = 0.0385, 0.1464
 @cache
 def read_car_with_drift() -> tuple[History, Drift]:
     """A computed run, and how its bodies drift in its flight."""
-    history = solved("carT01.gz").history
+    history = read_solved("carT01.gz").history
     (momenta,) = (
         part_momenta
         for part_momenta in history.momenta
         if part_momenta.parts is not None
     )
-    moving = tuple(sure(momenta.parts)[i] for i in momenta.moving)
-    return history, sure(
+    moving = tuple(require(momenta.parts)[i] for i in momenta.moving)
+    return history, require(
         find_drift_in_flight(history, Flight(FREE, TD, "momentum", moving))
     )
 
@@ -38,7 +38,7 @@ def read_car_with_drift() -> tuple[History, Drift]:
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
     history, whole = read_car_with_drift()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
-    swing = sure(find_swing(history, FREE, tr))
+    swing = require(find_swing(history, FREE, tr))
     assert swing.name == "engine"
     assert error <= swing.error <= 1.3 * error
     # a flight of that length has a path of a hundred times the error, at the speed so far
@@ -59,7 +59,9 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     momenta = Momenta(
         time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses
     )
-    first_swing = sure(find_swing(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
+    first_swing = require(
+        find_swing(make_table(time, np.zeros(time.size), momenta), 0.0, 0.06)
+    )
     assert first_swing.name == "block"
     assert first_swing.error == pytest.approx(2 * swings, abs=1e-5)
     assert "at most" in first_swing.told

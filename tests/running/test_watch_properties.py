@@ -7,8 +7,8 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
 from d2rpick.running.events import find_events
-from tests.energies import sure
-from tests.records import table, until
+from tests.energies import require
+from tests.records import cut_history, make_table
 from tests.running.seen import take_whole_record
 
 # Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
@@ -38,7 +38,7 @@ def make_pushed_history(gravity: float = 9.81) -> History:
         kinetic,
         sliding=np.concatenate([[0.0], np.cumsum(force[1:] ** 2) * 1e-6]),
     )
-    return table(time, energy, whole, balance=balance)
+    return make_table(time, energy, whole, balance=balance)
 
 
 def list_events(
@@ -56,8 +56,8 @@ def test_a_gap_between_two_pushes_is_no_flight() -> None:
     assert events == ["flight", "contact", "flight", "contact", "flight"]
     first, last, _ = [event for event in found_events if event.event == "flight"]
     assert first.time == 0.0
-    assert abs(sure(last.time) - PUSHES[1][1]) <= 3 * STEP
-    assert 0.05 <= sure(last.wait) <= 0.07
+    assert abs(require(last.time) - PUSHES[1][1]) <= 3 * STEP
+    assert 0.05 <= require(last.wait) <= 0.07
     contacts = [
         event.time
         for event in found_events
@@ -75,7 +75,7 @@ def test_the_events_of_a_run_so_far_are_the_first_of_all(
         list_events(make_pushed_history(), wait),
         float(make_pushed_history().time[state]),
     )
-    assert list_events(until(make_pushed_history(), end_of_file), wait) == [
+    assert list_events(cut_history(make_pushed_history(), end_of_file), wait) == [
         event for event in whole if event[2] is not None and event[2] <= end_of_file
     ]
 
@@ -86,7 +86,7 @@ def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
     state: int,
 ) -> None:
     history = (
-        until(make_pushed_history(), float(make_pushed_history().time[state]))
+        cut_history(make_pushed_history(), float(make_pushed_history().time[state]))
         if state > 20
         else make_pushed_history()
     )

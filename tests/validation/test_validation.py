@@ -9,7 +9,7 @@ import pytest
 
 from tests.command import ROOT
 from validation.compare import Run, compare, read
-from validation.figures import FIGURES, table
+from validation.figures import FIGURES, read_results
 from validation.models import MODELS
 from validation.run import run
 
@@ -95,7 +95,7 @@ def test_the_solver_confirms_the_better_pair_of_the_oscillator(tmp_path: Path) -
 def test_the_landings_of_plans_that_the_docs_sum_up_are_those_of_the_results_and_after_td() -> (
     None
 ):
-    rows = table("drop_plans")
+    rows = read_results("drop_plans")
     docs = (ROOT / "docs" / "validation.md").read_text("utf-8")
     assert np.all(rows["td_s"] < rows["landing_s"])
     assert np.all(rows["tr_s"] < rows["td_s"])

@@ -14,16 +14,16 @@ import d2rpick
 from d2rpick.deck import read_inventory
 from tests.command import ROOT
 from validation import vibration
-from validation.figures import RESULTS, absorbing_parts, table
+from validation.figures import RESULTS, find_absorbing_parts, read_results
 from validation.frame_deck import PARTS, Landing, mesh_frame, write_deck
 from validation.landing import Course, compare_landings
 from validation.nodes import (
     Motion,
     Nodes,
     compare_vibration,
+    compute_vibration_energy,
     read_nodes,
     remove_rigid_motion,
-    vibration_energy,
 )
 
 NODES = Nodes(
@@ -32,9 +32,9 @@ NODES = Nodes(
 )
 TIMES = np.linspace(0.0, 1.0, 7)
 VECTORS = arrays(float, 3, elements=st.floats(-5, 5, allow_nan=False))
-SWITCHED = table("vibration")[~np.isnan(table("vibration")["tr_s"])]
+SWITCHED = read_results("vibration")[~np.isnan(read_results("vibration")["tr_s"])]
 TOTALS = SWITCHED[SWITCHED["energy"] == "total"]
-PARTS_OF_LANDING = absorbing_parts(SWITCHED)
+PARTS_OF_LANDING = find_absorbing_parts(SWITCHED)
 DOCS = (ROOT / "docs" / "validation.md").read_text("utf-8")
 
 
@@ -99,7 +99,7 @@ def test_the_vibration_energy_is_twice_the_kinetic_energy_without_the_rigid_moti
         (1.0, 0.0, 0.0),
         (-2.0, 0.0, 0.0),
     )  # on one line, with no momentum
-    assert vibration_energy(
+    assert compute_vibration_energy(
         move_nodes(stretching + np.array([0.0, 0.0, 7.0])), NODES
     ) == pytest.approx(1 * 4 + 2 * 1)
 

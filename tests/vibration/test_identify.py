@@ -12,8 +12,8 @@ from d2rpick.vibration.fitting import compute_covariance
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.modes import Mode
 from tests.command import ROLLOVER
-from tests.computed import columns, stored
-from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration
+from tests.computed import locate_stored, read_columns
+from tests.records import ENERGY, MODE, TIME, add_noise, make_mode, round_as_printed
 
 
 def identify_accepted(time: Samples, energy: Samples) -> tuple[Identification, Mode]:
@@ -84,7 +84,7 @@ def draw_record(seed: int, second: float = 0.0) -> tuple[Samples, Samples, Mode]
         energy = energy + Mode(
             second_omega, alpha, root * np.cos(turn), root * np.sin(turn), start
         ).energy(time)
-    return time, noisy(energy, rng.choice([0.0, rng.uniform(0, 0.02)]), seed), mode
+    return time, add_noise(energy, rng.choice([0.0, rng.uniform(0, 0.02)]), seed), mode
 
 
 def test_a_clean_record_gives_all_parameters() -> None:
@@ -104,8 +104,8 @@ def test_a_clean_record_gives_all_parameters() -> None:
     [
         # another factor for each seed, so that other digits are lost
         (lambda seed: ENERGY * (1 + seed / 100), 1e-10),
-        (lambda seed: printed(ENERGY * (1 + seed / 100)), 1e-7),
-        (lambda seed: noisy(ENERGY, 0.01, seed), 1e-3),
+        (lambda seed: round_as_printed(ENERGY * (1 + seed / 100)), 1e-7),
+        (lambda seed: add_noise(ENERGY, 0.01, seed), 1e-3),
     ],
     ids=["clean", "6 digits", "1 % noise"],
 )
@@ -121,11 +121,11 @@ def test_95_percent_of_the_seeds_find_omega_within_the_bound(
 
 @pytest.mark.parametrize("seed", range(5))
 def test_least_squares_of_scipy_from_the_truth_ends_at_the_same_mode(seed: int) -> None:
-    energy = noisy(ENERGY, 0.01, seed)
+    energy = add_noise(ENERGY, 0.01, seed)
     fitted, mode = identify_accepted(TIME, energy)
     truth = list_parameters(MODE)[:4]
     best = least_squares(
-        lambda p: vibration(p).energy(TIME) - energy, truth, x_scale=[1, 1, 0.1, 0.1]
+        lambda p: make_mode(p).energy(TIME) - energy, truth, x_scale=[1, 1, 0.1, 0.1]
     )
     sign = np.sign(mode.sine * best.x[3])  # q and -q make the same energy
     ours = list_parameters(mode)[:4] * [1, 1, sign, sign]
@@ -170,13 +170,15 @@ def test_shifting_and_scaling_the_record_shifts_and_scales_the_mode(
 def test_the_last_periods_of_a_printed_record_are_enough(periods: float) -> None:
     start = TIME[-1] - periods * 2 * np.pi / MODE.omega
     tail = start <= TIME
-    _, mode = identify_accepted(TIME[tail], printed(ENERGY)[tail])
+    _, mode = identify_accepted(TIME[tail], round_as_printed(ENERGY)[tail])
     assert mode.omega == pytest.approx(MODE.omega, rel=2e-7)
 
 
 def test_jittered_times_are_used_as_they_are() -> None:
     jitter = 0.05 * 1e-4 * np.random.default_rng(0).standard_normal(TIME.size)
-    _, mode = identify_accepted(TIME + jitter, printed(MODE.energy(TIME + jitter)))
+    _, mode = identify_accepted(
+        TIME + jitter, round_as_printed(MODE.energy(TIME + jitter))
+    )
     assert mode.omega == pytest.approx(MODE.omega, rel=1e-7)
 
 
@@ -205,7 +207,9 @@ def test_energies_of_zero_and_below_are_no_obstacle(offset: float) -> None:
 
 def test_energy_deviation_is_the_scatter_over_many_noises() -> None:
     times = np.array([0.005, 0.0127, 0.03, 0.064])
-    fits = [identify_accepted(TIME, noisy(ENERGY, 0.01, seed)) for seed in range(60)]
+    fits = [
+        identify_accepted(TIME, add_noise(ENERGY, 0.01, seed)) for seed in range(60)
+    ]
     scatter = np.std([mode.energy(times) for _, mode in fits], axis=0)
     np.testing.assert_allclose(fits[0][0].energy_deviation(times), scatter, rtol=0.35)
 
@@ -291,7 +295,7 @@ def test_no_unit_system_is_too_small_or_too_large(scale: float) -> None:
     ],
 )
 def test_oscillators_of_a_real_solver(name: str, omega: float, alpha: float) -> None:
-    _, mode = identify_accepted(*columns(stored(name), "IE_J"))
+    _, mode = identify_accepted(*read_columns(locate_stored(name), "IE_J"))
     assert mode.omega == pytest.approx(omega, rel=1e-4)
     assert mode.alpha == pytest.approx(alpha, rel=1e-3)
     assert (mode.energy_plastic, mode.preload) == (0.0, 0.0)
@@ -304,7 +308,7 @@ def test_oscillators_of_a_real_solver(name: str, omega: float, alpha: float) -> 
 def test_a_real_load_is_refused_and_the_flight_after_it_accepted(
     name: str, end_of_load: float
 ) -> None:
-    time, energy = columns(stored(name), "IE_J")
+    time, energy = read_columns(locate_stored(name), "IE_J")
     assert "more than" in identify_refused(time, energy)
     flight = time >= end_of_load
     assert identify_accepted(time[flight], energy[flight])[0].misfit == pytest.approx(
@@ -313,7 +317,7 @@ def test_a_real_load_is_refused_and_the_flight_after_it_accepted(
 
 
 def test_a_real_rollover_is_refused() -> None:
-    time, energy = columns(ROLLOVER, "boxIE_J")
+    time, energy = read_columns(ROLLOVER, "boxIE_J")
     flight = (time >= 0.09) & (time <= 0.37)
     assert "misses the energy by 71%" in identify_refused(time[flight], energy[flight])
 
@@ -321,7 +325,7 @@ def test_a_real_rollover_is_refused() -> None:
 @pytest.mark.parametrize("channel", ["IE_total_J", "IE_spring1_J", "IE_spring2_J"])
 def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
     assert "more than" in identify_refused(
-        *columns(stored("chain_ref.csv.gz"), channel)
+        *read_columns(locate_stored("chain_ref.csv.gz"), channel)
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.vibration.lines import Exponentials, fit_spectrum, make_even_grid, predict
-from tests.energies import sure
+from tests.energies import require
 from tests.vibration.linear_structure import LinearStructure
 
 TIME = np.linspace(0.0, 8.0, 1201)
@@ -19,7 +19,7 @@ def test_each_mode_has_a_line_at_twice_its_rate_and_decay(
     seed: int, count: int
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    predicted_lines = sure(
+    predicted_lines = require(
         predict(make_even_grid(TIME, structure.elastic_energy(TIME)))
     )
     lines = predicted_lines.spectrum.lines
@@ -62,7 +62,7 @@ def test_uneven_states_show_the_same_lines() -> None:
     structure = LinearStructure.draw(3, 2)
     random = np.random.default_rng(1)
     time = np.sort(random.uniform(0.0, 8.0, 1500))
-    lines = sure(predict(make_even_grid(time, structure.elastic_energy(time))))
+    lines = require(predict(make_even_grid(time, structure.elastic_energy(time))))
     strongest = np.sort(
         lines.spectrum.lines.poles.imag[
             np.argsort(-np.abs(lines.spectrum.lines.weights))[:2]
@@ -76,4 +76,4 @@ def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
     energy = np.where(
         TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME)
     )
-    assert sure(predict(make_even_grid(TIME, energy))).missed > 0.3
+    assert require(predict(make_even_grid(TIME, energy))).missed > 0.3

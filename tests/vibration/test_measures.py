@@ -8,7 +8,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Replay, make_from_mode, to_mode
 from tests import paper
-from tests.records import MODES, replayed_residual
+from tests.records import MODES, compute_replayed_residual
 
 
 @given(MODES, st.floats(0, 3), st.floats(0, 3))
@@ -32,9 +32,9 @@ def test_measures_by_formula_are_those_of_the_motion(
     assert replay.residual() == pytest.approx(
         measures.residual(lock_in, kinetic), abs=1e-6, rel=1e-7
     )
-    assert float(replayed_residual(mode, np.array([tr]), td)[0]) == pytest.approx(
-        replay.residual(), abs=1e-6, rel=1e-7
-    )
+    assert float(
+        compute_replayed_residual(mode, np.array([tr]), td)[0]
+    ) == pytest.approx(replay.residual(), abs=1e-6, rel=1e-7)
 
 
 def test_each_measure_has_a_column() -> None:

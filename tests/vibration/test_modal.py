@@ -17,7 +17,7 @@ from d2rpick.vibration.modal import (
     confirm_by_kinetic_energy,
     identify_modal,
 )
-from tests.energies import of, sure
+from tests.energies import make_energy_history, require
 from tests.vibration.linear_structure import LinearStructure
 
 TIME = np.linspace(0.0, 9.0, 1801)
@@ -36,7 +36,7 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(
     seed: int, count: int, static: float
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    modal = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
+    modal = require(identify_modal(TIME, structure.elastic_energy(TIME) + static))
     assert modal.signed, modal.doubts
     true = structure.residual(*PAIRS)
     assert np.sqrt(np.mean((compute_residuals(modal, *PAIRS) - true) ** 2)) < 0.02
@@ -55,7 +55,7 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(
         noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
     )
     clean, noisy = (
-        sure(identify_modal(TIME, record)) for record in (energy, energy + scatter)
+        require(identify_modal(TIME, record)) for record in (energy, energy + scatter)
     )
     true = structure.residual(*PAIRS)
     _, low, high = noisy.residual_band(compute_residuals(noisy, *PAIRS), *PAIRS)
@@ -67,8 +67,8 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(
 @given(st.integers(0, 10**6), st.integers(1, 5))
 def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
     structure = LinearStructure.draw(seed, count)
-    internal = sure(identify_modal(TIME, structure.elastic_energy(TIME)))
-    kinetic = sure(
+    internal = require(identify_modal(TIME, structure.elastic_energy(TIME)))
+    kinetic = require(
         identify_modal(
             TIME,
             structure.kinetic_energy(TIME) + 40.0 * np.ones(TIME.size),
@@ -83,18 +83,20 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
         )
         < 0.02
     )
-    confirmed = sure(confirm_by_kinetic_energy(internal, kinetic))
+    confirmed = require(confirm_by_kinetic_energy(internal, kinetic))
     assert confirmed.second is kinetic.reading
     assert np.all(confirmed.half_width(*PAIRS) >= internal.half_width(*PAIRS))
 
 
 def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     structure = LinearStructure.draw(4, 3)
-    kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True))
+    kinetic = require(
+        identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True)
+    )
     flowing = (
         40.0 + 0.5 * np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)) / 5
     )
-    drifting = sure(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
+    drifting = require(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
     assert not drifting.signed
     assert confirm_by_kinetic_energy(drifting, None) is drifting
     calm = replace(drifting, doubts=drifting.doubts._replace(beyond=0.0))
@@ -105,7 +107,7 @@ def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
         )
         is not kinetic
     )
-    lacking = sure(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
+    lacking = require(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
     lacking = replace(lacking, doubts=calm.doubts)
     assert (
         confirm_by_kinetic_energy(lacking, kinetic) is lacking
@@ -118,7 +120,7 @@ def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
     structure = LinearStructure.draw(11, 3)
     about = structure.deformations(TIME)
     about[0] += stretch * structure.amplitude[0]
-    modal = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
+    modal = require(identify_modal(TIME, np.sum(about**2, axis=0)))
     assert not modal.reading.is_mode.all()
     assert (
         np.sqrt(
@@ -151,7 +153,7 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
         + 0.3 * np.cos(16 * TIME) ** 2
         + third * np.cos(24 * TIME) ** 2
     )
-    modal = sure(identify_modal(TIME, energy))
+    modal = require(identify_modal(TIME, energy))
     assert (modal.doubts.refusal is not None) == is_harmonic
 
 
@@ -168,8 +170,8 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
     ids=["friction", "random walk", "coarse"],
 )
 def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) -> None:
-    modal = sure(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
-    refusal = sure(modal.doubts.refusal)
+    modal = require(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
+    refusal = require(modal.doubts.refusal)
     assert any(word in refusal for word in reason.split("|")), refusal
 
 
@@ -190,7 +192,7 @@ def test_nothing_above_single_precision_is_no_vibration() -> None:
 
 
 STRUCTURE = LinearStructure.draw(21, 5)
-LOADED = of(
+LOADED = make_energy_history(
     np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME),
     TIME,
 )
@@ -204,7 +206,7 @@ def compute_true_residual(tr: float, td: float) -> float:
 @pytest.mark.parametrize("td", [5.0, 6.3, 7.7, 8.6])
 def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
     answer = suggest(LOADED, td, Settings(after=1.0))
-    best = sure(answer.chosen)
+    best = require(answer.chosen)
     assert answer.situation.basis == "modal"
     assert best.residual == pytest.approx(compute_true_residual(best.tr, td), abs=0.02)
     early = np.linspace(1.0, td - 0.25 * (td - 1.0), 2000)
@@ -212,16 +214,16 @@ def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
     assert compute_true_residual(best.tr, td) < oracle + 0.03
     verdict = verify(LOADED, best.tr, td, Settings(after=1.0))
     assert verdict.candidate.residual == pytest.approx(best.residual, abs=1e-9)
-    assert sure(verdict.quality).grade == sure(answer.quality).grade
+    assert require(verdict.quality).grade == require(answer.quality).grade
 
 
 def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> (
     None
 ):
     answer = suggest(LOADED, 7.7, Settings(after=1.0))
-    assert min(sure(candidate.residual) for candidate in answer.candidates) < 1
+    assert min(require(candidate.residual) for candidate in answer.candidates) < 1
     assert all(
-        sure(candidate.residual) <= 1.01
+        require(candidate.residual) <= 1.01
         for candidate in answer.candidates
         if candidate.acceptable
     )
@@ -247,7 +249,7 @@ def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> 
     situation = suggest(LOADED, td, Settings(after=1.0)).situation
     vibration = situation.vibration
     raised = replace(
-        vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4))
+        vibration, compared=require(vibration.compared)._replace(first=float(td - 0.4))
     )
     for record in (vibration, raised):
         if record.keeps_nothing:
@@ -261,16 +263,16 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
     from tests.energies import suggest_in_window
 
     answer = suggest_in_window(LOADED, (4.0, 8.8), Settings(after=1.0))
-    best = sure(answer.recommended)
+    best = require(answer.recommended)
     assert best.rigid_time > 0.4 * (8.8 - 1.0)
     assert compute_true_residual(best.tr, best.td) == pytest.approx(
-        sure(best.residual), abs=0.02
+        require(best.residual), abs=0.02
     )
     for td in (5.0, 6.3, 7.7, 8.6):
         suggestion = suggest(LOADED, td, Settings(after=1.0)).recommended
         assert (
-            sure(best.residual) <= sure(sure(suggestion).residual) + 0.02
-            or sure(suggestion).rigid_time < 3.9
+            require(best.residual) <= require(require(suggestion).residual) + 0.02
+            or require(suggestion).rigid_time < 3.9
         )
 
 
@@ -280,7 +282,7 @@ def test_a_weak_mode_of_few_states_is_told_of() -> None:
         time = np.linspace(0.0, 6.0, 1200)
         strong = np.cos(2 * np.pi * time) ** 2 + 0.7 * np.cos(14.3 * time) ** 2
         weak = 0.08 * np.cos(2 * np.pi * rate * time + 0.4) ** 2
-        modal = sure(identify_modal(time, strong + weak))
+        modal = require(identify_modal(time, strong + weak))
         assert modal.doubts.coarse > 4.0
         assert (modal.states_per_period < 4.0) == is_coarse
 

@@ -23,8 +23,13 @@ from d2rpick.vibration.moments import (
     estimate_curvature,
 )
 from d2rpick.vibration.span import Span
-from tests.energies import sure
-from tests.records import energy_of, level_crossings, printed, table
+from tests.energies import require
+from tests.records import (
+    find_level_crossings,
+    make_table,
+    round_as_printed,
+    sum_energies,
+)
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
@@ -73,7 +78,7 @@ def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
 def test_a_td_at_which_a_mode_sets_in_has_nothing_before_it_to_compare() -> None:
     mode = Mode(8.0, 0.05, 1.0, 0.4, 0.0)
     time = np.linspace(0.0, 6.0, 1201)
-    history = table(time, np.asarray(mode.energy(time)))
+    history = make_table(time, np.asarray(mode.energy(time)))
     vibration = find_energy_at(
         history, 2.0, Evidence(identify(time, history.energy), Span(2.0, 6.0))
     )
@@ -133,7 +138,7 @@ def measure_coverage(
             )
         ]
         history = replace(
-            table(printed(time, digits), printed(mode.energy(time), digits)),
+            make_table(round_as_printed(time, digits), round_as_printed(mode.energy(time), digits)),
             time_precision=Precision(digits), energy_precision=Precision(digits),
         )  # fmt: skip
         times, rises = find_crossings(
@@ -176,7 +181,7 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
         mode = draw_mode(rng)
         time = np.arange(0, 6, 1 / 40)
         noise = 0.01 * float(np.max(mode.energy(time))) * rng.normal(size=time.size)
-        history = table(time, mode.energy(time) + noise)
+        history = make_table(time, mode.energy(time) + noise)
         fit = identify(history.time, history.energy)
         if not fit.describes_record or not isinstance(fit.mode, Mode):
             continue
@@ -210,16 +215,16 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(
         )
         both_modes = (main, second_mode)
         time = np.arange(0, 6, 1 / samples_per_period)
-        history = table(time, energy_of(both_modes, time))
+        history = make_table(time, sum_energies(both_modes, time))
         suggestion = suggest(history, 4.3, Settings(after=0.0))
-        true = level_crossings(both_modes, 4.3, 0.0)
+        true = find_level_crossings(both_modes, 4.3, 0.0)
         sharp = [
             c
             for c in suggestion.candidates
             if c.kind == "crossing" and (c.timing_tolerance or 0) < 0.02
         ]
         for crossing in sharp:
-            low, high = sure(crossing.tr_low), sure(crossing.tr_high)
+            low, high = require(crossing.tr_low), require(crossing.tr_high)
             if (
                 np.abs(true - crossing.tr).min() < 0.25 / 2
             ):  # the level is passed, not only nearly touched
@@ -230,7 +235,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(
 
 def test_an_interval_from_samples_grows_by_what_the_level_is_off_them() -> None:
     time = np.linspace(0, 1, 101)
-    history = table(time, 3 * time)
+    history = make_table(time, 3 * time)
     (exact,), (shifted_reach,) = (
         compute_sampled_reach(history, np.array([0.3]), 0.755, 2.265 + error)
         for error in (0.0, 0.009)

@@ -22,9 +22,9 @@ from d2rpick.vibration.waves import PartMotion, Waves, find_all_zeros, follow_wa
 from tests import chain
 from tests.benchmarks.promise_parts import Motion, make_history_of_parts
 from tests.command import BOX
-from tests.energies import sure
-from tests.reading import solved
-from tests.records import noisy, printed
+from tests.energies import require
+from tests.reading import read_solved
+from tests.records import add_noise, round_as_printed
 
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")
@@ -62,7 +62,7 @@ def make_part_history(deformation: np.ndarray, time: np.ndarray) -> History:
 @cache
 def examine_chain_at(td: float) -> Situation:
     """The chain from a td."""
-    return examine(chain.history(), td, PLAIN)
+    return examine(chain.read_chain_history(), td, PLAIN)
 
 
 # ---- signs
@@ -73,7 +73,7 @@ def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     time = np.arange(0, 12, 2 * np.pi / 8.3 / samples_per_period)
     true = move_two_springs(time)
     signed_parts = SignedParts(
-        time, printed(true.ravel() ** 2).reshape(true.shape), NAMES
+        time, round_as_printed(true.ravel() ** 2).reshape(true.shape), NAMES
     )
     assert signed_parts.names == NAMES
     comparable = (time > signed_parts.comparable_since(10.8)) & (time < 10.8)
@@ -134,7 +134,7 @@ def test_a_part_that_does_not_swing_about_zero_has_no_sign(
     )
     assert signed_parts.names == ("good",)
     assert [
-        (part.name, reason in sure(part.reason)) for part in signed_parts.unsigned
+        (part.name, reason in require(part.reason)) for part in signed_parts.unsigned
     ] == [("bad", True)]
     assert not signed_parts.signed
 
@@ -176,7 +176,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 
 def predict_residual(situation: Situation, tr: float) -> float:
     (candidate,) = judge(situation, [tr])
-    return sure(candidate.residual)
+    return require(candidate.residual)
 
 
 @pytest.mark.slow
@@ -204,7 +204,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = examine_chain_at(chain.TD_LATE)
-    parts = sure(situation.evidence.parts)
+    parts = require(situation.evidence.parts)
     started = Waves(
         np.array([-300 + 900j]),
         np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]),
@@ -235,7 +235,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = sure(examine_chain_at(chain.TD_LATE).evidence.parts)
+    parts = require(examine_chain_at(chain.TD_LATE).evidence.parts)
     for run in chain.scan():
         product = np.prod(
             compute_deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1
@@ -244,7 +244,7 @@ def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
 
 
 def read_t01() -> History:
-    return solved("chain_referenceT01.gz", "spring1,spring2").history
+    return read_solved("chain_referenceT01.gz", "spring1,spring2").history
 
 
 @pytest.mark.slow
@@ -253,9 +253,11 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
     source: str,
 ) -> None:
     answer = suggest(
-        chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN
+        chain.read_chain_history() if source == "csv" else read_t01(),
+        chain.TD_PEAK,
+        PLAIN,
     )
-    assert sure(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
+    assert require(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
     best = answer.candidates[0]
     assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
     assert best.residual == pytest.approx(0.065, abs=0.005)
@@ -268,9 +270,11 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
     answer = suggest(
-        chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN
+        chain.read_chain_history() if source == "csv" else read_t01(),
+        chain.TD_LATE,
+        PLAIN,
     )
-    tr = sure(answer.recommended).tr
+    tr = require(answer.recommended).tr
     runs = [run for run in chain.scan() if run["td_s"] > 0.2]
     nearest = min(runs, key=lambda run: abs(run["tr_s"] - tr))
     assert nearest["R_sim"] <= min(run["R_sim"] for run in runs) + 0.05
@@ -286,9 +290,9 @@ def test_the_parts_that_contribute_most_are_named() -> None:
         note.startswith(f"mismatch of {candidate.parts[0].name}")
         for note in candidate.notes
     )
-    still = 1 - sure(situation.kinetic_share)
+    still = 1 - require(situation.kinetic_share)
     assert candidate.lock_in_error == pytest.approx(
-        np.sqrt(still) * sure(candidate.part_mismatch)
+        np.sqrt(still) * require(candidate.part_mismatch)
     )
 
 
@@ -308,12 +312,14 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
 
 
 def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:
-    assert chain.history().part_names == NAMES
-    assert chain.history("IE_total_J").part_energies is None
+    assert chain.read_chain_history().part_names == NAMES
+    assert chain.read_chain_history("IE_total_J").part_energies is None
     selection = Selection(energy=(*NAMES, "x3_m"))
-    assert chain.history(*selection.energy).part_names == selection.energy
-    table = chain.history()
-    np.testing.assert_array_equal(sure(table.part_energies).sum(axis=1), table.energy)
+    assert chain.read_chain_history(*selection.energy).part_names == selection.energy
+    table = chain.read_chain_history()
+    np.testing.assert_array_equal(
+        require(table.part_energies).sum(axis=1), table.energy
+    )
 
 
 def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> (
@@ -366,7 +372,7 @@ def make_history_of_motion(motion: Motion, noise: float = 0.0) -> History:
     return make_history_of_parts(
         SPAN,
         np.maximum(
-            np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0
+            np.stack([add_noise(row, noise, seed=2) for row in energies.T], axis=1), 0.0
         ),
     )
 
@@ -390,9 +396,9 @@ def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     assert answer.situation.basis == basis
     for candidate in answer.candidates[:6]:
         assert (
-            sure(candidate.residual_low) - 0.05
+            require(candidate.residual_low) - 0.05
             <= truth.residual(candidate.tr, td)
-            <= sure(candidate.residual_high) + 0.05
+            <= require(candidate.residual_high) + 0.05
         )
 
 

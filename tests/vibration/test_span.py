@@ -21,21 +21,21 @@ from d2rpick.vibration.span import (
 )
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
-from tests.energies import sure
+from tests.energies import require
 from tests.records import (
     ENERGY,
     MODE,
     TIME,
-    energy_of,
-    noisy,
-    printed,
-    replayed_residual,
-    table,
+    add_noise,
+    compute_replayed_residual,
+    make_table,
+    round_as_printed,
+    sum_energies,
 )
 
 
 def make_history(energy: np.ndarray) -> History:
-    return table(TIME, energy)
+    return make_table(TIME, energy)
 
 
 def find_span_by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
@@ -87,7 +87,7 @@ def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record
     energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
     tracemalloc.start()
     span, fit = find_described_span(
-        table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
+        make_table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
     )
     peak_memory = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -98,7 +98,7 @@ def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_what_is_accepted_is_the_same_when_refusals_are_quick(noise: float) -> None:
-    energy = noisy(ENERGY, noise, seed=2)
+    energy = add_noise(ENERGY, noise, seed=2)
     quick, thorough = identify(TIME, energy, quick=True), identify(TIME, energy)
     assert isinstance(quick.mode, Mode)
     assert (quick.mode, quick.reason, quick.rms) == (thorough.mode, None, thorough.rms)
@@ -127,11 +127,11 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
     fits = Fits()
     for td in (0.05, paper.TD, 0.1):
         anew, again = (
-            examine(paper.history(), td, Settings(), fits_before)
+            examine(paper.make_history(), td, Settings(), fits_before)
             for fits_before in (None, fits)
         )
         assert again.evidence.span == anew.evidence.span
-        assert sure(again.evidence.fit).mode == sure(anew.evidence.fit).mode
+        assert require(again.evidence.fit).mode == require(anew.evidence.fit).mode
 
 
 MAIN = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0)
@@ -152,7 +152,7 @@ def add_second_mode(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
 def test_the_share_of_a_small_second_mode_is_estimated(
     share: float, noise: float, rate: float
 ) -> None:
-    energy = noisy(energy_of(add_second_mode(share, rate), TIMES), noise, seed=1)
+    energy = add_noise(sum_energies(add_second_mode(share, rate), TIMES), noise, seed=1)
     fitted = identify(TIMES, energy)
     assert fitted.mode is not None  # its rest is too small to refuse it
     assert fitted.describes_record
@@ -166,18 +166,18 @@ def test_the_share_of_a_small_second_mode_is_estimated(
 def test_white_noise_hides_a_second_mode_of_its_own_size(
     noise: float, seed: int
 ) -> None:
-    energy = noisy(MAIN.energy(TIMES), noise, seed)
+    energy = add_noise(MAIN.energy(TIMES), noise, seed)
     assert (
         0
-        < estimate_hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode))
+        < estimate_hidden_share(TIMES, energy, require(identify(TIMES, energy).mode))
         < 3 * noise
     )
 
 
 def test_a_clean_or_printed_record_hides_nothing() -> None:
-    for energy, largest in ((ENERGY, 1e-12), (printed(ENERGY), 1e-5)):
+    for energy, largest in ((ENERGY, 1e-12), (round_as_printed(ENERGY), 1e-5)):
         assert (
-            estimate_hidden_share(TIME, energy, sure(identify(TIME, energy).mode))
+            estimate_hidden_share(TIME, energy, require(identify(TIME, energy).mode))
             < largest
         )
 
@@ -186,15 +186,15 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
     tr, td = np.array([0.3, 1.1, 2.6]), 5.3
     for seed in range(0, 20, 3):
         truth = add_second_mode(0.005, rate=1.5 + seed / 10)
-        energy = noisy(energy_of(truth, TIMES), 0.03, seed)
+        energy = add_noise(sum_energies(truth, TIMES), 0.03, seed)
         fitted = identify(TIMES, energy)
-        mode = sure(fitted.mode)
+        mode = require(fitted.mode)
         fitted = fitted._replace(
             hidden_share=estimate_hidden_share(TIMES, energy, mode)
         )
         true, predicted = (
-            replayed_residual(truth, tr, td),
-            replayed_residual(mode, tr, td),
+            compute_replayed_residual(truth, tr, td),
+            compute_replayed_residual(mode, tr, td),
         )
         _, low, high = residual_band(fitted, predicted, tr, td)
         assert np.all(high > true - 0.05)
@@ -202,15 +202,17 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
 
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:
-    energy = noisy(MAIN.energy(TIMES), 0.03, seed=3)
-    suggestion = suggest(table(TIMES, energy), 5.3, Settings(after=0.0))
+    energy = add_noise(MAIN.energy(TIMES), 0.03, seed=3)
+    suggestion = suggest(make_table(TIMES, energy), 5.3, Settings(after=0.0))
     assert suggestion.candidates
     for candidate in suggestion.candidates:
-        assert sure(candidate.residual_high) >= sure(candidate.residual)
+        assert require(candidate.residual_high) >= require(candidate.residual)
         noted = any(
             "if the record hides a further mode" in note for note in candidate.notes
         )
-        assert noted == (sure(candidate.residual_high) > sure(candidate.residual) + 0.1)
+        assert noted == (
+            require(candidate.residual_high) > require(candidate.residual) + 0.1
+        )
 
 
 @pytest.mark.slow

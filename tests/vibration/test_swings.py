@@ -19,8 +19,8 @@ from d2rpick.vibration.identify import identify
 from d2rpick.vibration.model import Evidence, find_energy_at, model_at
 from d2rpick.vibration.span import Span
 from d2rpick.vibration.swings import Swings, count_swings
-from tests.energies import sure
-from tests.records import table
+from tests.energies import require
+from tests.records import make_table
 
 TIME: Samples = np.linspace(0.0, 30.0, 1201)
 
@@ -48,7 +48,7 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(
     by: float, alpha: float, lifted: Samples
 ) -> None:
     x, energy = integrate_stiffening_spring(by, alpha)
-    swings = sure(count_swings(TIME, energy + lifted))
+    swings = require(count_swings(TIME, energy + lifted))
     counted = swings.amplitudes(TIME)[0]
     unclear = swings.unclear
     assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))
@@ -82,7 +82,7 @@ def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(
 
 @pytest.mark.parametrize("preload", [0.1, 0.3, -0.3])
 def test_a_preload_that_makes_swings_uneven_is_no_beat(preload: float) -> None:
-    swings = sure(
+    swings = require(
         count_swings(TIME, (np.exp(-0.02 * TIME) * np.sin(TIME) + preload) ** 2)
     )
     assert np.ptp(np.diff(swings.bottoms)) > 0.3
@@ -100,14 +100,14 @@ def test_noise_and_too_few_swings_are_not_counted() -> None:
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 5.0 + 0.01 * TIME])
 def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) -> None:
     x, energy = integrate_stiffening_spring(1.0, 0.02)
-    record = table(TIME, energy + lifted)
+    record = make_table(TIME, energy + lifted)
     for td in (20.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
         assert ("basis", "swings of the energy, counted") in heading(
             answer.situation
         )  # no word of parts
-        at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
+        at_tr, at_td = np.interp([require(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(
             candidate.acceptable and np.interp(candidate.tr, TIME, x) * at_td < -1e-3
@@ -118,7 +118,10 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
 def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> (
     None
 ):
-    record, memory = table(TIME, integrate_stiffening_spring(1.0, 0.02)[1]), Memory()
+    record, memory = (
+        make_table(TIME, integrate_stiffening_spring(1.0, 0.02)[1]),
+        Memory(),
+    )
     around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
     together = Together(record, Flight())
 
@@ -146,8 +149,8 @@ def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
             return np.array([unseen])
 
     time = np.linspace(0.0, 6.0, 601)
-    record = table(time, np.sin(5 * time) ** 2)
-    counted = sure(count_swings(time, record.energy))
+    record = make_table(time, np.sin(5 * time) ** 2)
+    counted = require(count_swings(time, record.energy))
     fit = identify(time, record.energy)._replace(hidden_share=hidden)
     evidence = Evidence(fit, Span(0.0, 6.0), models={"swings": Told(**vars(counted))})
     assert model_at(find_energy_at(record, 4.1, evidence), evidence).basis == basis

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.vibration.waves import Waves, fit_waves
-from tests.energies import sure
+from tests.energies import require
 
 MADE = Waves(
     np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0
@@ -26,7 +26,7 @@ def test_waves_are_found_again(
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
     true_waves = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
     time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
-    fitted = sure(fit_waves(time, true_waves.deformation(time)))
+    fitted = require(fit_waves(time, true_waves.deformation(time)))
     room = (1e-6 if even else 0.02) * true_waves.vibration_energy(time)
     assert np.all(np.abs(fitted.energy(time) - true_waves.energy(time)) < room + 1e-9)
     assert np.all(
@@ -49,7 +49,7 @@ def test_one_wave_is_an_oscillator() -> None:
 
 def test_the_fewest_waves_that_do_are_taken() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
-    fitted = sure(fit_waves(TIME, MADE.deformation(TIME) + noise))
+    fitted = require(fit_waves(TIME, MADE.deformation(TIME) + noise))
     assert np.sort(fitted.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
     assert np.all(fitted.rates.real <= 0)
 

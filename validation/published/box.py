@@ -76,36 +76,37 @@ def _run(parameters: Parameters, *windows: RigidWindow) -> Record:
     return simulate(parameters, _END, *windows)
 
 
-def _setting(_: Parameters) -> Exhibit:
+def _make_setting_exhibit(_: Parameters) -> Exhibit:
     return Exhibit(
         "box", "Box on a sled that meets a curb", 1, "1", "A box on a decelerating sled, tripped by a curb.",
         "Drawn from the model: a narrow box on the tilted floor of a standard dolly.",
     )  # fmt: skip
 
 
-def _early(base: Parameters) -> Exhibit:
+def _make_early_exhibit(base: Parameters) -> Exhibit:
     reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
-    roll_error = _roll_error(reference, early)
-    return _compared(
+    roll_error = _compute_roll_error(reference, early)
+    return _make_comparison(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
         "Outlines and roll with and without switching; switched at 1 ms the box rolls less than the reference.",
-        f"So does this box, by {abs(roll_error):.2f} degrees of {np.degrees(abs(_at_td(reference).roll)):.0f} at td. "
+        f"So does this box, by {abs(roll_error):.2f} degrees of "
+        f"{np.degrees(abs(_find_state_at_td(reference).roll)):.0f} at td. "
         "Outlines and roll look identical; the difference is visible only in a panel of its own.",
         agrees=roll_error < 0,
     )  # fmt: skip
 
 
-def _energies(base: Parameters) -> Exhibit:
+def _make_energy_exhibit(base: Parameters) -> Exhibit:
     reference = _run(base)
     errors = {
-        tr: _roll_error(reference, _run(base, RigidWindow(tr, TD)))
+        tr: _compute_roll_error(reference, _run(base, RigidWindow(tr, TD)))
         for tr in (_LITTLE, _MUCH)
     }
     energy = {
         tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
         for tr in (*errors, TD)
     }
-    return _compared(
+    return _make_comparison(
         "energies", "Too little and too much energy", "2c", 1, base, (_LITTLE, _MUCH),
         "Too little energy locked in gives less roll, too much gives more roll.",
         f"With {energy[_LITTLE] / energy[TD]:.2f} times the level (tr = {1e3 * _LITTLE:g} ms) the roll at td is off by "
@@ -116,15 +117,15 @@ def _energies(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _revised(base: Parameters) -> Exhibit:
+def _make_revised_exhibit(base: Parameters) -> Exhibit:
     reference = _run(base)
-    tr = _own(reference, TD)
+    tr = _find_own_tr(reference, TD)
     assert tr is not None
     errors = [
-        _roll_error(reference, _run(base, RigidWindow(time, TD)))
+        _compute_roll_error(reference, _run(base, RigidWindow(time, TD)))
         for time in (_REVISED, tr)
     ]
-    return _compared(
+    return _make_comparison(
         "revised", "The revised pair", "8", 4, base, (_REVISED, tr),
         "With tr = 70 and td = 370 ms, the ground at about 380 ms, height and roll agree closely.",
         f"The sled pushes this box until {1e3 * (reference.released or 0):.0f} ms, so 70 ms lies in its trip: the roll "
@@ -134,7 +135,7 @@ def _revised(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _compared(
+def _make_comparison(
     name: str, title: str, figure: str, section: int, base: Parameters, times: tuple[float, ...], paper: str,
     results: str, *, agrees: bool,
 ) -> Exhibit:  # fmt: skip
@@ -143,7 +144,7 @@ def _compared(
     columns: dict[str, Samples] = {
         "time_ms": 1e3 * reference.time, "roll_deg": np.degrees(reference.roll), "z_m": reference.centre.imag,
     }  # fmt: skip
-    shapes = [Shape("without switching", _outlines(reference))]
+    shapes = [Shape("without switching", _make_outlines(reference))]
     rolls, differences, heights = [Curve("without switching", "roll_deg")], [], []
     for tr in times:
         run, key = _run(base, RigidWindow(tr, TD)), f"{1e3 * tr:.4g}"
@@ -151,7 +152,7 @@ def _compared(
         columns[f"roll_{key}_deg"] = np.degrees(run.roll)
         columns[f"droll_{key}_deg"] = np.degrees(run.roll - reference.roll)
         columns[f"dz_{key}_mm"] = 1e3 * (run.centre - reference.centre).imag
-        shapes.append(Shape(label, _outlines(run), "thin"))
+        shapes.append(Shape(label, _make_outlines(run), "thin"))
         rolls.append(Curve(label, f"roll_{key}_deg", "thin"))
         differences.append(Curve(label, f"droll_{key}_deg"))
         heights.append(Curve(label, f"dz_{key}_mm"))
@@ -187,7 +188,7 @@ def _compared(
     )
 
 
-def variants_of(base: Parameters) -> Iterator[Variant]:
+def list_variants(base: Parameters) -> Iterator[Variant]:
     """Changes that act after td, then changes that act before."""
     yield Variant("base", base, before=False)
     yield Variant(
@@ -223,7 +224,7 @@ def variants_of(base: Parameters) -> Iterator[Variant]:
     yield Variant("damping 1 1/s", replace(base, damping=1.0), before=True)
 
 
-def tried(variants: Sequence[Variant]) -> Trial:
+def try_variants(variants: Sequence[Variant]) -> Trial:
     """Run all variants, the base first, choose one tr for them as ``study`` does, and switch each run there.
 
     td is 10 ms before the first of their landings.
@@ -244,7 +245,7 @@ def tried(variants: Sequence[Variant]) -> Trial:
     window = RigidWindow(common.tr, td)
     common_results = zip(variants, rows, common.errors, strict=True)
     runs = tuple(
-        _at(trial_result, row, error or 0.0, window)
+        _switch_variant(trial_result, row, error or 0.0, window)
         for trial_result, row, error in common_results
     )
     named_rows = [
@@ -261,18 +262,20 @@ def tried(variants: Sequence[Variant]) -> Trial:
     return Trial(window, bool(common.keeps_tolerance), runs, three)
 
 
-def _at(variant: Variant, row: StudyRow, error: float, common: RigidWindow) -> Tried:
+def _switch_variant(
+    variant: Variant, row: StudyRow, error: float, common: RigidWindow
+) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare_runs(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
     return Tried(variant, row, error, outcome.roll_error, end)
 
 
-def _variants(base: Parameters) -> Exhibit:
-    return exhibit_of(tried(tuple(variants_of(base))))
+def _make_variants_exhibit(base: Parameters) -> Exhibit:
+    return make_variants_exhibit(try_variants(tuple(list_variants(base))))
 
 
-def exhibit_of(trial: Trial) -> Exhibit:
+def make_variants_exhibit(trial: Trial) -> Exhibit:
     """Show what one tr for many variants costs each of them."""
     window, rows = trial.window, trial.runs
     number = np.arange(1.0, len(rows) + 1)
@@ -293,11 +296,11 @@ def exhibit_of(trial: Trial) -> Exhibit:
         "variants", "One reference run for many variants", 4, "section 4",
         "One reference run serves dozens of variants, since parameters such as headroom, belts and roof do not "
         "influence tr: they act after td.",
-        _told(trial), _alone_after(trial), columns, _of_variants(window),
+        _describe_outcome(trial), _is_tr_kept_after_td(trial), columns, _make_variant_panels(window),
     )  # fmt: skip
 
 
-def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
+def _make_variant_panels(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
     rigid = (
@@ -332,7 +335,7 @@ def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     )
 
 
-def _alone_after(trial: Trial) -> bool:
+def _is_tr_kept_after_td(trial: Trial) -> bool:
     """Whether what acts after td leaves tr where it is, to a state of the record."""
     times = [
         run.row.tr
@@ -344,7 +347,7 @@ def _alone_after(trial: Trial) -> bool:
     )
 
 
-def _told(trial: Trial) -> str:
+def _describe_outcome(trial: Trial) -> str:
     """Say how far the paper's statement holds, and where it fails."""
     rows, window = trial.runs, trial.window
     chosen = [
@@ -380,7 +383,8 @@ def _told(trial: Trial) -> str:
     )  # fmt: skip
     return (
         f"True for what acts after td: tr moves by {max(later) - min(later):.2g} ms. What acts before td moves it: "
-        f"from {min(earlier):.1f} to {max(earlier):.1f} ms. {_of_stiffness(trial, dict(_named(chosen)))}{fails}"
+        f"from {min(earlier):.1f} to {max(earlier):.1f} ms. "
+        f"{_describe_stiffness(trial, dict(_name_results(chosen)))}{fails}"
         f"tr = {1e3 * window.tr:.1f} ms is still acceptable in all {len(rows)}: the level is off by up to "
         f"{worst.level_error:.3f} ({worst.variant.name}), with a tolerance of 0.2; switched there, the roll at td is "
         f"right within {roll:.2f} degrees, and up to {given_up:.1f} ms of about {rigid:.0f} are given up. "
@@ -389,12 +393,14 @@ def _told(trial: Trial) -> str:
     )
 
 
-def _named(known_results: Sequence[tuple[Tried, float]]) -> Iterator[tuple[str, float]]:
+def _name_results(
+    known_results: Sequence[tuple[Tried, float]],
+) -> Iterator[tuple[str, float]]:
     for known_result, tr in known_results:
         yield known_result.variant.name, tr
 
 
-def _of_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
+def _describe_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
     """Say what the stiffness alone does, where its variants were run."""
     if trial.stiffness is None or "stiffness +15%" not in own_results:
         return ""
@@ -409,7 +415,7 @@ def _of_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
     )
 
 
-def _own(reference: Record, td: float) -> float | None:
+def _find_own_tr(reference: Record, td: float) -> float | None:
     recommended = suggest(make_history(reference), td, Settings()).recommended
     return recommended.tr if recommended else None
 
@@ -419,31 +425,35 @@ class _State(NamedTuple):
     centre: complex
 
 
-def _at_td(record: Record) -> _State:
+def _find_state_at_td(record: Record) -> _State:
     state_index = int(np.abs(record.time - TD).argmin())
     return _State(float(record.roll[state_index]), complex(record.centre[state_index]))
 
 
-def _roll_error(reference: Record, run: Record) -> float:
+def _compute_roll_error(reference: Record, run: Record) -> float:
     """Roll at td against the reference [degrees]."""
-    return float(np.degrees(_at_td(run).roll - _at_td(reference).roll))
+    return float(
+        np.degrees(_find_state_at_td(run).roll - _find_state_at_td(reference).roll)
+    )
 
 
-def _outlines(record: Record) -> Plane:
+def _make_outlines(record: Record) -> Plane:
     shown_states = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
     return np.asarray(record.outline[shown_states])
 
 
 # Section of the paper and what makes each figure, some seconds with the default box.
 _FIGURES: Final = (
-    (1, _setting),
-    (1, _early),
-    (1, _energies),
-    (4, _revised),
-    (4, _variants),
+    (1, _make_setting_exhibit),
+    (1, _make_early_exhibit),
+    (1, _make_energy_exhibit),
+    (4, _make_revised_exhibit),
+    (4, _make_variants_exhibit),
 )
 
 
-def exhibits_of(parameters: Parameters) -> list[tuple[int, Callable[[], Exhibit]]]:
+def list_box_exhibits(
+    parameters: Parameters,
+) -> list[tuple[int, Callable[[], Exhibit]]]:
     """Figures of a box by section, each to be computed by a call."""
     return [(section, partial(make, parameters)) for section, make in _FIGURES]

@@ -14,7 +14,7 @@ from d2rpick.report import figures
 from d2rpick.report.formats import Shown, written_by
 from validation.published import box, exhibits, reproduction, saving
 from validation.published.drawing import draw_exhibit
-from validation.published.values import table
+from validation.published.values import make_values_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -40,10 +40,14 @@ def reproduce(
 
     ``tables``: the columns of a solver's table beside its times, by what it is.
     """
-    folder = _made(output_dir)  # the page may go there
+    folder = _make_folder(output_dir)  # the page may go there
     output = output.beside(*solver)
-    curves = _solver(solver, tables)  # before the half minute that the box takes
-    answer = reproduction.Reproduction(table(), list(_exhibits(section, curves)))
+    curves = _read_solver_tables(
+        solver, tables
+    )  # before the half minute that the box takes
+    answer = reproduction.Reproduction(
+        make_values_table(), list(_make_exhibits(section, curves))
+    )
     files = _write(output, folder, answer)
     if output.report:
         output.write(
@@ -57,14 +61,14 @@ def reproduce(
     output.finish(objection=not all(row.agrees for row in answer.rows))
 
 
-def _exhibits(
+def _make_exhibits(
     sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
 ) -> Iterator[Exhibit]:
     """Give the figures of these sections, of all without any, in the order of the paper."""
     makers = [
-        *box.exhibits_of(Parameters()),
-        *exhibits.exhibits_of(solver),
-        (5, saving.exhibit),
+        *box.list_box_exhibits(Parameters()),
+        *exhibits.list_exhibits(solver),
+        (5, saving.make_saving_exhibit),
     ]
     makers.sort(key=lambda section_name: section_name[0])
     return (
@@ -72,7 +76,9 @@ def _exhibits(
     )
 
 
-def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples]]:
+def _read_solver_tables(
+    names: Sequence[str], tables: Tables
+) -> dict[str, dict[str, Samples]]:
     """Read each table by the columns that it has."""
     tables_by_name = {}
     for name in names:
@@ -97,7 +103,7 @@ def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples
     return tables_by_name
 
 
-def _made(folder: str) -> Path:
+def _make_folder(folder: str) -> Path:
     """Create the folder where it is missing; D2RPickError where that cannot be done."""
     path = Path(folder)
     try:
