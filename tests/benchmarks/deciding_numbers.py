@@ -134,7 +134,7 @@ def _find_comment(lines: Sequence[str], statement: ast.stmt) -> str:
 def make_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
     """Make the frozen questions, and so many records of each class of `promise` in files of the folder."""
     questions: dict[str, Question] = {}
-    for name, td, settings, _ in test_same_answers.OLD:
+    for name, td, settings, _ in test_same_answers.FROZEN:
         questions[f"{name}, td {td}, {settings}"] = _make_frozen_question(
             name, td, settings
         )
@@ -154,7 +154,8 @@ def _make_frozen_question(
     name: str, td: float | tuple[float, float], settings: Mapping[str, float | bool]
 ) -> Question:
     def ask() -> str:
-        return test_same_answers.digest(test_same_answers.answer(name, td, **settings))
+        suggestion = test_same_answers.suggest_for(name, td, **settings)
+        return str(test_same_answers.summarize(suggestion))
 
     return ask
 

@@ -20,7 +20,7 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import find_faults
-from tests.choice.test_same_answers import made
+from tests.choice.test_same_answers import make_record
 from tests.command import BOX, run
 from tests.computed import locate_stored
 from tests.drops import drop, write_run_files
@@ -61,7 +61,7 @@ def read_again(history: History, tr: float, td: float, settings: Settings) -> Ve
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.7, 0.8])
 def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
-    history = made("five modes")
+    history = make_record("five modes")
     pair = require(suggest(history, td, PLAIN).better_pair)
     assert suggest(history, pair.td, PLAIN).recommended == pair
 
@@ -98,7 +98,7 @@ def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
 
 @pytest.mark.slow
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
-    history, settings = made("five modes"), Settings(after=0.1, replay=False)
+    history, settings = make_record("five modes"), Settings(after=0.1, replay=False)
     answer = suggest(history, 0.8, settings)
     line = acceptable(answer.windows or (), None)
     windows = re.findall(r"(\S+) to (\S+) \(", line)
@@ -177,7 +177,7 @@ def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
 
 
 def test_an_error_that_is_refused_reads_as_too_large() -> None:
-    history, td = made("one mode"), 0.8
+    history, td = make_record("one mode"), 0.8
     best = require(suggest(history, td, PLAIN).chosen)
     assert best.residual
     barely = Settings(max_residual=best.residual * (1 - 1e-6))

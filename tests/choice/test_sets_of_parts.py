@@ -546,7 +546,10 @@ def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
         run("suggest", "--part", part_names, "--merge", "1", "-f", "card", *arguments)
         for part_names in ("1-9", CAR)
     )
-    message = "--merge 1 makes one rigid body of what nothing joins: parts 1-6; parts 7-9; leave it out to keep them apart"
+    message = (
+        "--merge 1 makes one rigid body of what nothing joins: parts 1-6; parts 7-9; "
+        "leave it out to keep them apart"
+    )
     assert f"warning: merged-apart: {message}\n" in merged.stderr
     assert "merged-apart" not in whole.stderr
 

@@ -63,7 +63,8 @@ FILES = {
     "no energy": (b"time,vx,vy\n0,1,2\n1,2,3\n2,3,4\n", (), ["input: no column", "--energy", "2 'vx', 3 'vy'"]),
     "unknown column": (tabulate(math.cos), ("--energy", "heat"), ["input: no column 'heat'", "2 'internal_energy'"]),
     "column misspelt": (
-        tabulate(math.cos), ("--energy", "internal_enrg"), ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
+        tabulate(math.cos), ("--energy", "internal_enrg"),
+        ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
     ),
     "column zero": (tabulate(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
     "energy is the time": (tabulate(math.cos), ("--energy", "time"), ["input: ", "choose another one as energy"]),

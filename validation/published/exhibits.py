@@ -327,9 +327,9 @@ def _make_after_td_exhibit() -> Exhibit:
     return Exhibit(
         "after-td", "Response after td", 4, "7b",
         "After td the response y for (13, 64) ms agrees well with the reference.",
-        f"It does not: R = {compute_residual(PUBLISHED):.3f}. At 64 ms 92 % of the energy of the vibration is kinetic and "
-        "so is lost, whatever tr. The mean motion agrees, the vibration does not. 4.8 ms later, at the next peak of the "
-        "energy, the switched run goes on as the reference does.",
+        f"It does not: R = {compute_residual(PUBLISHED):.3f}. At 64 ms 92 % of the energy of the vibration is kinetic "
+        "and so is lost, whatever tr. The mean motion agrees, the vibration does not. 4.8 ms later, at the next "
+        "peak of the energy, the switched run goes on as the reference does.",
         False, columns, tuple(panels),
     )  # fmt: skip
 
