@@ -1,4 +1,4 @@
-"""The library gives what the command line gives, loses nothing in tables, and names a wrong argument."""
+"""The library gives the same answers as the command line, loses nothing in tables, and reports wrong arguments."""
 
 import io
 import json
@@ -40,14 +40,14 @@ loose: Any = d2  # for what a type checker would not let pass
 
 
 def assert_same_document(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
-    """Hold two documents against each other, but for the command that asked for them."""
+    """Compare two documents, except for the command that asked for them."""
     assert {**mine, "command": None} == {**theirs, "command": None}
 
 
 def assert_frame_holds(
     frame: pd.DataFrame, rows: Sequence[Mapping[str, Any]], *, but: Collection[str] = ()
 ) -> None:
-    """Ask for every value of the rows of a document, bit for bit, NaN where it is null."""
+    """Check that a frame has every value of the rows of a document bit for bit, NaN for null."""
     assert len(frame) == len(rows) > 0
     for shown_row, expected in zip(frame.to_dict("records"), rows, strict=True):
         for key in expected.keys() - {*but}:
@@ -60,7 +60,7 @@ def assert_frame_holds(
 
 @st.composite
 def records(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
-    """Energies of a damped oscillator after a load, with or without noise: some are described, some are not."""
+    """Draw the energy of a damped oscillator after a load, with or without noise; d2rpick can describe only some."""
     states, periods = draw(st.integers(30, 200)), draw(st.floats(0.5, 12))
     noise, damping = draw(st.sampled_from([0.0, 0.0, 0.01, 0.5])), draw(st.floats(0, 3))
     time = np.linspace(0, 1, states)
@@ -237,7 +237,7 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
 
 @pytest.mark.slow
 def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
-    """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
+    """Lists are not cells: the shares of a part in each flight and the details of a td have tables of their own."""
     run = d2.read(BOX)
     plan, parts = (
         d2.plan(run, parts="box", replay=False, min_quality="poor"),

@@ -1,4 +1,4 @@
-"""Runs and answers can be copied, compared and sent to other processes; values of numpy and None go everywhere."""
+"""Runs and answers can be copied, compared and sent to other processes; numpy values and None work everywhere."""
 
 import copy
 import pickle

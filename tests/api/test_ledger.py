@@ -1,4 +1,4 @@
-"""What a ledger gives back is what was put in, unless files, options or version have changed; cut lines are no harm."""
+"""A ledger returns the rows that were stored, unless files, options or version have changed; cut lines are skipped."""
 
 import json
 import os
@@ -21,7 +21,7 @@ QUESTION = Question(variants.TD, Settings())
 
 
 def list_values(row: StudyRow | None) -> dict[str, object]:
-    """All of a row as plain values."""
+    """Return all fields of a row as plain values."""
     assert row is not None
     field_values = {name: getattr(row, name) for name in row.__dataclass_fields__}
     for name in ("acceptable", "alike", "profile", "curve"):
@@ -34,7 +34,7 @@ def list_values(row: StudyRow | None) -> dict[str, object]:
 def keep_run_in_ledger(
     folder: Path, question: Question = QUESTION
 ) -> tuple[str, str, StudyRow]:
-    """A run, the ledger that holds it, and its row."""
+    """Return a run, the ledger that contains it, and its row."""
     name, ledger = variants.write(folder / "run.csv"), str(folder / "ledger.ndjson")
     row = ask(question, name)
     Ledger(ledger, question).add(row)

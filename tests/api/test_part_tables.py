@@ -1,4 +1,4 @@
-"""The answers of ``d2.parts`` and ``d2.plan``: the same as the commands, as objects and frames."""
+"""The answers of ``d2.parts`` and ``d2.plan`` equal those of the commands, as objects and as frames."""
 
 import json
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
-    """Typed without them it would give another run time; as it stands it is refused."""
+    """Without the weights, the printed command would give another run time; as printed, it is refused."""
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
     arguments: Any = {
         "parts": "recommended",

@@ -1,4 +1,4 @@
-"""``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
+"""``import d2rpick`` is fast, offers every public name, and its types are correct for users."""
 
 import ast
 import re
@@ -46,7 +46,7 @@ def test_what_the_docs_call_public_is_there_and_every_function_is_in_the_docs() 
 
 
 def test_what_a_function_takes_can_be_made_by_public_names() -> None:
-    """Every class of this package that an argument may be; the others are of python or stand for several."""
+    """Every class of this package that is an argument type must be public; other names are Python's or aliases."""
     hints = [*Choosing.__annotations__.values()]
     for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
         hints += [
@@ -76,7 +76,7 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
 
 
 def test_the_stub_gives_editors_every_public_name_and_no_other() -> None:
-    """Static tools follow no names that are imported when they are first used."""
+    """Static tools cannot follow names that are imported on first use."""
     tree = ast.parse((ROOT / "d2rpick/__init__.pyi").read_text("utf-8"))
     imported = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
     assert {name.asname for node in imported for name in node.names} == {*d2.__all__}
@@ -92,7 +92,7 @@ def test_other_names_are_not() -> None:
 
 
 def test_types_hold_for_a_stranger() -> None:
-    """What mypy is asked here it is asked without knowing more than a user does."""
+    """mypy checks the types here with the knowledge of a user only."""
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
     assert_type(answer, d2.Suggestion)
     assert_type(answer.to_frame(), pd.DataFrame)

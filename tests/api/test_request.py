@@ -1,4 +1,4 @@
-"""One table of what can be asked: it contradicts nothing, and is written as it is typed."""
+"""One table of all arguments: it contradicts nothing, and is printed as a user types it."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Tables of other libraries: as they are where these are installed, and by what they offer where they are not."""
+"""Tables of other libraries: real ones if the libraries are installed, otherwise stand-ins with the same interface."""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,7 +40,7 @@ def convert_to_data_array(frame: pd.DataFrame) -> Any:
 
 
 class Polars:
-    """What a frame of polars offers."""
+    """Stand-in with the interface of a polars frame."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame, self.columns = frame, list(frame)
@@ -50,7 +50,7 @@ class Polars:
 
 
 class Lazy:
-    """What a lazy frame of polars offers; its columns are not known for nothing."""
+    """Stand-in with the interface of a polars lazy frame, whose columns are expensive to find."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -64,7 +64,7 @@ class Lazy:
 
 
 class Arrow:
-    """What a table of pyarrow offers."""
+    """Stand-in with the interface of a pyarrow table."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -74,7 +74,7 @@ class Arrow:
 
 
 class Dataset:
-    """What a dataset of xarray offers."""
+    """Stand-in with the interface of an xarray dataset."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -84,7 +84,7 @@ class Dataset:
 
 
 class DataArray:
-    """What an array of xarray offers."""
+    """Stand-in with the interface of an xarray array."""
 
     name = None
 

@@ -1,4 +1,4 @@
-"""What the user says of a flight counts, with a warning that names the evidence against it."""
+"""A flight given by the user is used, with a warning that names the contradicting evidence."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ TIME = np.linspace(0.0, 1.0, 1001)
 
 
 def make_braked_block(until: float = 1.0) -> History:
-    """A block that slides with friction up to a time, and vibrates."""
+    """Return a vibrating block that slides with friction until ``until``."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.minimum(TIME, until)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))

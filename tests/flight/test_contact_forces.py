@@ -1,4 +1,4 @@
-"""Flight by the forces of contacts and rigid walls, and by nothing else where momenta are missing."""
+"""Flights found by the forces of contacts and rigid walls, alone if momenta are missing."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ STEP = float(TIME[1])
 def make_contact(
     *acts: tuple[float, float], time: Samples = TIME, name: str = "contact"
 ) -> ContactForce:
-    """A contact that acts in these times."""
+    """Return a contact whose force acts during these times."""
     forces = np.zeros((time.size, 3))
     for start, end in acts:
         forces[(time >= start) & (time <= end), 2] = 5.0
@@ -46,7 +46,7 @@ def find_flight_around(td: float, *forces: ContactForce) -> FreeFlight | None:
 
 
 def drop_momenta(history: History) -> History:
-    """The same record, of which only energies and forces are written."""
+    """Return the same record with energies and forces only."""
     evidence = history.evidence
     return replace(history, evidence=Given((), evidence.balance, None, evidence.forces))
 
@@ -149,7 +149,7 @@ def test_momenta_of_parts_come_first_since_a_contact_may_be_of_others() -> None:
 
 
 def compute_crash_energy(time: Samples) -> Samples:
-    """Energy of parts that vibrate, crash into a wall whose force is not written at 0.6, and vibrate on."""
+    """Return the energy of vibrating parts that hit a wall of unwritten force at 0.6 and continue to vibrate."""
     level = np.where(time < 0.6, 1.0, np.minimum(6.0, 1 + 50 * (time - 0.6)))
     return np.asarray(level + 0.2 * np.sin(300 * time))
 
@@ -223,7 +223,7 @@ def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None
 
 
 def make_pushed_momenta(*forces: ContactForce, velocity: bool = False) -> Momenta:
-    """Momentum of a model of 2 kg on which these forces work, and gravity."""
+    """Return the momentum of a model of 2 kg under these forces and gravity."""
     momentum = sum(np.cumsum(force.impulses, axis=0) for force in forces) + np.outer(
         TIME, [0.0, 0.0, -19.62]
     )
@@ -236,7 +236,7 @@ def make_pushed_momenta(*forces: ContactForce, velocity: bool = False) -> Moment
 def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
     velocity: bool, side: int
 ) -> None:
-    """They are written with a force of one side, although none acts from outside."""
+    """Such contacts are written with the force of one side, although no external force acts."""
     ground, inner = (
         make_contact((0.0, 0.2), (0.8, 0.9)),
         make_contact((0.1, 0.6), name="with itself"),

@@ -1,4 +1,4 @@
-"""When something pushes, by momenta that fall and bounce as computed here."""
+"""Contact times from momenta, for a part that falls and bounces as computed here."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def make_bouncing_part(
     interval: float,
     gravity: float = GRAVITY,
 ) -> Momenta:
-    """Momentum of a part that a constant force turns back in each contact; times of states are not those of forces."""
+    """Return the momentum of a part that a constant force turns back in each contact; no state is at its start or end."""
     time = np.arange(0.0, end + interval / 2, interval)
     impulses = [
         40.0 * MASS * (0.05 + 0.02 * contact_number)
@@ -52,7 +52,7 @@ def make_bouncing_part(
 def test_every_contact_is_seen_within_half_an_interval(
     shift: float, length: float
 ) -> None:
-    """A push that shows in one interval alone is placed in its middle third: two thirds off at most."""
+    """A contact inside one interval is placed in its middle third: the error is at most 2/3 of an interval."""
     interval = 1e-3
     sliver = 0.01 * interval  # so short a push in an interval does not show
     contacts = [

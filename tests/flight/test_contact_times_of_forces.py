@@ -1,4 +1,4 @@
-"""When a force acts, by forces and impulses that are written at states: within half an interval."""
+"""Contact times from forces and impulses at states: exact to half an interval."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ FORCE = 3.0
 
 
 def integrate_constant_force(start: float, end: float) -> ContactForce:
-    """A constant force from ``start`` to ``end``, as its impulses since the start of the run."""
+    """Return a constant force from ``start`` to ``end``, as impulses since the start of the run."""
     pushed = FORCE * (np.clip(TIME, start, end) - start)
     return ContactForce.of_impulses("interface 1", TIME, np.outer(pushed, [0, 0, 1]))
 

@@ -1,4 +1,4 @@
-"""When the parts fly, by everything that the files of computed runs tell, against what is known of these runs."""
+"""Flights found by all evidence in the files of computed runs, compared with the known flights of these runs."""
 
 import json
 from functools import cache
@@ -43,7 +43,7 @@ CAR, DROP = locate_stored("carT01.gz"), locate_stored("drop2T01.gz")
 
 
 class Rolled(NamedTuple):
-    """A computed run, and when it truly flies."""
+    """Computed rollover run, and its true flight."""
 
     record: Record
     folder: Path
@@ -51,7 +51,7 @@ class Rolled(NamedTuple):
     end: float
 
     def file(self, form: str) -> str:
-        """The run in a format."""
+        """Write the run in a format and return the file name."""
         path = self.folder / f"run.{form}"
         if not path.exists():
             path.write_bytes(
@@ -78,7 +78,7 @@ class Rolled(NamedTuple):
 def rolled(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Rolled:
-    """Runs that no threshold was set by."""
+    """Compute runs that were not used to set any threshold."""
     record = simulate(request.param, 0.5, interval=2e-4)
     return Rolled(
         record,

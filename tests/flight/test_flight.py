@@ -1,4 +1,4 @@
-"""The end of the load: found by the oscillator that describes the rest, or by the energy alone."""
+"""The end of the load, found by the oscillator that describes the later energy, or by the energy alone."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ PERIOD = 2 * np.pi / paper.OMEGA_2
 def integrate_oscillator(
     force: Callable[[float], float], end: float, *, alpha: float
 ) -> History:
-    """The paper's oscillator, from rest, under a force on its frame; one state each 0.1 ms."""
+    """Return the paper's oscillator, from rest, under a force on its frame; one state each 0.1 ms."""
 
     def equations_of_motion(t: float, u: np.ndarray) -> list[float]:
         z, y, vz, vy = u
@@ -54,7 +54,7 @@ def integrate_oscillator(
 
 @cache
 def push_oscillator(alpha: float, contact: float) -> History:
-    """Under a half-sine force of 20 ms, and under another one from ``contact`` on."""
+    """Push the oscillator with a half-sine of 20 ms, and with another one from ``contact`` on."""
 
     def force(t: float) -> float:
         if t > contact:
@@ -67,15 +67,15 @@ def push_oscillator(alpha: float, contact: float) -> History:
 def push_with_noise(
     *, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf
 ) -> History:
-    """The same, with white noise."""
+    """Push the oscillator as `push_oscillator` does, and add white noise to its energy."""
     history = push_oscillator(alpha, contact)
     return make_table(history.time, add_noise(history.energy, noise, seed))
 
 
 def begins_after_load(flight: Flight) -> bool:
-    """Whether an oscillator shows a flight that begins a quarter of a period after 20 ms.
+    """Return True if an oscillator shows a flight that begins within 1/10 of a period of 20 ms + 1/4 period.
 
-    A load that ends while the spring passes zero moves it unseen; no tr may lie in it.
+    A load that ends while the spring passes zero moves it without a trace in the energy; no tr may be in it.
     """
     start = flight.start or 0.0
     return (
@@ -195,7 +195,7 @@ def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
 
 
 def apply_two_loads(t: float) -> float:
-    """A load to 20 ms, free flight, the next contact from 150 ms on."""
+    """Return the force at ``t``: a load until 20 ms, free flight, the next contact from 150 ms on."""
     if t < 0.02:
         return 1e4 * math.sin(math.pi * t / 0.02)
     return 1.3e4 * math.sin(math.pi * (t - 0.15) / 0.03) if 0.15 <= t <= 0.18 else 0.0

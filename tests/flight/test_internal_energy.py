@@ -1,4 +1,4 @@
-"""No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
+"""No flight is claimed while forces act: walls that do no work, fading loads, friction, supports, other bodies."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ PARTS = (Part(1, "body"), Part(2, "other"))
 def make_momenta(
     *columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: int = 2
 ) -> Momenta:
-    """Momenta of parts along one axis."""
+    """Return momenta of parts along one axis."""
     values = np.zeros((TIME.size, len(columns), 3))
     values[:, :, axis] = np.stack(columns, axis=1)
     chosen = tuple(range(len(columns)))
@@ -57,7 +57,7 @@ def make_momenta(
 
 
 def make_energy_table(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
-    """A table of energies."""
+    """Return a history made from a table of energies."""
     return make_table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
 
 
@@ -128,12 +128,12 @@ def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_al
 
 
 def integrate_force(force: Samples) -> Samples:
-    """Its integral over TIME."""
+    """Return the integral of a force over TIME."""
     return np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * TIME[1]])
 
 
 def make_momenta_in_plane(along_x: Samples, along_z: Samples) -> Momenta:
-    """Momentum of one body of mass 10 in a plane, with seven digits."""
+    """Return the momentum of one body of mass 10 in a plane, with seven digits."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = along_x, along_z
     values = round_as_printed(values.ravel(), 7).reshape(values.shape)
@@ -207,7 +207,7 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(
 def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
     acceleration: float, falling: bool
 ) -> None:
-    """Friction and other planets: kinetic energy follows any constant force, so the acceleration itself decides."""
+    """Kinetic energy follows any constant force (friction, other planets), so only the acceleration decides."""
     assert not flights_of(
         make_accelerated_model(acceleration if falling else -acceleration), PLAIN
     )
@@ -215,7 +215,7 @@ def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
 
 
 def make_accelerated_model(acceleration: float) -> History:
-    """Velocity and energies of a model of 10 that is accelerated, in a glstat with six digits."""
+    """Return velocity and energies of an accelerated model of mass 10, as in a glstat with six digits."""
     velocity = np.zeros((TIME.size, 1, 3))
     velocity[:, 0, 0] = 30 + acceleration * TIME
     velocity = round_as_printed(velocity.ravel()).reshape(velocity.shape)
@@ -237,7 +237,7 @@ def make_accelerated_model(acceleration: float) -> History:
 
 
 def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
-    """Without the mass and without energies nothing shows whether the force is gravity."""
+    """Without mass and energies, nothing shows that the force is gravity."""
     falling = make_momenta(
         200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,)
     )
@@ -285,7 +285,7 @@ def test_a_motion_that_has_ended_is_no_flight() -> None:
 def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> (
     None
 ):
-    """Springs back from 0.2 to 0.8: kinetic energy comes from the internal one, and both together stay."""
+    """The body springs back from 0.2 to 0.8: internal becomes kinetic energy, and their sum is constant."""
     pushed = 500 * np.clip((TIME - 0.2) / 0.6, 0, 1) ** 2
     ringing = 3 * np.sin(300 * TIME) ** 2
     history = make_energy_table(900 - pushed + ringing, 100 + pushed - ringing)
@@ -298,7 +298,7 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
 
 @pytest.mark.parametrize("spring_share", [0.0, 40.0])
 def test_a_spring_to_ground_does_not_fly(spring_share: float) -> None:
-    """All of its kinetic energy is that of the vibration; what flies keeps some where the deformation turns."""
+    """All of its kinetic energy is vibration; a flying body keeps some when the deformation turns."""
     internal = 100 * np.sin(60 * TIME) ** 2
     history = make_energy_table(
         internal, 100 - internal + spring_share - 10 * np.maximum(0.05 - TIME, 0)
@@ -354,7 +354,7 @@ def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_do
 def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> (
     None
 ):
-    """What dampers within the body take comes in steps: no parabola describes it."""
+    """Internal damping dissipates energy in steps, which no parabola describes."""
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
@@ -393,7 +393,7 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
 
 
 def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
-    """A couple winds it up, and then it stands: what held its momentum may hold it still."""
+    """A couple winds the body up, then it stands still: a support that held its momentum may still hold it."""
     wound = np.minimum(TIME / 0.4, 1.0) ** 2
     values = np.full((TIME.size, 1, 3), 2.5)
     values[0] = 0.0
@@ -409,7 +409,7 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
 
 
 def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
-    """Damping that is proportional to mass takes more of the motion than the vibration has."""
+    """Mass-proportional damping dissipates more energy of the motion than the vibration has."""
     alpha = 0.3
     kinetic = (
         60 * np.exp(-2 * alpha * TIME)
@@ -429,7 +429,7 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
 def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     lost: float,
 ) -> None:
-    """Drag slows the body down while the spring in it swings on as one oscillator."""
+    """Drag slows the body down while its spring vibrates on as one oscillator."""
     decay = np.exp(
         -0.2 * TIME
     )  # damping within the body, which the energies show as well
@@ -444,7 +444,7 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
 
 
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
-    """A stiff body that is pulled may have an energy that one oscillator describes."""
+    """A stiff body that is pulled can have an energy that one oscillator describes."""
     assert not Flight(
         0.1, 0.9, "energy-balance", gravity=np.inf, described=True
     ).certain
@@ -484,7 +484,7 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
 def make_falling_damped_body(
     *left_out: str, internal: Samples = ZERO, vibration: float = 40.0
 ) -> History:
-    """A vibration that damping takes, above plastic work of 5, of a body of 20 that falls from 0.1 on; seven digits.
+    """Return a damped vibration above plastic work of 5, of a body of mass 20 that falls from 0.1 on; seven digits.
 
     The terms ``left_out`` are not written; ``internal`` is added to the internal energy.
     """
@@ -554,13 +554,13 @@ def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_e
 
 
 def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:
-    """Two bodies in it hit each other: their momentum together is that of free fall."""
+    """Its two bodies hit each other; their total momentum is that of free fall."""
     history = make_falling_damped_body(internal=200 * TIME)
     assert not examine(history, 0.5, PLAIN).in_flight
 
 
 def make_body_deformed_in_flight(load_start: float, *left_out: str) -> History:
-    """The body of `falling_and_damped`, of whose motion 30 turn into plastic work within 20 ms from ``at`` on."""
+    """Return `make_falling_damped_body` with 30 of its kinetic energy turned into plastic work within 20 ms."""
     done = 30 * np.sin(np.pi / 2 * np.clip((TIME - load_start) / 0.02, 0.0, 1.0)) ** 2
     history = make_falling_damped_body(*left_out, internal=done, vibration=2.0)
     balance = history.balance

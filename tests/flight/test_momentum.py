@@ -1,4 +1,4 @@
-"""Free flight found in the momentum: on motions made up of known pieces, and on runs that a solver computed."""
+"""Flights found by momentum, for motions of known pieces and for runs computed by a solver."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -43,7 +43,7 @@ TD = 0.25
 
 
 class Piece(NamedTuple):
-    """From ``begin`` on, ``force`` of shape (3,) acts on both bodies together, beside weight and damping."""
+    """External ``force`` (3,) on both bodies together from ``begin`` on, besides weight and damping."""
 
     begin: float
     force: tuple[float, float, float]
@@ -52,7 +52,7 @@ class Piece(NamedTuple):
 def compute_total_momentum(
     time: Samples, pieces: Sequence[Piece], alpha: float, gravity: float
 ) -> Samples:
-    """Momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
+    """Return the momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
     mass = MASSES.sum()
     p = np.zeros((time.size, 3))
     momentum = np.array([mass * SPEED, 0.0, 0.0])
@@ -80,7 +80,7 @@ def compute_total_momentum(
 
 
 def _integrate_decay(span: Samples, alpha: float) -> Samples:
-    """Integral of exp(-alpha t) over ``span``, shape (n, 1)."""
+    """Return the integral of exp(-alpha t) over ``span``, shape (n, 1)."""
     return np.asarray(span if alpha == 0 else -np.expm1(-alpha * span) / alpha)[
         :, np.newaxis
     ]
@@ -90,9 +90,9 @@ def make_momenta_in_flight(
     pieces: Sequence[Piece], *, alpha: float = 0.0, gravity: float = 9.81, states: int = 1000, frequency: float = 60.0,
     share: float = 0.1, digits: int = 17, sled: float = 0.0,
 ) -> Momenta:  # fmt: skip
-    """Box and step that vibrate against each other; a sled of momentum ``sled`` that stops at 0.08 if it has any.
+    """Return momenta of a box and a step vibrating against each other, and of a sled that stops at 0.08 (if ``sled``).
 
-    ``share``: amplitude of the momentum they exchange, relative to that of both.
+    ``share`` is the amplitude of the momentum they exchange, relative to their total; ``sled`` is its initial momentum.
     """
     time = np.linspace(0, END, states)
     p = (
@@ -122,7 +122,7 @@ def make_momenta_in_flight(
 
 
 def list_trip_pieces(start: float = 0.08, end: float = 0.33) -> list[Piece]:
-    """A load until ``start``, flight, and a contact from ``end`` on."""
+    """Return a load until ``start``, flight, and a contact from ``end`` on."""
     weight = MASSES.sum() * 9.81
     load = MASSES.sum() * SPEED / start
     return [
@@ -133,7 +133,7 @@ def list_trip_pieces(start: float = 0.08, end: float = 0.33) -> list[Piece]:
 
 
 def list_pulse_pieces(begin: float, end: float, force: float) -> list[Piece]:
-    """A force in x and z that changes four times and then ceases: a constant one is nothing but another gravity."""
+    """Return a force in x and z that changes four times and ends; a constant one could not be told from gravity."""
     levels = np.array([1.0, 2.0, 1.5, 0.7])
     times = np.linspace(begin, end, 5)
     return [
@@ -143,7 +143,7 @@ def list_pulse_pieces(begin: float, end: float, force: float) -> list[Piece]:
 
 
 def keep_box_alone(momenta: Momenta) -> Momenta:
-    """The same run of which only the box is written."""
+    """Return the same run with the box only."""
     assert momenta.parts
     return replace(
         momenta,
@@ -154,7 +154,7 @@ def keep_box_alone(momenta: Momenta) -> Momenta:
 
 
 def smooth(seed: int, waves: int, digits: int) -> Momenta:
-    """A load that never ends: one momentum of random waves."""
+    """Return a load that never ends: the momentum of one body as a sum of random waves."""
     random = np.random.default_rng(seed)
     time = np.linspace(0, 1, 1000)
     turns = np.arange(1, waves + 1) * random.uniform(0.7, 1, waves)
@@ -286,7 +286,7 @@ def test_attached_parts_are_found_among_many() -> None:
 
 
 def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
-    """Whether a sum becomes less by it is a matter of rounding."""
+    """Rounding decides if such a part makes a sum smaller."""
     for seed in range(100):
         rests = np.random.default_rng(seed).normal(size=(3, 150)) * [
             [1.0],
@@ -358,7 +358,7 @@ def test_a_momentum_that_never_changes_tells_of_flight_throughout(digits: int) -
 
 
 def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
-    """Its momentum is constant, but nothing."""
+    """Its momentum is constant but zero."""
     light = make_momenta_in_flight(list_trip_pieces())
     braked = np.zeros((light.time.size, 1, 3))
     braked[:, 0, 0] = np.where(
@@ -516,7 +516,7 @@ def test_every_command_takes_the_words() -> None:
 
 
 def make_car_on_curb() -> Written:
-    """A body of 280 flies for a fifth of the record; two wheels of 15 for twice as long before, and slide on then."""
+    """Return a body of 280 that flies for 20 % of the record; two wheels of 15 fly twice as long, then slide."""
     time = np.linspace(0.0, 1.0, 501)
     masses = np.array([100.0, 60.0, 40.0, 80.0, 15.0, 15.0])
     lifted = np.where(

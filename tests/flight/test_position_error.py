@@ -1,4 +1,4 @@
-"""How far bodies are out of place at td: of bodies that turn, of those that tell nothing, and of a solver's runs."""
+"""Position error at td: of rotating bodies, of bodies without evidence, and of computed runs."""
 
 import csv
 from functools import cache
@@ -44,7 +44,7 @@ vectors = st.tuples(numbers, numbers, numbers).map(np.array)
 
 
 def rotate_about(rate: Samples, angle: Samples) -> Samples:
-    """Rotation matrices, (n, 3, 3), by Rodrigues, about ``rate`` by ``angle`` times its size."""
+    """Return rotation matrices, (n, 3, 3), about ``rate`` by ``angle`` times its length (Rodrigues)."""
     size = np.linalg.norm(rate)
     x, y, z = rate / size if size > 0 else rate
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -55,7 +55,7 @@ def rotate_about(rate: Samples, angle: Samples) -> Samples:
 
 
 def make_momenta(rate: Samples, slides: Samples, masses: Samples = MASSES) -> Momenta:
-    """Momenta of parts that slide, (n, parts, 3) in the body's frame, while this turns at ``rate`` and flies."""
+    """Return momenta of sliding parts, (n, parts, 3), in a body that rotates at ``rate`` and flies."""
     inside = PLACES + slides
     centre = np.einsum("p,npi->ni", masses / masses.sum(), inside)
     positions = np.einsum(
@@ -71,7 +71,7 @@ def make_momenta(rate: Samples, slides: Samples, masses: Samples = MASSES) -> Mo
 
 
 def make_slides(path: Samples, part: int = ENGINE) -> Samples:
-    """Slides of one part alone: ``way`` to and fro, one and a half times in the record [length]."""
+    """Return the slides of one part along ``path`` and back, 1.5 times in the record [length]."""
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, part] = np.outer(np.sin(3 * np.pi * TIME / TIME[-1]), path)
     return slides
@@ -88,7 +88,7 @@ def find_drift_of_body(momenta_of_body: Momenta, masses: Samples = MASSES) -> Dr
 def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
     turn: Samples, path: Samples, start: float
 ) -> None:
-    """Within a tenth of how far the slide pushes it: what of a slide looks like a circle may be the arm of the part."""
+    """Within 10 % of the largest: the part of a slide along a circle cannot be told from the arm of the part."""
     slides = make_slides(0.02 * path)
     drift_found = find_drift_of_body(make_momenta(6.0 * turn, slides))
     first, last = (
@@ -192,7 +192,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
 def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
     periods: float, turn: Samples, phase: float
 ) -> None:
-    """Most of it passes for the rotation: the error comes out too small, down to a tenth."""
+    """Most of the slide looks like rotation, so the error is too small, down to 10 %."""
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE] = np.outer(
         np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016)
@@ -212,7 +212,7 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
 
 @cache
 def read_computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
-    """By the momenta of a run that a solver computed."""
+    """Return the drift from the momenta of a computed run."""
     history = read_solved(name, parts).history
     return require(
         find_drift(
@@ -229,7 +229,7 @@ def read_computed_drift(name: str, parts: str, flight: tuple[float, float]) -> D
 def compute_errors(
     name: str, parts: str, flight: tuple[float, float], tr: list[float], td: float
 ) -> Samples:
-    """Position errors [mm]."""
+    """Return position errors [mm]."""
     drift_found = read_computed_drift(name, parts, flight)
     assert drift_found.part.title == ("engine" if name.startswith("car") else "block")
     return 1e3 * drift_found.errors(np.array(tr), td)
@@ -237,7 +237,7 @@ def compute_errors(
 
 @pytest.mark.slow
 def test_the_car_is_as_far_off_as_computed() -> None:
-    """All switched runs in flight: centre of twelve nodes of the body, within 30 % or 1 mm, seen over 1 to 7.5 mm."""
+    """All switched runs in flight: centre of 12 nodes of the body, within 30 % or 1 mm, for errors of 1 to 7.5 mm."""
     with locate_results("car_runs.csv").open() as table:
         rows = [
             scan_row
@@ -269,7 +269,7 @@ def test_the_car_is_as_far_off_as_computed() -> None:
 def test_the_box_is_as_far_off_as_computed(
     tr: float, td: float, flight: tuple[float, float], computed: float
 ) -> None:
-    """drop2_runs.csv: the box 0.2 ms before td of the windows w2, w123_m8 and w3."""
+    """Values from drop2_runs.csv: the box 0.2 ms before td of the windows w2, w123_m8 and w3."""
     assert compute_errors("drop2T01.gz", "1-5", flight, [tr], td)[0] == pytest.approx(
         computed, rel=0.3
     )
@@ -325,7 +325,7 @@ SPAN = np.linspace(0.0, 1.0, 11)
 
 
 def make_moving_body(part: int, rate: float, path: float = 100.0) -> Drift:
-    """A body that is off in proportion to the time between tr and td, by ``part``."""
+    """Return a body whose position error grows in proportion to td - tr, because of ``part``."""
     motion = np.outer(SPAN, (0.0, rate, 0.0))
     return Drift(SPAN, motion, SPAN * path, Part(part, f"mass {part}"), 0.0)
 
@@ -397,7 +397,7 @@ def read_car(parts: str) -> tuple[History, Flight]:
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
-    """Six bodies: the solver found the car 0.16 mm off; taken for one body it would be 1.8 mm."""
+    """Six bodies: computed, the car is 0.16 mm off; as one body it would be 1.8 mm."""
     with locate_results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])

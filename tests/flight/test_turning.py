@@ -1,4 +1,4 @@
-"""How a body that is rigid for a while turns away: against bodies whose motion is integrated step by step."""
+"""Rotation error of a body that is rigid for a while, compared with a motion integrated step by step."""
 
 import csv
 from collections.abc import Callable, Collection
@@ -45,7 +45,7 @@ def place_about_centre(slide: Samples) -> Samples:
 def integrate_rotation(
     momentum: Samples, slides: Callable[[float], Samples], time: Samples, start: Samples
 ) -> Samples:
-    """Orientations (n, 3, 3) of a body with this angular momentum, by Runge and Kutta."""
+    """Return orientations (n, 3, 3) of a body with this angular momentum (Runge-Kutta)."""
 
     def rate(t: float, frame: Samples) -> Samples:
         small = 1e-6
@@ -69,7 +69,7 @@ def integrate_rotation(
 
 
 def make_placement(positions: Samples = PLACES) -> Placement:
-    """The deck of the body; parts 1 to 4 hang together, 5 is the engine."""
+    """Return the deck of the body: parts 1 to 4 are connected, 5 is the engine."""
     return cast(
         "Placement",
         SimpleNamespace(
@@ -100,7 +100,7 @@ def find_drift_and_turn(
 def test_angle_and_place_are_those_of_the_two_motions(
     momentum: Samples, path: Samples, tr: float
 ) -> None:
-    """Within 2 % of the largest over the flight, where the engine slides by 2 cm and the body turns by up to 30 deg."""
+    """Within 2 % of the largest of the flight; the engine slides 2 cm and the body rotates up to 30 degrees."""
     full, td = 900.0 * momentum, 0.095
     start = int(np.searchsorted(TIME, tr))
 
@@ -144,7 +144,7 @@ def test_angle_and_place_are_those_of_the_two_motions(
 
 @cache
 def make_body_with_sliding_engine() -> Samples:
-    """A body whose engine slides while it turns about its length."""
+    """Return a body whose engine slides while the body rotates about its long axis."""
     slide = np.array([0.0, 0.0, 0.02])
     frames = integrate_rotation(
         np.array([900.0, 0.0, 0.0]), lambda t: slide * np.sin(94.0 * t), TIME, np.eye(3)
@@ -190,7 +190,7 @@ def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -
 
 
 def test_what_flies_with_a_body_holds_it() -> None:
-    """The frame of three corners is pushed by the mass share in all that flies, not in what becomes rigid."""
+    """The frame is displaced by the mass share in everything that flies, not in the parts that become rigid."""
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.5 * TIME
     inside = PLACES + slides
@@ -224,7 +224,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
 def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
     tmp_path: Path,
 ) -> None:
-    """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
+    """Centre and orientation of 12 nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
     deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
     where = Placement(read_inventory(str(deck)))
     with locate_results("car_runs.csv").open() as table:

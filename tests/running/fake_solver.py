@@ -1,9 +1,10 @@
-"""A solver for tests: a box that is pushed, flies, lands and flies again, one state of its history after the other.
+"""Fake solver for tests: a box that is pushed, flies, lands and flies again, computed state by state.
 
-``python fake_solver.py starter|engine DECK`` in the folder of a run.  The engine goes on from the restart of the leg
-before and writes its own; what it prints is what OpenRadioss prints there.  D2RPICK_FAKE names what goes wrong:
-``fail`` ends leg 2 with an error, ``hang`` lets leg 2 sleep, ``slow`` takes its time for each state, and ``empty`` and
-``cut`` leave no whole restart of leg 3 once, as a disk does that is full; that of ``damaged`` only looks whole.
+``python fake_solver.py starter|engine DECK`` runs in the folder of a run.  The engine continues from the restart file
+of the previous restart segment, writes its own, and prints what OpenRadioss prints.  D2RPICK_FAKE names a fault:
+``fail`` ends segment 2 with an error, ``hang`` makes segment 2 sleep, ``slow`` delays each state.  ``empty`` and
+``cut`` leave an incomplete restart file of segment 3 once, as a full disk does; with ``damaged`` it only looks
+complete.
 """
 
 import math
@@ -28,7 +29,7 @@ CODES = (1, 2, 3, 4, 5, 6)
 
 
 def compute_momentum(now_time: float, *, rigid: bool) -> float:
-    """Momentum of the box along z: gravity and each push, softly, add to it."""
+    """Return the momentum of the box along z: the sum of gravity and all pushes."""
     late = LATER if rigid else 0.0
     shares = (
         min(max(now_time - begin - late * (begin > 0), 0.0) / (end - begin), 1.0)
@@ -41,7 +42,7 @@ def compute_momentum(now_time: float, *, rigid: bool) -> float:
 
 
 def state(now_time: float, *, rigid: bool) -> tuple[list[float], list[float]]:
-    """Quantities of the whole model, and of its part, whose own are void while it is rigid."""
+    """Return global values and part values; the first values of the part are meaningless (9e9, 0) while it is rigid."""
     along = compute_momentum(now_time, rigid=rigid)
     energy = (
         0.0 if now_time <= 0 else 50.0 + 20.0 * math.cos(2 * math.pi * now_time / 0.01)
@@ -51,7 +52,7 @@ def state(now_time: float, *, rigid: bool) -> tuple[list[float], list[float]]:
 
 
 def write_restart(name: str, number: int, content: str = "") -> Path:
-    """Name the restart of a leg, and write it, if it has a content."""
+    """Return the path of the restart file of a restart segment; write it if ``content`` is not empty."""
     path = Path(f"{name}_{number:04d}_0001.rst")
     if content:
         path.write_text(f"{path.name} {content}".ljust(SIZE))
@@ -59,7 +60,7 @@ def write_restart(name: str, number: int, content: str = "") -> Path:
 
 
 def run_engine(deck: Path) -> None:
-    """Compute a leg from the restart of the leg before."""
+    """Compute a restart segment from the restart file of the previous one."""
     text, fault = deck.read_text(), os.environ.get("D2RPICK_FAKE", "")
     head = re.search(r"/RUN/(\w+)/(\d+)\n\s*(\S+)", text)
     assert head

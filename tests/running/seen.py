@@ -1,4 +1,4 @@
-"""Evidence and inner motion of a whole record, as a run that has come to its end shows them."""
+"""Evidence and inner motion of a whole record, as a finished run shows them."""
 
 from d2rpick.histories.history import History
 from d2rpick.running.evidence import Evidence

@@ -1,4 +1,4 @@
-"""A run that switches itself, with a solver that is a script: what is left of it, also after what ends it early."""
+"""A run that switches itself, with a script as solver: its results, also after an early end."""
 
 import errno
 import json
@@ -80,7 +80,7 @@ def make_driving(folder: Path) -> Driving:
 
 
 def check_finished_run(report: dict[str, Any], folder: Path) -> None:
-    """What must hold of every run that came to its end: it is whole, and rigid in the flight alone."""
+    """Check what must hold for every finished run: it is complete, and rigid in the flight only."""
     switched = [
         window_row for window_row in report["windows"] if window_row["reason"] is None
     ]
@@ -112,7 +112,7 @@ def read_histories(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
-    """A run that nothing disturbed, and what was said of it."""
+    """Return an undisturbed run, and the answer about it."""
     folder = tmp_path_factory.mktemp("whole")
     return folder, json.loads(
         run(*prepare_drive(folder, "--report", str(folder / "page.html"), "-q")).stdout
@@ -156,7 +156,7 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
     whole: tuple[Path, dict[str, object]],
     fault: str,
 ) -> None:
-    """A disk that was full, a machine that is busy, a solver that fails once: its history is the same, bit by bit."""
+    """After a full disk, on a slow machine, or after a solver error, the history is the same bit by bit."""
     monkeypatch.setenv("D2RPICK_FAKE", fault)
     result = run(*prepare_drive(tmp_path))
     if fault == "fail":
@@ -232,7 +232,7 @@ def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
 def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     tmp_path: Path, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    """Restarts that are damaged meanwhile: it goes on from an earlier one, in the end from that of the starter."""
+    """If restart files are damaged, the run continues from an earlier one, in the end from that of the starter."""
     shutil.copytree(whole[0] / "deck", tmp_path / "deck")
     shutil.copytree(whole[0] / "run", tmp_path / "run")
     journal = tmp_path / "run" / "drive.ndjson"

@@ -1,4 +1,4 @@
-"""When no force acts, and how long it must not: on computed runs, and on made ones whose law is known."""
+"""Force-free times, and how long they must last, for computed runs and for synthetic ones of known motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -36,7 +36,7 @@ def record(*names: str) -> History:
 
 
 def list_spans(quiet_spans: Sequence[Quiet]) -> NDArray[np.float64]:
-    """Starts and ends, NaN where none is seen."""
+    """Return start and end of each span, NaN if unknown."""
     return np.array([(span.start, span.end) for span in quiet_spans], np.float64)
 
 
@@ -73,7 +73,7 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
 
 
 def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
-    """In the box the longest swing was pushed at 302 ms and took 24 ms, half of the period of the springs is 17 ms."""
+    """The longest cycle of the box contains a push at 302 ms and lasts 24 ms; half the spring period is 17 ms."""
     for earlier_wait in (None, Wait(0.018, "record", "as in the flight before")):
         waits = [
             wait.wait
@@ -149,7 +149,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
 
 
 def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
-    """The rollover box rises by 1.5 m/s; it lands 6 % before that, turned."""
+    """The rollover box rises at 1.5 m/s; because it rotates, it lands 6 % before it is level again."""
     rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(
         Selection(parts=("box",))
     )
@@ -166,7 +166,7 @@ def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
 
 
 def test_a_record_of_as_many_states_as_parts_keeps_the_masses_of_all() -> None:
-    """Three states of three parts: cut to two states, each part still has its mass."""
+    """Three states of three parts, cut to two states: each part still has its mass."""
     parts = tuple(Part(number, str(number)) for number in (1, 2, 3))
     momenta = Momenta(
         np.arange(3.0),
@@ -181,7 +181,7 @@ def test_a_record_of_as_many_states_as_parts_keeps_the_masses_of_all() -> None:
 
 @cache
 def make_pushed_body(tail: float, share: float) -> History:
-    """A body of 10 kg that is pushed for 30 ms, and lands after 170 ms; a share ``left`` of the push dies away."""
+    """Return a body of 10 kg, pushed for 30 ms, landing after 170 ms; ``share`` of the push decays slowly."""
     time = np.arange(0.0, 0.2, 2e-4)
     push = 30.0 * np.sin(np.pi / 2 * np.minimum(time / 0.03, 1.0)) ** 2
     decaying_push = (
@@ -206,7 +206,7 @@ def make_pushed_body(tail: float, share: float) -> History:
 def test_no_flight_is_lost_behind_a_push_that_dies_away(
     tail: float, share: float, wait: float
 ) -> None:
-    """Its first states are within what may be left, and later not: the flight begins later, and goes on."""
+    """Its first states are within the remaining force, later ones are not: the flight begins later, and continues."""
     history = make_pushed_body(round(tail, 4), round(share, 4))
     (flight,) = quiet_times(history, lambda *_: wait)
     assert 0.02 <= flight.start <= 0.05
@@ -252,7 +252,7 @@ def take_states(history: History, states: NDArray[np.bool_]) -> History:
 
 @pytest.mark.parametrize("jump", [True, False])
 def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> None:
-    """It swings with 50 Hz, so that what deforms takes 20 ms for half a period."""
+    """It vibrates at 50 Hz, so that half a period of the deformation takes 20 ms."""
     time = np.arange(0.0, 0.1, 5e-5)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.02)
     energy[0] = 0.0 if jump else energy[0]

@@ -1,4 +1,4 @@
-"""A first run that switches itself: what its legs and switches say, and what is refused."""
+"""A first run that switches itself: the content of its engine files and switches, and what is refused."""
 
 import math
 import re
@@ -32,7 +32,7 @@ def write_radioss_run(folder: Path, contents: str = CONTACT + THROWN + GRAVITY) 
 
 
 def read_leg_states(files: tuple[str, ...]) -> list[tuple[bool, int]]:
-    """Whether each leg is rigid, and the sensor that ends it."""
+    """Return for each engine file if it is rigid, and the sensor that ends it."""
     return [
         (rigid, leg.sensor)
         for leg in read_run(files[0]).legs
@@ -145,7 +145,7 @@ def test_a_deck_without_known_springs_asks_for_the_wait(tmp_path: Path) -> None:
 def write_dyna_run(
     folder: Path, contact: str = "AUTOMATIC_SURFACE_TO_SURFACE_ID"
 ) -> str:
-    """Two shells that share nodes, one apart from them, and a contact."""
+    """Write two shells that share nodes, one separate shell, and a contact."""
     nodes = "".join(
         f"{n:8d}{n % 3:16.1f}{n // 3:16.1f}{0.0:16.1f}\n" for n in range(1, 20)
     )

@@ -1,4 +1,4 @@
-"""What a look adds to those before: new states alone, or all of them where files were written anew."""
+"""What a look at growing files adds: only new states, or all states if files were written again."""
 
 import gzip
 from pathlib import Path
@@ -73,7 +73,7 @@ def test_files_that_were_written_anew_are_read_as_a_whole(
 
 
 def make_falling_masses() -> Written:
-    """Three masses that are pushed for a tenth of the record and fall then, while they vibrate."""
+    """Return three vibrating masses that are pushed for 10 % of the record and then fall."""
     time = np.linspace(0.0, 1.0, 401)
     masses = np.array([3.0, 2.0, 1.0])
     swing = np.outer(np.sin(60 * time), [1.0, -1.0, 0.0])
@@ -90,7 +90,7 @@ SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
 
 
 def _find_state(data: bytes, share: float) -> int:
-    """End of a state of a glstat near a share of its length; of other contents the length itself."""
+    """Return the end of a glstat state near a share of the length; for other contents, the length itself."""
     size = int(share * len(data))
     end = data.find(b"\n dt of cycle", size)
     return end if end > 0 else size
@@ -127,7 +127,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
     tmp_path: Path,
 ) -> None:
-    """Its numbers are others than before, so that what was made of them does not count."""
+    """Its numbers change, so results derived from it are discarded."""
     run, looks = make_falling_masses(), Looks(Selection())
     for last_energy in (7.0, 8.0):
         internal = run.internal[:200].copy()

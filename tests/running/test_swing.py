@@ -1,4 +1,4 @@
-"""What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
+"""Warnings about parts that still vibrate when a body becomes rigid, from the flight so far and without td."""
 
 from functools import cache
 
@@ -21,7 +21,7 @@ FREE, TD = 0.0385, 0.1464
 
 @cache
 def read_car_with_drift() -> tuple[History, Drift]:
-    """A computed run, and how its bodies drift in its flight."""
+    """Return a computed run, and the drift of its bodies in the flight."""
     history = read_solved("carT01.gz").history
     (momenta,) = (
         part_momenta
@@ -50,7 +50,7 @@ def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> Non
 def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     swings: float,
 ) -> None:
-    """They swing against each other at 25 Hz, fall, and do not turn; from an end of the swing it is twice as far."""
+    """The parts vibrate against each other at 25 Hz, fall, and do not rotate; from an extremum the error is doubled."""
     time, masses = np.linspace(0.0, 0.06, 241), np.array([30.0, 10.0])
     values = np.zeros((time.size, 2, 3))
     values[:, :, 2] = np.outer(-9.81 * time - 1.0, masses)

@@ -1,4 +1,4 @@
-"""A run that is watched: it has not begun, grows, is cut in a record, goes silent, starts again, ends."""
+"""Watching a run that has not begun, grows, is cut within a record, goes silent, restarts, or ends."""
 
 import gzip
 import os

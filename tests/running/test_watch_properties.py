@@ -1,4 +1,4 @@
-"""Events of a run so far: a made body that swings, is pushed, flies and lands, as long as one likes."""
+"""Events of a run so far, for a synthetic body that vibrates, is pushed, flies and lands."""
 
 from functools import cache
 
@@ -48,7 +48,7 @@ def list_events(
 
 
 def test_a_gap_between_two_pushes_is_no_flight() -> None:
-    """It lasts for 40 ms, half of the period for 60."""
+    """The gap lasts 40 ms; half of the vibration period is 60 ms."""
     found_events = find_events(*take_whole_record(make_pushed_history()))
     events = [
         event.event for event in found_events if event.event in ("flight", "contact")

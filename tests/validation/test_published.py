@@ -362,6 +362,6 @@ def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
 
 
 def read_named_columns(name: str) -> dict[str, np.ndarray]:
-    """Columns of a sample by their names."""
+    """Return the columns of a sample by name."""
     rows = np.genfromtxt(name, delimiter=",", names=True)
     return {column: rows[column] for column in rows.dtype.names or ()}

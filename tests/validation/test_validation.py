@@ -1,4 +1,4 @@
-"""The runs of the solver that the documentation quotes: decks, legs, comparison, figures."""
+"""The solver runs quoted in the documentation: decks, restart segments, comparison, figures."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Validation of residuals by the motion of all nodes: the decks, the measures, and the results that the docs show."""
+"""Validation of residuals by the motion of all nodes: decks, measures, and the results shown in the docs."""
 
 import gzip
 import re
@@ -39,7 +39,7 @@ DOCS = (ROOT / "docs" / "validation.md").read_text("utf-8")
 
 
 def move_nodes(velocities: np.ndarray) -> Motion:
-    """Nodes at their places with constant velocities."""
+    """Return nodes at their positions with constant velocities."""
     return Motion(
         TIMES,
         *(

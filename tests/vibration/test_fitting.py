@@ -1,4 +1,4 @@
-"""What a fit leaves over: scatter or structure, and when a part of the samples is enough to tell."""
+"""Misfit of a fit: scatter or structure, and when a subset of the samples decides."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ S = np.linspace(0.0, 1.0, 20_000)
 
 
 def draw_noise(size: int, seed: int = 14) -> np.ndarray:
-    """White noise of unit variance."""
+    """Return white noise of unit variance."""
     return np.random.default_rng(seed).standard_normal(size)
 
 

@@ -1,4 +1,4 @@
-"""The oscillator behind an energy history: bounds on its parameters, and what is refused and why."""
+"""The oscillator identified from an energy history: bounds on its parameters, and reasons to refuse it."""
 
 from collections.abc import Callable
 
@@ -45,7 +45,7 @@ def list_parameters(mode: Mode) -> Samples:
 
 
 def draw_record(seed: int, second: float = 0.0) -> tuple[Samples, Samples, Mode]:
-    """Valid record of 2-20 periods; ``second`` adds a mode with that share of the first one's energy."""
+    """Return a valid record of 2 to 20 periods; ``second`` adds a mode with that share of the first one's energy."""
     rng = np.random.default_rng(seed)
     periods, density = (
         np.exp(rng.uniform(np.log(2), np.log(20))),
@@ -339,7 +339,7 @@ def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
 def move_about_preload(
     time: Samples, omega: float, phase: float
 ) -> tuple[Samples, Samples]:
-    """Deformation about a preload that it never passes zero with, and its velocity over omega."""
+    """Return a deformation that never passes zero because of a preload, and its velocity over omega."""
     return 1 + 0.2 * np.cos(omega * time + phase), -0.2 * np.sin(omega * time + phase)
 
 
@@ -358,7 +358,7 @@ def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_f
 def test_what_has_too_few_samples_is_not_taken_for_a_vibration_of_half_its_rate() -> (
     None
 ):
-    """The refused fit of a fast vibration about a preload, aliased, was accepted without a look at its samples."""
+    """A fast vibration about a preload, aliased, must not be accepted without a look at its samples."""
     for rate in np.linspace(4.1, 4.6, 6).tolist():
         time = np.arange(0.0, 6.0, 1 / rate)
         assert not identify(

@@ -1,4 +1,4 @@
-"""The lines of an energy, and what keeps them from being found."""
+"""Spectral lines of an energy, and reasons why they cannot be found."""
 
 from __future__ import annotations
 

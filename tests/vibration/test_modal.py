@@ -1,4 +1,4 @@
-"""The residual of any pair from the energy alone: against the motion of the modes, and where it must be refused."""
+"""Residual of any pair from the energy alone, compared with the motion of the modes; and when it must be refused."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PAIRS = np.array([(tr, td) for tr in EVEN for td in EVEN if tr < td]).T
 
 
 def compute_residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
-    """What follows from the lock-in error and the kinetic share."""
+    """Return the residuals that follow from the lock-in error and the kinetic fraction."""
     return residual(lock_in_error(vibration, tr, td), kinetic_share(vibration, td))
 
 
@@ -133,7 +133,7 @@ def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
 
 
 def compute_rubbed_energy() -> Samples:
-    """Energy of a mass that slides with friction on its spring: its swings fall by the same length each time."""
+    """Return the energy of a mass on a spring with dry friction: its amplitude drops by the same amount each cycle."""
     position, speed, step = 1.0, 0.0, 2e-3
     positions = []
     for _ in range(4500):
@@ -147,7 +147,7 @@ def compute_rubbed_energy() -> Samples:
 def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
     third: float, is_harmonic: bool
 ) -> None:
-    """Modes at twice and three times the rate of a weak one may begin in step with it."""
+    """Modes at twice and three times the frequency of a weak one may begin in phase with it."""
     energy = (
         np.cos(8 * TIME) ** 2
         + 0.3 * np.cos(16 * TIME) ** 2
@@ -199,7 +199,7 @@ LOADED = make_energy_history(
 
 
 def compute_true_residual(tr: float, td: float) -> float:
-    """R of one pair, by the motion."""
+    """Return R of one pair from the motion."""
     return float(STRUCTURE.residual(np.array([tr]), np.array([td]))[0])
 
 
@@ -240,7 +240,7 @@ def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there
 
 
 def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> None:
-    """At a td where nearly all energy is kinetic, no tr is better than a release without any vibration."""
+    """If nearly all energy is kinetic at td, no tr is better than a release without any vibration."""
     tds = np.linspace(4.0, 8.5, 600)
     share = STRUCTURE.kinetic_energy(tds) / (
         STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds)
@@ -277,7 +277,7 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
 
 
 def test_a_weak_mode_of_few_states_is_told_of() -> None:
-    """Its line holds too little for the strong ones, and shows that the record may hold faster ones unseen."""
+    """Its line is too weak for strong modes, and shows that faster modes may be invisible in the record."""
     for rate, is_coarse in ((3.3, False), (30.3, True)):
         time = np.linspace(0.0, 6.0, 1200)
         strong = np.cos(2 * np.pi * time) ** 2 + 0.7 * np.cos(14.3 * time) ** 2

@@ -1,4 +1,4 @@
-"""The closed form of a single-mode energy record."""
+"""Closed form of a single-mode energy history."""
 
 from collections.abc import Callable
 
@@ -59,7 +59,7 @@ def test_the_level_of_a_peak_is_crossed_before_it_but_not_at_it() -> None:
 def estimate_slope(
     function: Callable[[Samples], Samples], mode: Mode
 ) -> tuple[Samples, float]:
-    """Its central difference at T, and how exact that is for energies of the mode."""
+    """Return the central difference of ``function`` at T, and its accuracy for energies of the mode."""
     rate = mode.omega + mode.alpha
     h = 1e-5 / rate
     return (function(T + h) - function(T - h)) / (2 * h), 1e-6 * rate * float(

@@ -1,4 +1,4 @@
-"""The modes of a structure, identified from the lines of its energy, and the residuals that follow from them."""
+"""Modes of a structure identified from the lines of its energy, and the residuals that follow."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PAIRS = np.array(
 def draw_modes(
     rng: np.random.Generator, count: int, most_damping: float = 0.5
 ) -> list[Mode]:
-    """Modes with a damping each, the slowest with period 1, the others up to four times as fast."""
+    """Draw damped modes, the slowest with period 1, the others up to four times as fast."""
     while True:
         rates = 2 * np.pi * np.sort(1 + np.append(0.0, rng.uniform(0.2, 3, count - 1)))
         alpha = rng.uniform(0, most_damping, count)
@@ -58,7 +58,7 @@ TWO = draw_modes(np.random.default_rng(5), 2)
 
 
 def predict_residuals(modal: ModalVibration, tr: Samples, td: Samples) -> Samples:
-    """Residual of pairs, each of shape (n,), by the measures of a deformation [-]."""
+    """Return the residuals of pairs, each of shape (n,), by the measures of a deformation [-]."""
     squared = modal.separation(tr, td) + modal.kinetic_energy(td)
     return np.asarray(np.sqrt(squared / modal.vibration_energy(td)))
 
@@ -121,7 +121,7 @@ def test_rates_damping_and_energies_of_the_modes_are_found(
 
 @pytest.mark.parametrize("states", [300, 1200, 60_000])
 def test_the_modes_are_known_up_to_both_ends_of_their_window(states: int) -> None:
-    """Fine records are brought to means over blocks, whose middles do not reach the ends."""
+    """Fine records are averaged over blocks, whose middles do not reach the ends."""
     time = np.linspace(0, 6, states)
     modal = require(identify_modal(time, sum_energies(TWO, time)))
     assert modal.known_at(6.0)
@@ -185,7 +185,7 @@ def test_the_rollover_is_no_oscillator() -> None:
 
 
 def test_the_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
-    """Lines at the sums and differences of the rates hold more than the mean, as no modes do."""
+    """Lines at the sums and differences of the frequencies exceed the mean, which modes cannot do."""
     first, second = (mode.deformation(TIME) for mode in TWO)
     assert not require(identify_modal(TIME, (first + second) ** 2)).signed
 
@@ -231,7 +231,7 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
 def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
     share: float,
 ) -> None:
-    """The oscillator alone stated a residual of zero at any peak of the energy, while the other mode stood opposed."""
+    """The oscillator alone states a residual of 0 at any energy peak, while the other mode has the opposite sign."""
     main, root = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0), float(np.sqrt(share))
     modes = [main, Mode(2 * np.pi * 2.3, 0.2, 0.5 * root, 0.8 * root, 0.0)]
     history = make_table(TIME, sum_energies(modes, TIME))
@@ -249,7 +249,7 @@ def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
 
 
 def test_given_the_end_of_the_load_modes_tell_the_end_of_the_flight() -> None:
-    """After it the energy jumps, as in a landing: modes of the flight alone describe it."""
+    """After the flight the energy jumps, as in a landing; only the flight can be described by modes."""
     energy = sum_energies(TWO, TIME) + 5.0 * np.maximum(TIME - 5.0, 0.0)
     situation = examine(make_table(TIME, energy), 4.0, Settings(after=0.2))
     assert situation.basis == "modal"

@@ -1,4 +1,4 @@
-"""Times that may serve as tr: minima of the lock-in error, and intervals that hold the true time."""
+"""Candidate times for tr: minima of the lock-in error, and intervals that contain the true time."""
 
 from dataclasses import replace
 
@@ -120,7 +120,7 @@ def draw_mode(rng: np.random.Generator) -> Mode:
 def measure_coverage(
     samples_per_period: int, digits: int, *, jitter: float, runs: int
 ) -> tuple[float, float]:
-    """Share of the crossings that the samples show whose interval holds the true one; median width over step."""
+    """Return the share of visible crossings whose interval holds the true one, and the median width over the step."""
     rng = np.random.default_rng(20261)
     inside, widths = [], []
     for _ in range(runs):

@@ -1,4 +1,4 @@
-"""Closed forms against independent numbers, scipy's integrator, and what mechanics says must hold."""
+"""Closed forms compared with independent numbers, scipy's integrator, and laws of mechanics."""
 
 from collections.abc import Callable
 
@@ -38,7 +38,7 @@ oscillators = st.builds(
 
 
 def scale(oscillator: Oscillator, start: State) -> float:
-    """Largest displacement and velocity that the motion can reach, for comparisons relative to it."""
+    """Return the largest displacement and velocity that the motion can reach, as a scale for errors."""
     return (
         float(
             np.sum(np.abs(start)) * max(1, oscillator.omega_0, 1 / oscillator.omega_0)

@@ -1,4 +1,4 @@
-"""Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
+"""Deformations of single parts: their signs, the residual that follows, and when they have no sign."""
 
 from copy import copy
 from dataclasses import replace
@@ -31,7 +31,7 @@ NAMES = ("IE_spring1_J", "IE_spring2_J")
 
 
 def move_two_springs(time: np.ndarray) -> np.ndarray:
-    """Signed deformations of two parts in which two modes mix, shape (n, 2)."""
+    """Return signed deformations of two parts in which two modes mix, shape (n, 2)."""
     slow, fast = (
         np.exp(-0.1 * time) * np.sin(5 * time),
         np.exp(-0.1 * time) * np.cos(8.3 * time),
@@ -40,7 +40,7 @@ def move_two_springs(time: np.ndarray) -> np.ndarray:
 
 
 def compute_deformations(parts: SignedParts, t: np.ndarray) -> np.ndarray:
-    """Signed deformations of whole parts, shape (k, n)."""
+    """Return signed deformations of parts described by waves, shape (k, n)."""
     return np.array(
         [
             motion.model.deformation(t)
@@ -61,7 +61,7 @@ def make_part_history(deformation: np.ndarray, time: np.ndarray) -> History:
 
 @cache
 def examine_chain_at(td: float) -> Situation:
-    """The chain from a td."""
+    """Return the situation of the chain at a td."""
     return examine(chain.read_chain_history(), td, PLAIN)
 
 
@@ -345,7 +345,7 @@ TWO_PARTS = ("A", "B")
 
 
 def make_motion_in_planes(share: float) -> Motion:
-    """A bends in two planes, of which the second has that share of its energy; B has one mode."""
+    """Return a part A that bends in two planes, the second with ``share`` of its energy, and a part B with one mode."""
     forms = np.array([np.diag([1 - share, share, 0.0]), np.diag([0.0, 0.0, 0.5])])
     return Motion(
         7.7,
@@ -356,7 +356,7 @@ def make_motion_in_planes(share: float) -> Motion:
 
 
 def make_grouped_springs() -> Motion:
-    """Three springs in which three modes mix; the first two are one part."""
+    """Return three springs in which three modes mix; the first two springs are one part."""
     rows = np.array([[1.0, 0.7, -0.2], [0.8, -0.9, 0.4], [0.3, 0.2, 1.0]])
     forms = np.einsum("si,sj->sij", rows, rows)
     return Motion(
@@ -390,7 +390,7 @@ def make_history_of_motion(motion: Motion, noise: float = 0.0) -> History:
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     share: float, noise: float, basis: str
 ) -> None:
-    """A part whose planes both swing has no sign; the modes of the whole have."""
+    """A part vibrating in both planes has no sign; the modes of the whole structure have."""
     truth, td = make_motion_in_planes(share), 0.31
     answer = suggest(make_history_of_motion(truth, noise), td, Settings(after=0.0))
     assert answer.situation.basis == basis
@@ -442,7 +442,7 @@ def test_parts_of_several_springs_in_which_modes_mix_have_no_sign() -> None:
 
 
 def test_what_crosses_between_modes_in_the_parts_is_no_part_of_the_error() -> None:
-    """The energy of the parts alone may come back wrong by it at td, and is right a moment later."""
+    """It makes the energy of single parts wrong at td, but only for a moment."""
     rows = np.array([[0.9, 0.6], [0.8, -0.3]])
     forms = np.einsum("pi,pj->pij", rows, rows)
     truth = Motion(3.0, 2 * np.pi * np.array([24.0, 37.0]), np.array([0.4, 2.1]), forms)

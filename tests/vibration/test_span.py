@@ -1,4 +1,4 @@
-"""The window in which a record stays with an oscillator, what is tried to find it, and what may hide in its rest."""
+"""The span that one oscillator describes, how it is searched, and what its misfit may hide."""
 
 import tracemalloc
 
@@ -39,7 +39,7 @@ def make_history(energy: np.ndarray) -> History:
 
 
 def find_span_by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
-    """Where means over a twenty-fifth of a period leave the paper's mode by more than 1 % of its energy."""
+    """Return the span in which running means over 1/25 period stay within 1 % of the energy of the paper's mode."""
     width = round(2 * np.pi / MODE.omega / 25 / 1e-4)
     gone = np.abs(
         np.convolve(energy - ENERGY, np.ones(width) / width, mode="same")
@@ -139,7 +139,7 @@ TIMES = np.arange(0, 7, 1 / 40)
 
 
 def add_second_mode(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
-    """The main mode and one with that share of its energy."""
+    """Return the main mode and one with this share of its energy."""
     root = float(np.sqrt(share * MAIN.vibration_energy(0.0)))
     return MAIN, Mode(
         rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0

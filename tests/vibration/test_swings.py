@@ -1,4 +1,4 @@
-"""Counting the swings of an energy: the signs of a motion that was integrated, or none where a mode hides."""
+"""Counting the oscillation cycles of an energy: signs of an integrated motion, or none if a mode may be hidden."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,7 +26,7 @@ TIME: Samples = np.linspace(0.0, 30.0, 1201)
 
 
 def integrate_stiffening_spring(by: float, alpha: float) -> tuple[Samples, Samples]:
-    """Deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
+    """Return the deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
     solution = solve_ivp(
         lambda _, x: (x[1], -alpha * x[1] - x[0] - by * x[0] ** 3),
         TIME[[0, -1]],
@@ -66,7 +66,7 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(
 def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(
     rate: float, phase: float, share: float
 ) -> None:
-    """The residual with both modes known is not above the highest that counting tells."""
+    """The residual with both modes known is at most the upper limit that counting gives."""
     two_planes = np.stack([np.sin(TIME), np.sqrt(share) * np.sin(rate * TIME + phase)])
     swings = count_swings(TIME, np.sum(two_planes**2, axis=0))
     if swings is None:

@@ -1,4 +1,4 @@
-"""Waves: signed records made of a few are found again, others are none."""
+"""Sums of waves: signed records made of a few waves are recovered, other records are refused."""
 
 import numpy as np
 import pytest
