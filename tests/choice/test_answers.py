@@ -1,4 +1,4 @@
-"""What suggest decides and verify judges, and that a record is examined once: what is recommended verifies."""
+"""Choices of suggest and verdicts of verify: a recommended pair verifies, and each record is examined once."""
 
 from functools import partial
 from typing import Any
@@ -41,7 +41,7 @@ PLAIN = Settings()
 
 @pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
-    """By the contact energy the trip ends at 90.8 ms."""
+    """According to the contact energy, the trip ends at 90.8 ms."""
     answer = suggest(read_rollover(), 0.37, PLAIN)
     flight = answer.situation.flight
     assert (answer.situation.basis, flight.source, flight.certain) == (
@@ -173,7 +173,7 @@ def test_verify_measures_what_suggest_measures() -> None:
 
 
 def make_ringing_history() -> History:
-    """Three modes and noise, finely sampled: of several modes a tr may be a closest match, which is off the level."""
+    """Return three modes with noise, finely sampled; a tr for several modes may be a closest match, off the level."""
     time = np.linspace(0, 0.5, 10_001)
     modes = [(5, 4, 300, 0.3), (2, 6, 777, 1), (1, 9, 1500, 2)]
     energy = sum(
@@ -214,7 +214,7 @@ OPTIONS = st.builds(
 
 @st.composite
 def histories(draw: st.DrawFn) -> History:
-    """A load that falls, then one or two modes, damped or not, with noise, sampled finely or coarsely."""
+    """Draw a load that falls, then one or two modes, damped or not, with noise, finely or coarsely sampled."""
     count, rng = (
         draw(st.integers(12, 90)),
         np.random.default_rng(draw(st.integers(0, 2**32 - 1))),
@@ -239,7 +239,7 @@ def histories(draw: st.DrawFn) -> History:
 
 
 def verify_pair(history: History, pair: Pair | None, settings_asked: Settings) -> bool:
-    """Whether a pair is verified; none is."""
+    """Return True if a pair verifies; no pair counts as verified."""
     if pair is None:
         return True
     return verify(history, pair.tr, pair.td, settings_asked).admissible

@@ -1,4 +1,4 @@
-"""Weights fitted to legs: what the legs tell is found, what they do not keeps its ratio."""
+"""Element weights fitted to the times of restart segments; ratios that the segments do not determine are kept."""
 
 import shutil
 from collections.abc import Mapping
@@ -71,7 +71,7 @@ def test_a_run_without_switching_is_needed() -> None:
 
 
 def write_listing(cycles: int, elements: float, total: float) -> str:
-    """End of an engine listing."""
+    """Return the end of an engine listing."""
     return (
         f" ** CUMULATIVE CPU TIME SUMMARY **\n CONTACT SORTING.............: .2224E+00     1.53 %\n"
         f" ELEMENT FORCES..............: {elements:.4E}    85.72 %\n"
@@ -81,7 +81,7 @@ def write_listing(cycles: int, elements: float, total: float) -> str:
 
 
 def run_folder(folder: Path) -> Path:
-    """A run of two legs, in the second of which part 1 of its two shells is rigid."""
+    """Write a run of two restart segments; part 1 of its two shells is rigid in the second."""
     parts = "".join(
         f"/PART/{n}\np{n}\n{pad(1, 1)}/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}"
         for n in (1, 2)

@@ -1,4 +1,4 @@
-"""Candidates for tr: which times are offered, what is measured at them, and what speaks against them."""
+"""Candidates for tr: the times offered, their measures, and the reasons against them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Finished switched runs held against their reference: by a solver, and by the closed form; which parts count."""
+"""Finished switched runs compared with their reference, from a solver and from closed forms."""
 
 import re
 from collections.abc import Callable
@@ -38,7 +38,7 @@ LEGS = locate_stored("rollover_r100_T0*.gz")
 
 
 def scan(run_name: str) -> dict[str, float]:
-    """Row of the table in which the solver's runs were evaluated when they were computed."""
+    """Return a row of the table with the results of the solver's switched runs."""
     table = np.genfromtxt(
         locate_results("rollover_scan.csv"),
         delimiter=",",
@@ -52,7 +52,7 @@ def scan(run_name: str) -> dict[str, float]:
 
 
 def verify_rollover(*options: str) -> dict[str, Any]:
-    """Answer of verify for the rollover switched at 100 ms, its three legs given by a glob."""
+    """Return the answer of verify for the rollover switched at 100 ms; a glob names its three restart segments."""
     return run_json(*VERIFY, BOX, "--switched", LEGS, *options)
 
 
@@ -103,7 +103,7 @@ def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
 
 
 def test_the_times_are_read_off_the_switched_run() -> None:
-    """Its states are 0.5 ms apart; the option does not take the history that follows it."""
+    """Its states are 0.5 ms apart; the option must not swallow the history argument after it."""
     verdict = run_json("verify", "--part", "box", "--switched", LEGS, BOX)
     assert (verdict["tr"], verdict["td"]) == (
         pytest.approx(0.1, abs=5e-4),
@@ -140,7 +140,7 @@ def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
 def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(
     tmp_path: Path,
 ) -> None:
-    """Nothing vibrates before the ground: the energies of both runs are round-off until then."""
+    """Nothing vibrates before the landing: the energies of both runs are round-off until then."""
     box = ("rollover", "--drop", "0.1", "--mesh", "4", "--t-end", "0.18")
     names = [str(tmp_path / f"{name}.matsum") for name in ("reference", "switched")]
     for name, switches in zip(names, ((), ("--tr", "0", "--td", "0.13")), strict=True):
@@ -262,7 +262,7 @@ SWITCHES = ("--tr", str(TR), "--td", str(TD))
 
 @pytest.fixture
 def replayed(tmp_path: Path) -> Callable[..., str]:
-    """Write a replay as a matsum: with these options, and with a change of its text."""
+    """Return a function that writes a replay as a matsum, with options and with a change of its text."""
 
     def write(
         name: str, *options: str, change: Callable[[str], str] = str, v0: str = "6"
@@ -277,7 +277,7 @@ def replayed(tmp_path: Path) -> Callable[..., str]:
 
 
 def replace_while_rigid(text: str, pattern: str, number: float) -> str:
-    """Write ``number`` for what matches in the states between the switches."""
+    """Write ``number`` in place of each match in the states between the switches."""
     head, *states = text.split("\n time =")
     rigid = re.compile(rf"({pattern}=) *[-+.\dE]+")
     new = [
@@ -467,7 +467,7 @@ def make_history(energy: Samples, time: Samples = TIME, name: str = "run") -> Hi
 def compare_momenta(
     momenta: tuple[Track | None, Track | None], td: float = 0.5
 ) -> Comparison:
-    """Compare two runs of one energy by their momenta."""
+    """Compare two runs of the same energy by their momenta."""
     return compare_runs(
         make_history(1 + TIME),
         make_history(1 + TIME),
@@ -554,7 +554,7 @@ LONG: Samples = np.linspace(0.0, 1.0, 1001)
 
 
 def make_crushed_energy(vibration: float) -> Samples:
-    """Energy of a body that was crushed, mostly plastic: it goes on falling and rising while it vibrates."""
+    """Return the mostly plastic energy of a crushed body that vibrates in flight."""
     return np.asarray(29000 + vibration * np.sin(20 * LONG))
 
 
@@ -562,7 +562,7 @@ def make_crushed_energy(vibration: float) -> Samples:
 def test_a_right_switched_run_of_a_crushed_body_was_rigid_from_tr_to_td(
     vibration: float,
 ) -> None:
-    """By 1e-4 of an energy that is plastic a vibration of 3 would stand still all along."""
+    """A threshold of 1e-4 of the plastic energy would call a vibration of 3 rigid throughout."""
     energy = make_crushed_energy(vibration)
     frozen = np.interp(0.3, LONG, energy)
     energy_after = np.where(LONG > 0.8, energy[800] - frozen, 0)
@@ -595,7 +595,7 @@ def test_a_right_switched_run_of_a_crushed_body_was_rigid_from_tr_to_td(
 def test_where_the_reference_stands_still_too_a_longer_stillness_is_no_objection() -> (
     None
 ):
-    """A body that flies in from the start, and hardly vibrates: its energy does not tell when it was switched."""
+    """A body that flies from the start and hardly vibrates: its energy does not show when it was switched."""
     energy = 5 + np.where(LONG > 0.9, LONG - 0.9, 0.0)
     comparison = compare_runs(
         make_history(energy, LONG),
@@ -652,7 +652,7 @@ CAR_TR, CAR_TD = 0.0496, 0.1464
 
 
 def list_legs(run: str) -> list[str]:
-    """Legs of a run; until tr all runs are alike."""
+    """Return the restart segments of a run; up to tr all runs share them."""
     return [
         locate_stored(name)
         for name in ("car_all_T01.gz", f"{run}_T02.gz", f"{run}_T03.gz")
@@ -660,7 +660,7 @@ def list_legs(run: str) -> list[str]:
 
 
 def compare_car(run: str, *parts: str) -> Verdict:
-    """Verdict on the car whose engine, battery and four wheels were six rigid bodies, or that was one."""
+    """Return the verdict on the car with engine, battery and wheels as six rigid bodies, or as one."""
     solved_run = read_solved("carT01.gz", *parts)
     verdict = verify_of(solved_run, CAR_TR, CAR_TD, Settings())
     return compare_with(
@@ -694,7 +694,7 @@ def test_the_parts_that_were_rigid_are_recognised_in_several_bodies() -> None:
 
 
 def test_a_run_of_which_all_parts_were_rigid_is_judged_by_its_energy() -> None:
-    """Computed: 0.947 of the mean energy of shells and beams until the landing, all parts without springs here."""
+    """Computed: 0.947 of the mean energy of shells and beams until the landing (here all parts without springs)."""
     switched_run = require(compare_car("car_all", "1-17").switched)
     assert switched_run.objections == ()
     assert switched_run.mean_after / switched_run.mean_after_reference == pytest.approx(
@@ -711,7 +711,7 @@ def test_parts_that_were_not_rigid_are_named() -> None:
 
 
 def test_energies_that_are_reported_wrongly_do_not_enter_the_comparison() -> None:
-    """The battery reports 70 400 J for 21; shells and beams keep 1.019 of their mean energy."""
+    """The battery reports 70 400 J instead of 21; shells and beams keep 1.019 of their mean energy."""
     switched_run = require(compare_car("car_heavy", "1-17").switched)
     assert switched_run.mean_after / switched_run.mean_after_reference == pytest.approx(
         1.019, abs=0.002

@@ -1,4 +1,4 @@
-"""The cost model: shares of a step, and what is said where they are not known."""
+"""Cost model: shares of a time step, and the warnings if they are unknown."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ def make_inventory(
     rigid: int | None = None,
     notes: tuple[str, ...] = (),
 ) -> Inventory:
-    """Parts of shells in a row, each with nodes of its own."""
+    """Return parts that are rows of shells, each with its own nodes."""
     part = np.repeat(list(counts), list(counts.values()))
     nodes = np.arange(4 * part.size).reshape(-1, 4)
     formulation_by_part = formulations or {}
@@ -66,7 +66,7 @@ def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> Non
 def test_shells_cost_more_with_more_integration_points(
     layers: int | None, extra: int
 ) -> None:
-    """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
+    """Four points per layer, of which 3 are assumed; without a weight for points they cost nothing."""
     of_deck = require(find_radioss_formulation("shell", 12, 0, 0))
     mesh = make_inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     parts = {

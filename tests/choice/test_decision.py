@@ -1,4 +1,4 @@
-"""One verdict for a pair: the same in every command, with a reason and a cure wherever it is not good."""
+"""One verdict on a pair: the same in every command, with a reason and a cure unless it is good."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a deck tells of a run, and what makes it worth little: the same words in every command, nothing of another."""
+"""Evidence from the deck of a run, and deck errors that make it useless; decks of other models are ignored."""
 
 import shutil
 from dataclasses import replace
@@ -380,7 +380,7 @@ def make_gravity(*values: float) -> Surroundings:
 
 
 def make_falling_momenta(acceleration: float, surroundings: Surroundings) -> Momenta:
-    """Momentum of a part of mass 10 that is pushed, and falls."""
+    """Return the momentum of a part of mass 10 that is pushed, then falls."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 2] = PUSH - 10.0 * acceleration * TIME
     return Momenta(
@@ -396,7 +396,7 @@ def make_falling_momenta(acceleration: float, surroundings: Surroundings) -> Mom
 
 @pytest.mark.parametrize("acceleration", [9.81, 3.71, 1.62, 24.8])
 def test_the_gravity_of_the_deck_is_what_is_believed(acceleration: float) -> None:
-    """Of another planet, or another load: without a deck only that of the earth is."""
+    """The acceleration may be another planet's or a load's; without a deck only the earth's is accepted."""
     flight_found = find_flight_around(
         make_falling_momenta(acceleration, make_gravity(acceleration)), 0.6
     )
@@ -434,7 +434,7 @@ def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
 def make_flying_history(
     surroundings: Surroundings, parts: tuple[Part, ...] | None = PARTS[:1]
 ) -> History:
-    """A part that flies from 0.2 on, and rings."""
+    """Return a part that flies from 0.2 on and vibrates."""
     evidence = Given((make_falling_momenta(0.0, surroundings),))
     energy = 2 + np.sin(300 * TIME) ** 2
     return History(

@@ -1,4 +1,4 @@
-"""Health of a run: every threshold from both sides, every missing term, real runs, and runs that cannot be judged."""
+"""Health of a run: each threshold from both sides, each missing term, real runs, and runs that cannot be judged."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Cards judged as they are printed: for which solver, whom they switch, and what their comments say."""
+"""Cards judged as printed: the solver, the switched parts, and the comments."""
 
 from dataclasses import replace
 from functools import partial

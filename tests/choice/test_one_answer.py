@@ -1,4 +1,4 @@
-"""One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
+"""One question has one answer: each command confirms the pairs, windows and flights that another one prints."""
 
 import re
 from dataclasses import replace
@@ -48,13 +48,13 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Reference:
 
 
 def make_resting_history() -> History:
-    """Constant energy over times of many digits."""
+    """Return a constant energy over times of many digits."""
     time = 0.10005206614732742 + np.linspace(0, 1, 101)
     return make_energy_history(np.ones(time.size), time)
 
 
 def read_again(history: History, tr: float, td: float, settings: Settings) -> Verdict:
-    """Judge a pair as it is read."""
+    """Judge a pair with its times as they are printed."""
     return verify(history, round_as_read(tr), round_as_read(td), settings)
 
 
@@ -192,7 +192,7 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
 
 @pytest.mark.slow
 def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
-    """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
+    """An oscillator fits around some td of the flight, but not around the chosen one."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
     load, contact, omega, alpha = (
         rng.uniform(0.05, 0.3),
@@ -234,7 +234,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
 
 @pytest.mark.slow
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
-    """Also of the health of the run, and of a td that is not printed as it was chosen."""
+    """This includes the health of the run, and a td that is printed with other digits than chosen."""
     time = np.linspace(0, 1, 1500) / 7
     values = np.stack(
         [time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1
@@ -261,7 +261,7 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
 
 
 def test_a_plan_keeps_the_margin_that_it_lists() -> None:
-    """To a td in it the energy alone shows no end of that flight."""
+    """For a td in this flight, the energy alone shows no end of the flight."""
     rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
     omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
     energy = (

@@ -1,4 +1,4 @@
-"""What info tells of a run, whatever its files hold."""
+"""The overview of a run by info, for files of any content."""
 
 import csv
 import io
@@ -29,13 +29,13 @@ FORMATS = ("table", "json", "csv", "markdown")
 
 
 def run_info(*args: str) -> dict[str, Any]:
-    """Answer of info, held against its schema."""
+    """Run info and validate its answer."""
     return run_json_checked("info", *args)
 
 
 @pytest.fixture
 def matsum(tmp_path: Path) -> Path:
-    """The paper's oscillator as a matsum of three parts."""
+    """Write the paper's oscillator as a matsum of three parts."""
     return put(tmp_path / "matsum", make_replay_file("matsum"))
 
 
@@ -336,7 +336,7 @@ def test_csv_is_one_row_under_the_keys_of_json() -> None:
 def test_rigid_legs_are_called_so_and_raise_no_alarm(
     names: tuple[str, ...], when: str, ratio: float | None
 ) -> None:
-    """While its parts are rigid Radioss writes masses and momenta of 0, and any energy of solids."""
+    """While parts are rigid, Radioss writes masses and momenta of 0, and arbitrary energies of solids."""
     document = run_info(*(str(ROOT / "tests/data" / name) for name in names))
     (warning,) = document["warnings"]
     assert warning["code"] == "rigid-legs"

@@ -1,4 +1,4 @@
-"""Plans: flights, windows and what one reference supports, on computed runs of the box and of a real solver."""
+"""Plans: flights, windows and what one reference supports, for computed runs of the box and of a real solver."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -166,7 +166,7 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
 def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     plan: Plan, window: tuple[float, float], tmp_path: Path
 ) -> None:
-    """The box is made rigid before, or while, it stands on the ground; it takes off while it is rigid."""
+    """The box becomes rigid before or while it stands on the ground, and takes off while it is rigid."""
     done = [
         planned_window
         for planned_window in (plan.windows[0], window)
@@ -250,9 +250,9 @@ def test_a_run_that_was_not_switched_is_not_taken_for_one(
 
 @pytest.mark.slow
 def test_the_flights_and_windows_of_the_computed_box() -> None:
-    """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv.
+    """Contacts as the solver reports them (openradioss/car_drop/drop2_runs.csv).
 
-    A window of more than half the longest comes first: one after the other both are had with one more run.
+    A window of more than half the longest one is planned first: one more run then gives both windows.
     """
     planned = plan_of(read_solved("drop2T01.gz"), PLAIN)
     flights = [
@@ -317,7 +317,7 @@ def test_the_switched_car_landed_as_computed() -> None:
 
 @pytest.mark.slow
 def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) -> None:
-    """One window was offered for two flights that lay in each other, as the energy before and after a load tells."""
+    """Before and after a load, the energy alone shows overlapping flights; they must not share a window."""
     record = drop(tilt=35.0, interval=1e-4)
     rows = zip(record.time.tolist(), record.internal_energy[:, 0].tolist(), strict=True)
     table = tmp_path / "energy.csv"
@@ -337,7 +337,7 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
 
 
 def make_bouncing_energy(seed: int) -> Reference:
-    """The energy of a run of two to five impacts, after each of which another vibration sets in."""
+    """Return the energy of a run with two to five impacts, each of which starts another vibration."""
     rng = np.random.default_rng(seed)
     time = np.linspace(0.0, 1.0, int(rng.integers(300, 900)))
     plastic, elastic = np.zeros_like(time), np.zeros_like(time)
@@ -355,7 +355,7 @@ def make_bouncing_energy(seed: int) -> Reference:
 @given(seed=st.integers(0, 100_000))
 @example(seed=204)  # at the end of this flight the energy shows none
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
-    """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
+    """The energy shows another flight start for each td; a window must not begin before the flight of its row."""
     reference = make_bouncing_energy(seed)
     plan = plan_of(reference, PLAIN)
     for row in plan.flights:
@@ -378,7 +378,7 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [33, 72])
 def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int) -> None:
-    """The page of a plan offered pairs that were rigid while the flight before had not landed."""
+    """The page of a plan must not offer pairs that are rigid before the previous flight has landed."""
     reference = make_bouncing_energy(seed)
     plan = plan_of(reference, PLAIN)
     landings = {row.number: row.end for row in plan.flights}
@@ -403,7 +403,7 @@ def car() -> Reference:
 def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
     car: Reference,
 ) -> None:
-    """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
+    """The car is rigid for 17 ms between two pushes, and for 108 ms after them; `parts` compares sets for the latter."""
     planned = plan_of(car, PLAIN)
     assert list_statuses(planned) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (
@@ -417,7 +417,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
 def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(
     tmp_path: Path,
 ) -> None:
-    """Flight 2 is left out for flight 4, which waits for flight 3: with flight 2 it would wait for one run more."""
+    """Flight 2 is left out for flight 4, which waits for flight 3; with flight 2 it would wait one run longer."""
     box = read(write_run_files(drop(height=0.15, tilt=80.0), tmp_path), BOX)
     planned = plan_of(box, PLAIN)
     assert list_statuses(planned)[:4] == [

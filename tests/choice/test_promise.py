@@ -1,4 +1,4 @@
-"""A grade and a stated residual are promises: they hold in the motion that was integrated, and in that of parts."""
+"""Grades and stated residuals hold for motions that are integrated, and for motions of parts."""
 
 from itertools import islice
 from pathlib import Path
@@ -35,7 +35,7 @@ from tests.vibration.test_identify import move_about_preload
 def test_what_was_upside_down_has_the_sign_of_td(
     name: str, seed: int, number: int, tmp_path: Path
 ) -> None:
-    """The energy alone, or an oscillator about a preload, gave these pairs the other sign: residuals of 2."""
+    """The energy alone, or an oscillator about a preload, gives these pairs the opposite sign: residuals of 2."""
     pair = require(
         ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path)
     )
@@ -46,7 +46,7 @@ def test_what_was_upside_down_has_the_sign_of_td(
 def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
     tmp_path: Path,
 ) -> None:
-    """Half the rate, and a quarter of the kinetic share: the residual is twice the one of a vibration through zero."""
+    """The residual at half the frequency and a quarter of the kinetic fraction is twice that of a plain vibration."""
     time, td = np.arange(0.0, 6.711, 1 / 40), 5.506
     path = tmp_path / "preloaded.csv"
     energy = 100 * move_about_preload(time, 2 * np.pi, 3.4484)[0] ** 2
@@ -89,7 +89,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
 
 @pytest.mark.slow
 def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
-    """A residual of 0.32 was good, since 0.18 was the most that the floor was thought to hide."""
+    """A residual of 0.32 must not be good, although the lower envelope seems to hide 0.18 at most."""
     record = next(islice(draw_records("parts with mixed modes", 101, 77), 76, None))
     pair = require(recommend_pair(record))
     assert pair.true < BAD or pair.grade != "good"
@@ -97,7 +97,7 @@ def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
 
 @pytest.mark.slow
 def test_two_planes_turn_no_pair_upside_down() -> None:
-    """97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
+    """The planes have 97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])
     truth = Motion(
         7.7,

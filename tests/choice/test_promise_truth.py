@@ -1,4 +1,4 @@
-"""The truth that recommended pairs are compared with: closed forms agree with integration, records with physics."""
+"""True residuals for comparison: closed forms agree with integration, and records with physics."""
 
 from functools import partial
 from typing import Any
@@ -34,7 +34,7 @@ END = 4.0
 
 
 def integrate(modes: Modes, time: Samples) -> Samples:
-    """Integrate the modes from the equilibrium under their preload; q and q', shape (2 k, n)."""
+    """Integrate the modes from equilibrium under their preload; return q and q', shape (2 k, n)."""
 
     def slope(t: float, state: Samples) -> Samples:
         deformation, velocity = np.split(state, 2)
@@ -75,7 +75,7 @@ def test_the_impulse_of_a_load_is_its_integral(load: Load) -> None:
 
 
 def test_the_residual_is_given_by_the_energy_halfway() -> None:
-    """The identity of the midpoint, which holds for any damping, knows nothing of the modes' signs."""
+    """The midpoint identity holds for any damping and does not depend on the signs of the modes."""
     truth = Truth(MODES, (MODES.loaded_until, END))
     tr, td = 2.1, 3.3
     halfway = (tr + td) / 2

@@ -1,4 +1,4 @@
-"""The order of candidates, the limits that a recommendation keeps, and how good it is called."""
+"""Order of candidates, limits of a recommendation, and its grade."""
 
 import re
 from dataclasses import replace
@@ -92,7 +92,7 @@ def test_the_order_of_candidates(
 @pytest.mark.slow
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
-    """From 49.6 to 82.4 ms it did, as td moved by 3 ms, and gained nothing: the mean energy after td hardly differs."""
+    """A jump from 49.6 to 82.4 ms, for td 3 ms later, would gain nothing: the mean energy after td hardly changes."""
     history, known_fits, grades = read_solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
         situation = examine(history, td, Settings(), known_fits)
@@ -109,7 +109,7 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
     ranked_candidates = next(candidates_at([situation]))
 
     def first(until: float) -> float:
-        """The best where those before a time leave the body out of place."""
+        """Return the best tr if those before ``until`` displace the body."""
         out_of_place = np.where(ranked_candidates.judged.moments.tr < until, 1.0, 0.0)
         return next(
             ranked(
@@ -130,7 +130,7 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
 
 @cache
 def make_fits(_: float) -> Fits:
-    """What is found in the record that is asked about this td: limits change nothing of it."""
+    """Return the fits of a record, which do not depend on the limits."""
     return Fits()
 
 
@@ -170,7 +170,7 @@ ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
 
 
 def find_grade(history: History, td: float, **arguments: float | bool) -> str | None:
-    """Grade of what is recommended at a td."""
+    """Return the grade of the recommendation at a td."""
     suggestion = suggest(history, td, Settings(**arguments)).quality  # type: ignore[arg-type]
     return suggestion.grade if suggestion else None
 
@@ -299,7 +299,7 @@ EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
 
 
 def make_crushed_energy(vibration: float) -> np.ndarray:
-    """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
+    """Return 100 J with little vibration: the level says nothing, and a frozen tr may lose the whole vibration."""
     swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
     return np.asarray(
         100 * np.minimum(UNIT / 0.1, 1) ** 2
@@ -336,7 +336,7 @@ def test_rest_is_told_from_a_vibration(
 
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
-    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
+    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing far."""
     history = read_solved("oscillator_referenceT01.gz").history
     early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
     for answer, wanted in ((early, "good"), (late, "fair")):
@@ -363,7 +363,7 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
 
 
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
-    """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
+    """A structure with many modes is quiet for moments, but free flight excites nothing again."""
     time = np.linspace(0, 1, 201)
     energy = (
         np.where(time < 0.2, 50 * time, 10.0)
@@ -378,7 +378,7 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
 
 
 def test_where_nothing_vibrates_there_is_no_residual() -> None:
-    """What is left of a vibration when its energy is round-off is described by the oscillator, and is nothing."""
+    """If the energy is round-off, the oscillator describes noise, and no vibration is left."""
     time = np.linspace(0, 1, 4001)
     energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
     suggestion = suggest(make_energy_history(energy, time), 0.95, Settings(after=0.6))
@@ -394,7 +394,7 @@ def test_where_nothing_vibrates_there_is_no_residual() -> None:
 
 
 def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> None:
-    """Pairs on all swings of one mode have one error, which rounding makes another one in each."""
+    """Pairs on all cycles of one mode have the same error, except for rounding."""
     count = 12
     rng = np.random.default_rng(5)
     group, out_of_place = np.zeros(count, np.int32), np.zeros(count, np.bool_)

@@ -1,4 +1,4 @@
-"""Verdicts on parts, and sets of them: on a made run, a made car with loose wheels, and one that a solver computed."""
+"""Verdicts on parts and sets of parts: a synthetic run, a synthetic car with loose wheels, and a computed car."""
 
 from functools import cache
 from pathlib import Path
@@ -82,7 +82,7 @@ def write_variant(folder: Path, *changes: tuple[str, str]) -> str:
 
 
 def rank_sets_of_variant(folder: Path, *changes: tuple[str, str]) -> Parts:
-    """What is found with the deck that was changed so, in a window that is given: none is searched."""
+    """Rank the sets with a changed deck, in a given window so that none is searched."""
     return rank_sets(MATSUM, write_variant(folder, *changes), times=TIMES)
 
 
@@ -309,7 +309,7 @@ def test_a_deck_whose_parts_have_other_titles_is_doubted(tmp_path: Path) -> None
 
 
 def make_row(part: int, landing: float | None, cost: float | None) -> PartRow:
-    """A part by what it takes up at the beginning of the landing, and its share of the cost."""
+    """Return a part with this energy uptake at the beginning of the landing and this share of the cost."""
     return PartRow(
         part, "", {"shell": 1}, (), "MAT", "deformable", 1.0, "deck", (), InFlight(True, 1.0, 0.0, 0.5, landing),
         cost, None, None, (),
@@ -371,7 +371,7 @@ def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
 
 
 def write_separate_step(folder: Path, extra_text: str = "") -> str:
-    """The deck with nodes of its own for the step: copies where it shares those of the box."""
+    """Write the deck with copies of the nodes that the step shares with the box."""
     lines = DECK.read_text("utf-8").splitlines()
     for line_number, line in enumerate(lines):
         cells = line.split()
@@ -436,7 +436,7 @@ TR, TD = "0.02", "0.14"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The car with its wheels, whose engine swings three times before it lands, and its decks."""
+    """Write the car with wheels and an engine that oscillates three times before the landing, and its decks."""
     car_folder = tmp_path_factory.mktemp("car")
     made_car.write_t01(car_folder, 3.0)
     made_car.write_starter(car_folder)
@@ -456,7 +456,7 @@ def list_messages(document: dict[str, Any], code: str) -> list[str]:
 def test_the_car_without_its_wheels_is_recommended_in_its_own_flight(
     folder: Path,
 ) -> None:
-    """All parts fly until the wheels land, and the car flies on: a set that saves a third of that was recommended."""
+    """All parts fly until the wheels land, and the car flies on: its set saves more than the set of all parts."""
     run, deck = d2.read(folder / "MADET01"), folder / "MADE_0000.rad"
     part_table = d2.parts(run, replay=False, deck=deck)
     check_by_schema(part_table.to_dict())
@@ -556,7 +556,7 @@ def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
-    """Momenta show it: a hub with a tyre each, and the car, change their velocities by nothing against each other."""
+    """Momenta show it: the car and each pair of hub and tyre move at constant velocities relative to each other."""
     arguments = (
         "verify",
         "--tr",

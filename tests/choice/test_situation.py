@@ -1,4 +1,4 @@
-"""A record seen from one td: what is found in it, which model of the vibration counts, what stays the same."""
+"""A record seen from one td: its contents, the model of its vibration, and what other td do not change."""
 
 from dataclasses import replace
 
@@ -72,7 +72,7 @@ def test_from_another_td_the_same_evidence_is_seen() -> None:
 def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
     order: tuple[float, float],
 ) -> None:
-    """Behind the flight, at 0.42, it is the same flight that is nearest, but nothing flies."""
+    """At 0.42, after the flight, the nearest flight is the same, but nothing flies."""
     history = read(
         ["sample_data/rollover_box.matsum"], Selection(parts=("all",))
     ).history
@@ -116,7 +116,7 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
 def test_what_was_found_with_another_end_of_the_load_changes_nothing(
     history: History, td: float
 ) -> None:
-    """A plan keeps what it finds for all flights, and only one of them has the end of the load that was given."""
+    """A plan remembers results for all flights, and only one flight has the given end of the load."""
     fits, fresh = Fits(), suggest(history, td, PLAIN).candidates[:]
     other_candidates = suggest_at(
         examine(history, td, Settings(after=0.6 * td), fits)
@@ -126,7 +126,7 @@ def test_what_was_found_with_another_end_of_the_load_changes_nothing(
 
 
 def make_one_mode() -> History:
-    """A load until 0.1, then one mode with white noise."""
+    """Return a load until 0.1, then one mode with white noise."""
     time = np.linspace(0.0, 1.0, 601)
     energy = np.sin(2 * np.pi * 6.3 * time) ** 2
     energy = (

@@ -1,4 +1,4 @@
-"""What many runs have in common: the spread, the agreement, one tr for all or why none, and which stand out."""
+"""Many runs compared: spread, agreement, one tr for all or the reason against it, and outliers."""
 
 import os
 from dataclasses import replace
@@ -41,7 +41,7 @@ def make_study_row(
     width: float = 0.1,
     **other_fields: object,
 ) -> StudyRow:
-    """A run with windows of acceptable tr, all alike, its error a straight line from 0 at 0 to 1 at td = 10."""
+    """Return a run with these windows of acceptable tr; its error falls linearly from 0 at 0 to 1 at td = 10."""
     acceptable = np.array(windows, float).reshape(-1, 2)
     study_row = StudyRow(
         source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
@@ -172,7 +172,7 @@ def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
 
 @given(st.lists(st.floats(1.95, 2.05), min_size=1, max_size=7))
 def test_runs_that_agree_have_their_own_tr_in_common(times: list[float]) -> None:
-    """Times of which none differs from another by more than it may be off."""
+    """No two times differ by more than their uncertainty."""
     rows = [make_study_row(str(i), (1, 3), tr=tr) for i, tr in enumerate(times)]
     common_tr = summarise(10.0, rows).common
     assert common_tr.tr == pytest.approx(float(np.median(times)))
@@ -288,7 +288,7 @@ def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run(
 def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> (
     None
 ):
-    """One error falls from 0.2 to 0, the other grows from 0 to 0.2: both are least in the middle."""
+    """One error falls from 0.2 to 0, the other grows from 0 to 0.2; the larger one is least in the middle."""
     falling, growing = (
         np.array([[1.0, 3.0], [0.2, 0.0]]),
         np.array([[1.0, 3.0], [0.0, 0.2]]),
@@ -436,7 +436,7 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays() -> N
 
 @pytest.mark.slow
 def test_files_of_all_formats_are_rows_of_one_study() -> None:
-    """One ends before td."""
+    """One of the files ends before td."""
     samples = sorted(str(path) for path in Path(BOX).parent.iterdir() if path.is_file())
     sources = [
         *samples,

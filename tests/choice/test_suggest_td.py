@@ -1,4 +1,4 @@
-"""Choosing both times, on every basis, what is said when td is missing, and the bound by which a window is searched."""
+"""Choice of both times for every basis, the answer if td is missing, and the bound of the search for windows."""
 
 import csv
 
@@ -90,7 +90,7 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
 
 @pytest.mark.slow
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
-    """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
+    """The highest peak of the planar box in flight is its third; 0.0989 to 0.1478 would be rigid for only 0.049 s."""
     suggestion = suggest_in_window(
         make_history(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN
     )
@@ -99,7 +99,7 @@ def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
 
 
 def test_what_is_given_up_for_a_higher_level_is_told() -> None:
-    """The energy is high up to 6, then low, as it was before 0.5."""
+    """The energy is high up to 6, then as low as before 0.5."""
     time = np.arange(0, 10, 0.01)
     high = (time > 0.5) & (time < 6)
     energy = np.where(
@@ -188,7 +188,7 @@ def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
 
 
 def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> None:
-    """Above what comes back if all of the energy vibrates, and about what is expected if a part of it is at rest."""
+    """The bounds are the energy if all of it vibrates, and the expected energy if part of it is static."""
     history = read_rollover_run()
     table = np.genfromtxt(
         locate_results("rollover_scan.csv"),
@@ -214,7 +214,7 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
 
 
 def test_the_means_of_the_computed_car_are_expected() -> None:
-    """Shells and beams until the landing; 96 % were stated for all parts, springs among them, for 89 % computed."""
+    """Shells and beams until the landing; for all parts, springs included, 96 % was stated and 89 % computed."""
     history = read_solved("carT01.gz", "1-17").history
     situation = examine(history, 0.1464, PLAIN)
     with locate_results("car_runs.csv").open() as table:
@@ -236,7 +236,7 @@ def test_the_means_of_the_computed_car_are_expected() -> None:
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
-    """Forty modes over an energy at rest, damped or not: the mean over a while after td lies in between."""
+    """Forty modes above a static energy, damped or not: the mean after td lies between the bounds."""
     generator = np.random.default_rng(3)
     time = np.arange(0.0, 2.0, 2e-4)
     rates, phases, amplitudes = (

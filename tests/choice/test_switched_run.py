@@ -1,4 +1,4 @@
-"""When the parts of a question were rigid, and when only others were."""
+"""When the parts of a question were rigid, and when only other parts were."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def make_column(energy: Samples, kinetic: Samples, title: str) -> matsum.PartCol
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[str]:
-    """Three bodies: of one a rigid body has the kinetic energy for a while, one goes on, one never matters."""
+    """Write three bodies: the kinetic energy of the first is a rigid body's for a while, the others are controls."""
     is_off = (TIME > 0.299) & (TIME < 0.701)
     swing, moves = 5 + np.sin(40 * TIME), 100 + np.cos(40 * TIME)
     parts = (

@@ -1,4 +1,4 @@
-"""Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
+"""A trade-off gives every td the same answer as ``suggest``, and marks exactly the Pareto-optimal offers."""
 
 from itertools import pairwise
 
@@ -28,7 +28,7 @@ def check(
     settings_asked: Settings,
     offers: list[Offer],
 ) -> None:
-    """Hold offers against what ``suggest`` says of their td, asked for it alone."""
+    """Compare offers with the answers of ``suggest`` for each single td."""
     for offer in offers:
         alone = suggest_at(examine(history, offer.td, settings_asked, Fits()))
         assert offer.best == alone.chosen
@@ -46,7 +46,7 @@ def check(
 
 
 def check_unbeaten(exploration: TradeOff) -> None:
-    """Hold the marks against every other offer."""
+    """Compare the Pareto marks with all other offers."""
     for is_rigid_time_known in (True, False):
         pairs = [
             (
@@ -88,7 +88,7 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
 
 
 def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None:
-    """An offer holds none of them: they are looked for again."""
+    """An offer does not keep its candidates: they must be found again."""
     run = read(["sample_data/energy.csv"])
     exploration = explore_of(run, Settings(), (0.001, 0.07), steps=10)
     without = [offer_row for offer_row in exploration.offers if offer_row.pair is None]
@@ -100,7 +100,7 @@ def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None
 
 @st.composite
 def histories(draw: st.DrawFn) -> History:
-    """Energy of some modes after a load that may ring, with or without noise, damping and a contact at the end."""
+    """Draw the energy of some modes after a load, with or without noise, damping, ringing and a final contact."""
     states = draw(st.integers(60, 250))
     time = np.linspace(0.0, 1.0, states)
     energy = np.zeros(states)
@@ -123,7 +123,7 @@ def histories(draw: st.DrawFn) -> History:
     "seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))]
 )
 def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> None:
-    """Of forty modes, for whose td an oscillator is not sought everywhere."""
+    """For forty modes, the oscillator is not tried at every td."""
     rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
     energy = sum(
         rng.uniform(0.3, 1) * np.sin(2 * np.pi * cycles * time + rng.uniform(0, 3)) ** 2
@@ -141,7 +141,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> Non
 
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
-    """From peak to peak of one oscillator the rigid time is the same, but for its last digits."""
+    """From peak to peak of one oscillator the rigid time is the same, except for its last digits."""
     exploration = explore_of(
         read(["sample_data/energy.csv"]), Settings(), None, steps=20
     )
@@ -203,7 +203,7 @@ def test_candidates_before_the_flight_never_change_what_is_best(
 
 
 def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
-    """The energy alone shows another flight to each td; that of the window's start was shown."""
+    """The energy alone shows another flight for each td; the flight of the start of the range must not be shown."""
     time = np.linspace(0.0, 1.0, 2001)
     energy = (
         np.exp(-6 * time) * np.sin(250 * time) ** 2
@@ -229,7 +229,7 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
 
 @pytest.mark.slow
 def test_the_basis_is_that_of_the_recommended_pair() -> None:
-    """The first td of the flight has a single state before it, which is no reason why a basis is refused."""
+    """The first td of the flight has only one state before it, which must not make a basis unusable."""
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
     exploration = explore_of(reference, Settings(), steps=20)
     refused = [
@@ -268,7 +268,7 @@ def test_no_offer_beats_the_one_that_is_recommended(
 
 @pytest.mark.slow
 def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
-    """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
+    """Plastic energy with a vibration of 1e-4 of it: about half of the vibration is kinetic, on both sides of td."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
     exploration = explore_of(

@@ -1,4 +1,4 @@
-"""More energy than the reference has never comes back: where the estimate says so, the pair is refused."""
+"""A pair is refused if its estimate returns more energy than the reference ever has."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(
 
 
 def examine_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
-    """See the record from a td in a flight from 0.1 of which no end is known."""
+    """Return the situation at a td in a flight that begins at 0.1 and has no known end."""
     situation = examine(
         make_energy_history(energy, TIME), td, Settings(after=0.1, replay=False)
     )
@@ -58,7 +58,7 @@ def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_
 
 
 def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
-    """A td on the highest peak: of the levels within the tolerance the higher ones give back too much."""
+    """At a td on the highest peak, the higher levels within the tolerance return too much energy."""
     energy = 0.1 + np.sin(61 * TIME) ** 2 * (1 + 0.9 * np.sin(4.4 * TIME + 0.4))
     peak = TIME[np.argmax(energy * (TIME < 0.6))]
     situation = examine_at(float(peak), energy)

@@ -1,4 +1,4 @@
-"""Windows: margins against computed landings; what lies inside verifies, what lies outside does not."""
+"""Windows of acceptable tr: margins compared with computed landings; times inside verify, times outside do not."""
 
 import csv
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ positive = st.floats(0.1, 10.0)
 def make_flying_oscillator(
     omega: float, amplitude: float, speed: float, mass: float, periods: int = 20
 ) -> tuple[History, Flight]:
-    """A body that falls with a vibration of the velocity ``amplitude * omega`` in it, and its flight."""
+    """Return a falling body that vibrates with a velocity of ``amplitude * omega``, and its flight."""
     time = np.linspace(0.0, 2 * np.pi * periods / omega, 4001)
     internal = mass * (omega * amplitude * np.sin(omega * time)) ** 2 / 2
     velocity = speed * (0.5 + 0.5 * time / time[-1])
@@ -66,7 +66,7 @@ def make_flying_oscillator(
 def test_the_landing_moves_by_the_amplitude_over_the_speed(
     omega: float, amplitude: float, speed: float, mass: float
 ) -> None:
-    """Half of the vibration energy is kinetic in the mean: the amplitude counts with 1 over the root of 2."""
+    """On average half of the vibration energy is kinetic, so the amplitude counts with a factor of 1/sqrt(2)."""
     history, flight = make_flying_oscillator(
         omega, amplitude * speed / omega, speed, mass
     )
@@ -122,7 +122,7 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
 
 
 def make_touched_body(force: float) -> tuple[History, Flight]:
-    """A body of 2 that vibrates, is pushed by 2000, flies from 0.1 to 0.6 and is then touched with so much force."""
+    """Return a vibrating body of mass 2, pushed by 2000, that flies from 0.1 to 0.6 and then meets this force."""
     time = np.linspace(0.0, 1.0, 2001)
     push = np.where(time < 0.1, 2000.0, np.where(time > 0.6, force, 0.0))
     momentum = np.zeros((time.size, 1, 3))
@@ -156,7 +156,7 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
 
 
 def make_tapped_body(impulse: float, length: float) -> tuple[History, Flight]:
-    """The body of `touching`, whose contact from 0.6 on lasts for ``length`` and takes so much momentum."""
+    """Return the body of `make_touched_body` with a contact of this length and impulse from 0.6 on."""
     history, flight = make_touched_body(0.0)
     (momenta,) = history.momenta
     pushed = np.clip((momenta.time - 0.6) / length, 0.0, 1.0) * impulse
@@ -211,7 +211,7 @@ def test_no_landing_of_the_computed_car_and_box_is_taken_for_a_grazing_one(
 
 
 def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() -> None:
-    """It touches the block at 28 ms with a hundredth of the momentum towards it, and then hits it."""
+    """It touches the block at 28 ms with 1 % of the momentum towards it, and then hits it."""
     history = read_solved("carT01.gz").history
     flight = next(
         flight
@@ -250,7 +250,7 @@ def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
 
 
 def read_landings(name: str, column: str) -> Iterator[tuple[str, float]]:
-    """Name of each computed run, and a number of it."""
+    """Yield the name of each computed run, and a number from its row."""
     with locate_results(name).open() as file:
         yield from (
             (row["run"], float(row[column] or "nan")) for row in csv.DictReader(file)
@@ -258,7 +258,7 @@ def read_landings(name: str, column: str) -> Iterator[tuple[str, float]]:
 
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
-    """All that were switched in the flight and back before the contact."""
+    """For all runs that were switched in the flight and switched back before the contact."""
     history = read_solved("carT01.gz").history
     flight = flights_of(history, Settings())[-1]
     margin = compute_margin(history, flight)
@@ -312,7 +312,7 @@ def find_windows_of(answer: Suggestion) -> Samples:
 
 
 def are_in_windows(windows: Samples, times: Samples) -> Samples:
-    """Whether each time lies in a window."""
+    """Return for each time if it lies in a window."""
     column_of_times = times[:, np.newaxis]
     return np.asarray(
         np.any(
@@ -323,7 +323,7 @@ def are_in_windows(windows: Samples, times: Samples) -> Samples:
 
 
 def check(answer: Suggestion, seed: int) -> None:
-    """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
+    """Compare the windows with ``verify`` at their ends, inside, and at random times."""
     situation = answer.situation
     history = situation.history
     windows = find_windows_of(answer)
@@ -484,7 +484,7 @@ def test_where_nothing_verifies_there_is_no_window(settings_asked: Settings) -> 
 def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> (
     None
 ):
-    """On the level alone the level error grows by 0.05."""
+    """By the level alone, the level error grows by 0.05."""
     for history, settings_asked in (
         (PAPER, Settings()),
         (PAPER, Settings(replay=False, after=0.005)),

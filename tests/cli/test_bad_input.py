@@ -1,4 +1,4 @@
-"""What cannot be run has one line that says where, what and what to do; what has no answer is an objection."""
+"""Refused input gives one line with place, cause and cure; a record without an answer is reported as a problem."""
 
 import gzip
 import json
@@ -25,14 +25,14 @@ HEAD = "time,internal_energy\n"
 
 
 def tabulate(energy: Callable[[float], float], states: int = 101) -> bytes:
-    """Give a CSV file with an energy at every hundredth of a second."""
+    """Return a CSV file with an energy at every 0.01 s."""
     return (
         HEAD + "".join(f"{i / 100!r},{energy(i / 100)!r}\n" for i in range(states))
     ).encode()
 
 
 def replace_line(number: int, line: str) -> bytes:
-    """Give a good CSV file but for its ``number``-th line."""
+    """Return a good CSV file with another line ``number``."""
     lines = tabulate(lambda t: t * t).decode().split("\n")
     lines[number - 1] = line
     return "\n".join(lines).encode()

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("here", "by_level")
 
 
 def check_pasted(result: Result) -> list[tuple[int, float, float]]:
-    """Windows that the check sees in a printed card; it must find nothing else."""
+    """Return the windows that check finds in a printed card; it must find no problems."""
     Path("card.k").write_text(result.stdout)
     check_report = run_json("check", "card.k")
     assert check_report["findings"] == []
@@ -31,7 +31,7 @@ def check_pasted(result: Result) -> list[tuple[int, float, float]]:
 
 
 def join_comments(text: str) -> str:
-    """All comments of a card in one line."""
+    """Join all comments of a card in one line."""
     return " ".join(
         line.lstrip("$# ") for line in text.split("\n") if line.startswith(("$ ", "# "))
     )

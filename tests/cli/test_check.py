@@ -1,4 +1,4 @@
-"""The command ``check`` as a CI job sees it: exit codes, formats, configuration, several decks, histories."""
+"""The command ``check`` in a CI job: exit codes, formats, configuration, several decks, histories."""
 
 import json
 import os
@@ -39,7 +39,7 @@ def place(name: str, deck: str) -> str:
 
 
 def write_deck(tr: float, td: float, part: int = 1) -> str:
-    """A deck with one window; the times are printed with all their digits."""
+    """Return a deck with one window; the times are printed with all digits."""
     rigid_card = (
         "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n"
         f"{2 * part - 1:20d}{0:20d}{tr!r:>20}\n"
@@ -56,7 +56,7 @@ def list_rules(check_report: dict[str, Any]) -> list[str]:
 
 
 def check_output(form: str, text: str) -> None:
-    """Hold an output against the schema of its format."""
+    """Validate an output by the schema of its format."""
     if form == "json":
         check_by_schema(json.loads(text))
     elif form == "sarif":
@@ -362,7 +362,7 @@ def test_a_broken_configuration_does_not_hide_other_decks() -> None:
 
 
 def make_failing_reader(text: str, error: Exception) -> Callable[[str], dict[str, Any]]:
-    """A reader of TOML that nobody foresaw."""
+    """Return a TOML reader that raises an unforeseen error."""
     read_settings = tomllib.loads
 
     def loads(content: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What makes the command line easy to live with: settings, versions, completion, near misses, a manual page."""
+"""Comfort of the command line: settings, versions, completion, near misses, a manual page."""
 
 import json
 import re
@@ -83,7 +83,7 @@ def test_verbose_says_what_was_read() -> None:
 
 
 def complete(*args: str) -> list[str]:
-    """Values that the shell offers for the last word."""
+    """Return the values that the shell offers for the last word."""
     from click.shell_completion import ShellComplete
 
     completions = ShellComplete(
@@ -134,7 +134,7 @@ def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
 
 @pytest.fixture
 def in_ms(tmp_path: Path) -> str:
-    """The record of the oscillator with its times in ms, which no header names."""
+    """Write the record of the oscillator with times in ms and no unit in the header."""
     rows = [line.split(",") for line in Path(ENERGY).read_text().splitlines()[1:]]
     lines = [
         "time,internal_energy",
@@ -303,7 +303,7 @@ ASKED = ("suggest", "--td", "0.064", ENERGY)
 
 @pytest.fixture
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file that counts in the working folder, which lies below that of the file."""
+    """Change to a folder, and return the path of the settings file in its parent folder, which applies there."""
     inner = tmp_path / "inner"
     inner.mkdir()
     monkeypatch.chdir(inner)
@@ -311,7 +311,7 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def read_settings_in_use(*args: str) -> dict[str, str]:
-    """The settings that are not the default, with their values and sources."""
+    """Return the settings that differ from the defaults, with their values and sources."""
     lines = run(*args, "--show-settings").stdout.splitlines()
     return dict(
         line.split(" = ", 1) for line in lines if not line.endswith("# default")

@@ -1,4 +1,4 @@
-"""What the commands and their options do, seen from outside."""
+"""The effects of the commands and their options for a user."""
 
 import os
 import shlex
@@ -39,7 +39,7 @@ ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
 
 def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
-    """Run ``python -m d2rpick`` as a process of its own."""
+    """Run ``python -m d2rpick`` as a separate process."""
     command = [sys.executable, "-m", "d2rpick", *args]
     popen_options = {
         "capture_output": True,
@@ -484,7 +484,7 @@ def test_the_shell_completes_the_names_of_files(words: str) -> None:
 
 
 def list_examples(command: str) -> list[list[str]]:
-    """Arguments of the examples at the end of a command's help."""
+    """Return the arguments of the examples at the end of a command's help."""
     text = run(*filter(None, [command]), "--help").stdout
     _, end = text.split("\n  Examples:\n")
     lines = end.replace("\\\n", " ").strip("\n").split("\n")
@@ -547,7 +547,7 @@ def test_help_is_the_same_by_its_short_name_and_explains_every_option(
 
 
 def test_the_margin_is_kept_before_a_landing_that_is_given() -> None:
-    """3 % of a flight from 0.086 on; the record itself shows the landing at 0.379."""
+    """The margin is 3 % of a flight that begins at 0.086; the record itself shows the landing at 0.379."""
     landing = 0.36
     arguments = ("--no-verify", "--part", "box", "--landing", str(landing), MATSUM)
     suggestion = run_json("suggest", *arguments)

@@ -1,4 +1,4 @@
-"""``explore``: its forms, its schema, and that every td is what ``suggest`` says of it."""
+"""``explore``: its formats, its schema, and answers that agree with ``suggest`` for every td."""
 
 import csv
 import io

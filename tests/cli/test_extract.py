@@ -1,4 +1,4 @@
-"""Histories that are written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
+"""Histories written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
 
 import csv
 import io
@@ -33,7 +33,7 @@ NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
 
 
 def is_same(first_history: History, second_history: History) -> bool:
-    """Whether two histories hold the same numbers, bit for bit."""
+    """Return True if two histories hold the same numbers bit for bit."""
     return (
         first_history.time.tobytes() == second_history.time.tobytes()
         and first_history.energy.tobytes() == second_history.energy.tobytes()
@@ -119,7 +119,7 @@ QUANTITIES = ("kinetic_energy", "total_energy", "external_work", "contact_energy
 
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The rollover box in every format."""
+    """Write the rollover box in every format; return the file names."""
     folder = tmp_path_factory.mktemp("box")
     files = {suffix: str(folder / f"box.{suffix}") for suffix in BOX}
     for file in files.values():
@@ -155,7 +155,7 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     "name", ["rollover_box.binout", "rollover_box.glstat", "rolloverT01.gz"]
 )
 def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
-    """Friction that is told apart stays apart, and the energy ratio is the one that the solver wrote."""
+    """Friction energy stays separate, and the energy ratio is the one that the solver wrote."""
     source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
     assert (
         run(

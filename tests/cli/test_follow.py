@@ -1,4 +1,4 @@
-"""The command ``follow``: lines, ndjson, exit codes, an end that is quiet."""
+"""The command ``follow``: lines, ndjson, exit codes, and a quiet end."""
 
 import gzip
 import json

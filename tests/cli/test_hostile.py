@@ -1,4 +1,4 @@
-"""Closed streams, full disks, interrupts and damaged files: one line, or the result."""
+"""Closed streams, full disks, interrupts and damaged files: one error line, or the result."""
 
 import gzip
 import io
@@ -34,7 +34,7 @@ from tests.text_files import make_glstat_text, make_matsum_text
 
 
 def run_in_shell(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
-    """Call the program by a shell, which can close its streams and limit its memory; ``$@`` are the arguments."""
+    """Call the program in a shell, which can close streams and limit memory; ``$@`` are the arguments."""
     program = f'd2rpick() {{ "{sys.executable}" -m d2rpick "$@"; }}; {command}'
     return subprocess.run(
         ["bash", "-c", program, "bash", *args], cwd=ROOT, capture_output=True, text=True, check=False,
@@ -43,7 +43,7 @@ def run_in_shell(command: str, *args: str | Path) -> subprocess.CompletedProcess
 
 
 def read_one_line(result: subprocess.CompletedProcess[str]) -> str:
-    """Message of a call that could not run."""
+    """Return the message of a call that failed."""
     assert (result.returncode, result.stdout, result.stderr.count("\n")) == (
         2,
         "",
@@ -101,7 +101,7 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
 def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As one does that comes in the end of an object, or while an extension module is imported."""
+    """This happens in a finalizer of an object, or while an extension module is imported."""
     (tmp_path / "click.py").write_text(
         "import os, signal\n"
         "class Swallowing:\n"
@@ -119,7 +119,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
 def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Python 3.11 raises a RuntimeError for it."""
+    """Python 3.11 raises a RuntimeError in this case."""
     (tmp_path / "numpy.py").write_text(
         "import os, signal\n"
         "class Named:\n"
@@ -136,7 +136,7 @@ def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
 
 @pytest.mark.parametrize("command", ["study --td 0.064 --jobs 1", "info"])
 def test_an_interrupt_ends_the_loop_of_a_shell(tmp_path: Path, command: str) -> None:
-    """The pipe is opened by the reader of the run, which then waits in it for the interrupt."""
+    """The reader of the run opens the pipe and then waits in it for the interrupt."""
     pipe = tmp_path / "run.csv"
     os.mkfifo(pipe)
     python = f'"{sys.executable}" -c "{INTERRUPTIBLE}"'
@@ -224,7 +224,7 @@ def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
-    """The size of a file is limited in blocks of 1 kB, which the second row exceeds."""
+    """The file size is limited in blocks of 1 kB, which the second row exceeds."""
     ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
     again.write_bytes(Path(ENERGY).read_bytes())
     assert (
@@ -276,7 +276,7 @@ def make_deep_file(groups: int) -> bytes:
 
 
 def make_dense_file(sizes: Sequence[int], **options: Any) -> bytes:
-    """A file with columns of zeros, which are packed; what is not written is not there at all."""
+    """Return a file with compressed columns of zeros; empty chunks are not stored."""
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         for number, size in enumerate(sizes):
@@ -494,7 +494,7 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
 
 
 def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
-    """Of no common column no state would be left, as if the run had written none."""
+    """If they have no common column, no state is left, as if the run had written none."""
     for name, head in (
         ("one", "time,internal_energy"),
         ("other", "time,force"),

@@ -1,4 +1,4 @@
-"""Names that hold control codes, markup, and what shells, spreadsheets and terminals act on, in every output."""
+"""Names with control codes, markup, and characters special to shells, spreadsheets and terminals, in every output."""
 
 import csv
 import html
@@ -63,14 +63,14 @@ CHECKS = ("table", "json", "ndjson", "github", "junit", "sarif")
 
 
 def find_unseen(text: str) -> set[str]:
-    """What of a text is not seen on a terminal, or commands it."""
+    """Return the characters of a text that a terminal does not show, or executes."""
     return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {
         "\n"
     }
 
 
 def split_by_shell(line: str) -> list[bytes]:
-    """Words of a command line as a shell takes them."""
+    """Return the words of a command line as a shell reads them."""
     process = subprocess.run(
         ["bash", "-c", f"printf '%s\\0' {line}"], capture_output=True, check=True
     ).stdout
@@ -270,7 +270,7 @@ def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
 
 
 class Tags(HTMLParser):
-    """Counts elements and handlers."""
+    """Parser that counts elements and event handlers."""
 
     @classmethod
     def of(cls, page: str) -> dict[str, int]:

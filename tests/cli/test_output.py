@@ -1,4 +1,4 @@
-"""Where results go and in which form: formats, files, figures, colours, exit codes."""
+"""Destination and form of results: formats, files, figures, colours, exit codes."""
 
 import csv
 import hashlib
@@ -59,7 +59,7 @@ FORMATS = {
 
 
 def read_rows(text: str) -> list[dict[str, Any]]:
-    """Rows of a CSV result with the types that JSON has."""
+    """Return the rows of a CSV result with the types of JSON."""
     return [
         {key: _convert_cell(key, cell) for key, cell in row.items()}
         for row in csv.DictReader(io.StringIO(text))
@@ -478,14 +478,14 @@ PERIOD = 0.02
 
 
 class Terminal(io.StringIO):
-    """A stderr that is a terminal."""
+    """Stand-in for stderr that is a terminal."""
 
     def isatty(self) -> bool:
         return True
 
 
 def read_rest(terminal: int) -> bytes:
-    """What is left to be read where nobody writes any more."""
+    """Read what is left in a terminal that nobody writes to any more."""
     output = b""
     with suppress(OSError):  # how Linux tells that the other end is closed
         while piece := os.read(terminal, 1000):
@@ -497,7 +497,7 @@ def read_rest(terminal: int) -> bytes:
 def show_progress(
     stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False
 ) -> str:
-    """Give what is on ``stream`` after that many periods of reading."""
+    """Return the content of ``stream`` after this many periods of reading."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
         patch.setenv("COLUMNS", "40")

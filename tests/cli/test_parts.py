@@ -1,4 +1,4 @@
-"""Parts to be switched and parts that fly with them: --part and --flying, seen from outside."""
+"""Parts to be switched and parts that fly with them: --part and --flying for a user."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ BOX, STEP, SLED = (
 
 
 def run_rollover(*options: str, command: str = "suggest") -> dict[str, Any]:
-    """Answer for the computed rollover at td = 0.37, held against its schema."""
+    """Run a command on the computed rollover at td = 0.37 and validate its answer."""
     tr = ("--tr", "0.1") if command == "verify" else ()
     return run_json_checked(command, "--td", "0.37", *tr, *options, ROLLOVER_T01)
 

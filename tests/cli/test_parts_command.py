@@ -1,4 +1,4 @@
-"""The commands ``parts`` and ``calibrate`` in all their forms, and ``--deck`` where a cost share was asked for."""
+"""The commands ``parts`` and ``calibrate`` in all formats, and ``--deck`` instead of a cost share."""
 
 import csv
 import io
@@ -241,7 +241,7 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
 
 
 def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
-    """Else `check` finds nodes that two rigid bodies own, D2R108."""
+    """Otherwise `check` finds nodes that belong to two rigid bodies (D2R108)."""
     result = run(
         "plan",
         "-q",

@@ -1,7 +1,7 @@
-"""Cards printed for 20 folders of runs, pasted into their decks, and checked: nothing is objected to.
+"""Cards printed for 20 run folders, pasted into their decks and checked: no problem is found.
 
-Each folder has something on the parts that a card must respect: parts that share nodes, nodal rigid bodies, joints,
-included files, restarts; in Radioss several bodies, groups and included files.
+The parts in each folder have a feature that a card must respect: shared nodes, nodal rigid bodies, joints, included
+files, restarts; in Radioss several bodies, groups and included files.
 """
 
 import shutil
@@ -42,7 +42,7 @@ def add_cards(*cards: str) -> Callable[[Path], Path]:
 
 
 def move_to_include(folder: Path) -> Path:
-    """Move all but the title into a file that another one includes."""
+    """Move everything except the title into a file that is included by another one."""
     main = write_box(folder, write_nodal_body(9, 1, 2))
     put(folder / "mesh.k", main.read_text("utf-8"))
     put(folder / "outer.k", "*KEYWORD\n*INCLUDE\nmesh.k\n*END\n")
@@ -77,7 +77,7 @@ def drop_end(folder: Path) -> Path:
 
 
 def add_switches(folder: Path) -> Path:
-    """Take the first ids of switch sets for a part that is not the card's."""
+    """Use the first ids of switch sets for a part outside the card."""
     first = pad(901, 0, 0.01, 0.0, 0.0, 0, 0, 0)
     return write_box(
         folder,
@@ -148,7 +148,7 @@ def write_parts_group(number: int, *parts: int) -> str:
 
 
 def write_plates(folder: Path, extra_text: str = "", nodes_off: str = "") -> Path:
-    """Write two plates that share nodes (parts 1 and 2) and one apart (3), with the history of the sample box."""
+    """Write two plates that share nodes (parts 1 and 2) and a separate one (3), with the history of the sample box."""
     text = f"#RADIOSS STARTER\n/BEGIN\nBOX\n{pad(2022, 0)}/TITLE\nplates\n/MAT/ELAST/1\nsteel\n"
     text += pad(7850.0, width=20) + pad(2.1e11, 0.3, width=20)
     text += f"/PROP/SHELL/1\nshell\n{pad(24)}\n{pad(3, 0)[:-1]}{0.005:20g}\n/NODE\n"
@@ -216,7 +216,7 @@ RADIOSS: Mapping[str, Callable[[Path], Path]] = {
 
 
 def write_pieces(folder: Path, main: Path, printed: str) -> None:
-    """Put what is printed where its headings say: into the starter deck, and into engine files."""
+    """Put the printed text where its headings say: into the starter deck, and into engine files."""
     heading = "# ---- "
     for piece in printed.split(heading)[1:]:
         first, _, content = piece.partition("\n")

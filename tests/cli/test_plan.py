@@ -1,4 +1,4 @@
-"""The command ``plan`` in all its forms."""
+"""The command ``plan`` in all formats."""
 
 import json
 from pathlib import Path
@@ -63,7 +63,7 @@ def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
 
 
 def read_csv_rows(text: str) -> list[dict[str, object]]:
-    """Rows of the csv, numbers as numbers."""
+    """Return the rows of a csv, with numbers as numbers."""
     import csv
     import io
 
@@ -78,7 +78,7 @@ def read_csv_rows(text: str) -> list[dict[str, object]]:
 
 
 def test_a_poor_window_is_called_poor() -> None:
-    """A level that matches is not all: most of the vibration may be kinetic at td."""
+    """The level may match while most of the vibration is kinetic at td."""
     box = locate_stored("drop2T01.gz")
     plan = d2.plan(d2.read(box), parts="all")
     document = plan.to_dict()
@@ -248,7 +248,7 @@ def test_the_next_window_is_planned_from_the_switched_run(
 def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
     history: list[str], tmp_path: Path
 ) -> None:
-    """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
+    """The next run starts from the beginning; a run that was rigid in a finished window cannot be used to judge it."""
     done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
@@ -278,7 +278,7 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
 def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
     tmp_path: Path,
 ) -> None:
-    """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
+    """The first fall of the falling box is free, so the reference can stand in for a run switched there."""
     name, node = "DROP2", "535"
     deck = put(tmp_path / f"{name}_0000.rad", read_starter("DROP2"))
     engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"

@@ -1,4 +1,4 @@
-"""The position error in what suggest, verify and plan write, of a car that a solver computed."""
+"""The position error in the output of suggest, verify and plan, for a computed car."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -295,7 +295,7 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
 def test_a_lead_part_makes_one_body_with_a_deck_and_without(
     deck: str, tmp_path: Path
 ) -> None:
-    """What the card merges is the body whose error is given: engine, battery and wheels as one are 2 mm off."""
+    """The error is that of the merged body of the card: engine, battery and wheels as one body are 2 mm off."""
     page = ("--report", str(tmp_path / "page.html"), "--overwrite")
     merged = ("--merge", "12", "--no-verify", "--solver", "ls-dyna", *page)
     for with_deck in ((), ("--deck", deck)):
@@ -324,7 +324,7 @@ def test_a_lead_part_makes_one_body_with_a_deck_and_without(
 def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(
     tmp_path: Path, lead: str, is_known: bool
 ) -> None:
-    """Nor how a lead that is not among the parts moves against them."""
+    """Nor does a lead part outside the parts tell how it moves relative to them."""
     merged = (
         "--merge",
         lead,

@@ -1,4 +1,4 @@
-"""What cannot be run has one line that says what was found, what was expected and what to do; no file is written."""
+"""Refused input gives one line with what was found, what was expected and what to do; no file is written."""
 
 import shlex
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The command ``rollover``: what it writes is read back, scans in every form, figures, refusals."""
+"""The command ``rollover``: its files are read back, scans in every format, figures, refusals."""
 
 import csv
 import io
@@ -163,7 +163,7 @@ def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
 
 
 def list_points(line: Line2D) -> np.ndarray:
-    """Points of a line that was drawn."""
+    """Return the points of a drawn line."""
     return np.asarray(line.get_xydata(), dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""A folder of a run is enough: its main deck is found, named and used, and cards are checked in it before printing."""
+"""A run folder is enough input: its main deck is found, named and used, and cards are checked before printing."""
 
 import shutil
 from pathlib import Path
@@ -33,19 +33,19 @@ def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
 
 @pytest.fixture
 def box(tmp_path: Path) -> Path:
-    """The folder of the sample run."""
+    """Write the folder of the sample run."""
     return write_run_folder(tmp_path / "run")
 
 
 def print_card(folder: Path, *extra_keywords: str) -> tuple[str, str]:
-    """Card of a plan, and what is told on stderr."""
+    """Return the card of a plan, and the messages on stderr."""
     result = run("plan", str(folder), "--part", "flying", "-f", "card", *extra_keywords)
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
 
 def check_with_card(folder: Path, card: str) -> str:
-    """What ``check`` says of the deck with the card in it."""
+    """Return the output of ``check`` for the deck with the card in it."""
     main = (folder / "main.k").read_text("utf-8")
     pasted = put(folder.parent / "pasted.k", main.replace("*END", f"{card}*END"))
     result = run("check", "--fail-on", "warning", str(pasted))
@@ -224,7 +224,7 @@ ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
 def write_radioss_run(path: Path, root: str) -> Path:
-    """Write a box of two plates that fall, with the history of the sample box."""
+    """Write a falling box of two plates, with the history of the sample box."""
     path.mkdir()
     head = "#RADIOSS STARTER\n/BEGIN\nCAR\n      2022         0\n/TITLE\nplates\n/MAT/ELAST/1\nsteel\n"
     rows = [
@@ -250,7 +250,7 @@ def write_radioss_run(path: Path, root: str) -> Path:
 def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(
     tmp_path: Path,
 ) -> None:
-    """The record ends one output interval before the run, and the engine finds its restart by the name of its file."""
+    """The record ends one output interval before the run; the engine finds its restart file by name."""
     box = write_radioss_run(tmp_path / "run", "BOX")
     times = ("--tr", "0.1", "--td", "0.37", "--part", "1,2", "--after", "0.09")
     result = run("card", *times, "--history", str(box))

@@ -1,4 +1,4 @@
-"""Settings files that somebody else may have written: they start nothing, write nothing, and never crash a command."""
+"""Settings files from others start no program, write no file, and never crash a command."""
 
 import os
 import tomllib
@@ -79,7 +79,7 @@ VALUES: Final = (
 
 
 def list_options(command: str) -> list[str]:
-    """Keys of the settings of a command."""
+    """Return the settings keys of a command."""
     command_object = d2rpick.get_command(click.Context(d2rpick), command)
     assert command_object
     return [
@@ -90,7 +90,7 @@ def list_options(command: str) -> list[str]:
 
 
 def ask_with_settings(command: str, text: str) -> str:
-    """Let a command read these settings; what it says if it refuses them, in one line without an internal error."""
+    """Run a command with these settings; return its refusal of one line, which must not be an internal error."""
     put(Path("d2rpick.toml"), text)
     result = run(command, *NEEDED.get(command, ("x",)), "--show-settings")
     assert "internal error" not in result.stderr, text
@@ -203,7 +203,7 @@ def test_a_byte_order_mark_before_the_settings_is_no_part_of_them() -> None:
 
 @pytest.fixture
 def inner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder two below that with the settings."""
+    """Work in a folder two levels below the settings file."""
     folder = tmp_path / "project" / "runs"
     folder.mkdir(parents=True)
     put(tmp_path / "d2rpick.toml", "margin = 0.001\n")
@@ -212,7 +212,7 @@ def inner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def read_margin(*args: str) -> str:
-    """The margin that the settings give, or the default."""
+    """Return the margin in use: that of the settings, or the default."""
     lines = run(*ASKED, *args, "--show-settings").stdout.splitlines()
     return next(line.split()[2] for line in lines if line.startswith("margin = "))
 
@@ -260,7 +260,7 @@ def test_the_settings_of_a_deck_end_at_the_root_of_its_repository(inner: Path) -
 
 @pytest.fixture
 def foreign(inner: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Let all files belong to somebody else."""
+    """Make all files look as if they belong to another user."""
     monkeypatch.setattr(os, "geteuid", lambda: inner.stat().st_uid + 1)
     return inner
 
@@ -322,5 +322,5 @@ def test_a_link_to_a_file_of_another_user_is_not_used(inner: Path) -> None:
 
 
 def test_the_values_of_these_tests_are_toml() -> None:
-    """Otherwise a file would be refused as a whole, and its types would not be looked at."""
+    """Otherwise the whole file would be refused before its types are checked."""
     assert all(tomllib.loads(f"a = {value}") for value in VALUES)

@@ -1,4 +1,4 @@
-"""The command ``study`` as a user meets it: formats, codes, lists, and what is left when it is killed."""
+"""The command ``study`` for a user: formats, exit codes, lists, and the rows that survive a kill."""
 
 import csv
 import gzip
@@ -48,17 +48,17 @@ KEYS = (
 
 @pytest.fixture
 def runs(tmp_path: Path) -> list[str]:
-    """Three runs that differ a little."""
+    """Write three slightly different runs."""
     return variants.write_variants(tmp_path)
 
 
 def check_line(check_report: dict[str, Any], kind: str) -> None:
-    """Hold a line of newline-delimited JSON against the schema that ships."""
+    """Validate a line of newline-delimited JSON by the schema of the package."""
     check_by_definition(check_report, "study-1", kind)
 
 
 def read_lines(text: str) -> list[dict[str, Any]]:
-    """Lines of newline-delimited JSON."""
+    """Return the documents of newline-delimited JSON."""
     return [json.loads(line) for line in text.splitlines()]
 
 
@@ -232,7 +232,7 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one() -> None:
 
 
 def wait_for(ledger: Path, lines: int) -> None:
-    """Wait until a ledger has so many lines."""
+    """Wait until a ledger has this many lines."""
     for _ in range(1000):
         with suppress(
             FileNotFoundError
@@ -382,7 +382,7 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
 
 
 def count_taken(args: Sequence[str]) -> str:
-    """Say how many runs were taken from the ledger."""
+    """Return how many runs came from the ledger."""
     return next(
         (line for line in run(*args).stderr.splitlines() if "reused from" in line), ""
     )

@@ -1,4 +1,4 @@
-"""The library speaks of arguments; every argument that a message names has an option."""
+"""Each argument named in a library message has an option of the same name."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ SPEAKING = ("histories", "vibration", "flight", "choice", "models")
 
 
 def find_messages(folder: str) -> Iterator[str]:
-    """Texts in the code of a folder that are no docstrings."""
+    """Yield the strings in the code of a folder that are not docstrings."""
     for path in sorted((ROOT / "d2rpick" / folder).rglob("*.py")):
         nodes = list(ast.walk(ast.parse(path.read_text())))
         stated = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}

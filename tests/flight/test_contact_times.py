@@ -20,7 +20,7 @@ def make_bouncing_part(
     interval: float,
     gravity: float = GRAVITY,
 ) -> Momenta:
-    """Return the momentum of a part that a constant force turns back in each contact; no state is at its start or end."""
+    """Return the momentum of a part that a constant force turns back in each contact; no state is at its ends."""
     time = np.arange(0.0, end + interval / 2, interval)
     impulses = [
         40.0 * MASS * (0.05 + 0.02 * contact_number)

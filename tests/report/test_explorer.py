@@ -1,4 +1,4 @@
-"""The interactive part of a page in a real browser: what it shows of a td is what ``suggest --td`` prints."""
+"""The interactive part of a page in a real browser shows for each td what ``suggest --td`` prints."""
 
 import base64
 import json
@@ -56,20 +56,20 @@ return [...document.body.querySelectorAll("*")]
 
 
 def mark_for_browser(test: Test) -> Test:
-    """Mark a test that takes a browser, and so its time."""
+    """Mark a test that needs a browser and is slow."""
     for mark in (pytest.mark.slow, _NEEDED):
         mark(test)
     return test
 
 
 class Browser:
-    """A browser, and what a reader of a page does in it."""
+    """Browser with the actions of a reader of a page."""
 
     def __init__(self, driver: "webdriver.Chrome") -> None:
         self.driver = driver
 
     def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
-        """Show a page at a width [px], with what the reader prefers: ``prefers_color_scheme="dark"``."""
+        """Open a page at a width [px], with media preferences of the reader such as ``prefers_color_scheme="dark"``."""
         size = {
             "width": width,
             "height": 900,
@@ -85,7 +85,7 @@ class Browser:
         self.driver.get(page.as_uri())
 
     def ask(self, command: str, **arguments: Any) -> Any:
-        """Ask the browser itself, by its developer tools."""
+        """Send a command of the developer tools."""
         return self.driver.execute_cdp_cmd(command, arguments)
 
     def find(self, selector: str) -> "WebElement":
@@ -93,17 +93,17 @@ class Browser:
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
     def shown(self, selector: str) -> bool:
-        """Whether the first such element takes up room."""
+        """Return True if the first such element has a visible size."""
         return self.find(selector).is_displayed()
 
     def value(self, name: str) -> str:
-        """What the interactive part says under a name."""
+        """Return the text of the interactive part under a name."""
         return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
 
     def spoken(
         self, roles: set[str], value: float | None = None
     ) -> list[dict[str, Any]]:
-        """Elements with these roles, and this value, as a screen reader finds them, which is told a little later."""
+        """Return the elements with these roles and this value that a screen reader finds, after a short delay."""
 
         from selenium.webdriver.support.wait import WebDriverWait  # slow
 
@@ -124,7 +124,7 @@ class Browser:
         return WebDriverWait(self.driver, timeout=20).until(found)
 
     def cut(self) -> list[str]:
-        """What is cut at the right edge, and whether the page is wider than the screen."""
+        """Return the texts cut at the right edge, and a note if the page is wider than the screen."""
         cut_texts: list[str] = self.driver.execute_script(_CUT)
         wide = self.driver.execute_script(
             "return document.documentElement.scrollWidth > document.documentElement.clientWidth"
@@ -132,13 +132,13 @@ class Browser:
         return [*cut_texts, *["the page itself"] * bool(wide)]
 
     def pdf(self) -> bytes:
-        """Print the page."""
+        """Print the page to PDF."""
         return base64.b64decode(
             self.ask("Page.printToPDF", preferCSSPageSize=True)["data"]
         )
 
     def complaints(self) -> list[dict[str, Any]]:
-        """What stands in the console since the last call."""
+        """Return the console messages since the last call."""
         return list(self.driver.get_log("browser"))  # type: ignore[no-untyped-call]
 
 
@@ -191,7 +191,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser that keeps what it writes in a folder of its own."""
+    """Start a browser that writes into its own folder."""
     options = webdriver.ChromeOptions()
     options.binary_location = str(CHROMIUM)
     for option in (
@@ -209,13 +209,13 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture
 def browser(started: Browser) -> Iterator[Browser]:
-    """A browser, in whose console nothing may stand afterwards."""
+    """Return the browser; its console must be empty after the test."""
     yield started
     assert started.complaints() == []
 
 
 def read_content(page: Path) -> dict[str, Any]:
-    """What the script reads."""
+    """Return the data that the script of a page reads."""
     text = re.findall(
         r'<script type="application/json" id="explorer-data">(.*?)</script>',
         page.read_text("utf-8"),
@@ -225,7 +225,7 @@ def read_content(page: Path) -> dict[str, Any]:
 
 
 def list_numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
-    """Numbers of each td of a flight."""
+    """Return the numbers of each td of a flight."""
     rows_found = read_content(page)["flights"][flight]
     return [
         dict(zip(rows_found["numbers"], values, strict=True))
@@ -235,7 +235,7 @@ def list_numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
 
 @cache
 def run_suggested(command: str) -> dict[str, Any]:
-    """What the command prints that the page names."""
+    """Run the command that the page names and return its answer."""
     program, *args = shlex.split(command)
     assert program == "d2rpick"
     document: dict[str, Any] = json.loads(run(*args, "-q", "-f", "json").stdout)
@@ -243,7 +243,7 @@ def run_suggested(command: str) -> dict[str, Any]:
 
 
 def check(browser: Browser) -> float:
-    """Hold what is shown against the command that is shown beside it; give the td in sight."""
+    """Compare the page with the command it names; return the td shown."""
     said_by_page = browser.driver.execute_script(SAID)
     suggestion = run_suggested(said_by_page["command"])
     best = next(
@@ -385,7 +385,7 @@ def test_a_click_on_a_point_of_the_trade_off_selects_it(
 
 
 def describe_td(suggestion: dict[str, Any]) -> str:
-    """What is said of a td instead of its number."""
+    """Return the texts that the page shows for a td instead of numbers."""
     (best,) = (
         candidate for candidate in suggestion["candidates"] if candidate["recommended"]
     )
@@ -549,7 +549,7 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
 
 
 def compute_contrast(first_colour: str, second_colour: str) -> float:
-    """Contrast of two colours by WCAG 2, from 1 to 21."""
+    """Return the contrast of two colours by WCAG 2, from 1 to 21."""
 
     def luminance(colour: str) -> float:
         parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]

@@ -1,4 +1,4 @@
-"""Figures say one thing each: the flight, what is acceptable in it, runs told apart."""
+"""Each figure has one message: the flight, the acceptable times in it, or the differences of runs."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def list_marks(axes: Axes) -> list[int]:
 
 
 def find_extents(patch: Patch) -> Bbox:
-    """Give its width and height in its own coordinates: older versions of matplotlib draw a span as a polygon."""
+    """Return width and height in the coordinates of the patch; older matplotlib draws a span as a polygon."""
     path = patch.get_path().transformed(patch.get_patch_transform())
     return path.get_extents()
 
@@ -131,7 +131,7 @@ def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(
 
 
 def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
-    """Round-off of 1e-21 J before a landing of 40 J; where nothing ever comes, beside the energy it is measured by."""
+    """Round-off of 1e-21 J is flat beside a landing of 40 J, or beside the scale of the energy if nothing lands."""
     time = np.linspace(0, 1, 501)
     energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
     answer = suggest(

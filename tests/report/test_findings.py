@@ -1,4 +1,4 @@
-"""Reports of findings, each against its published schema."""
+"""Reports of findings, each validated by its published schema."""
 
 import json
 import re

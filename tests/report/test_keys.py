@@ -1,4 +1,4 @@
-"""The public keys: the schemas that ship say what the fields of the results say."""
+"""The public keys: the schemas of the package agree with the fields of the results."""
 
 import pytest
 

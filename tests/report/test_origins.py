@@ -1,4 +1,4 @@
-"""JSON documents and pages name every file that an answer rests on, with its SHA-256."""
+"""JSON documents and pages name every file behind an answer, with its SHA-256."""
 
 import hashlib
 from pathlib import Path
@@ -26,7 +26,7 @@ def compute_digest(file: Path | str) -> str:
 
 @pytest.fixture(autouse=True)
 def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A deck of two files, of which one is included twice, and weights."""
+    """Write a deck of two files, one of which is included twice, and weights."""
     monkeypatch.chdir(tmp_path)
     main = DECK.read_text("utf-8").replace(
         "*END", "*INCLUDE\nnote.k\n*INCLUDE\nnote.k\n*END"

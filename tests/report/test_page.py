@@ -1,4 +1,4 @@
-"""The HTML report: whole, self-contained, safe, and readable in a browser at any width and on paper."""
+"""The HTML report: complete, self-contained, safe, and readable at any width and on paper."""
 
 import base64
 import hashlib
@@ -25,7 +25,7 @@ VOID = {"meta", "br", "hr", "link", "input"}
 
 
 class Page(HTMLParser):
-    """What a page consists of; fails where an element is not closed."""
+    """Parser of the contents of a page; fails if an element is not closed."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -89,7 +89,7 @@ class Page(HTMLParser):
             self.text += data
 
     def last_command(self) -> list[str]:
-        """Words of the last command on the page, behind the name of the program."""
+        """Return the words of the last command on the page, without the name of the program."""
         return shlex.split(
             html.unescape(
                 re.findall(r"<pre[^>]*>d2rpick ([^<]*)</pre>", self.source)[-1]

@@ -1,4 +1,4 @@
-"""Lines that say what was read."""
+"""Lines about the input that was read."""
 
 import numpy as np
 

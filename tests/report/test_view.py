@@ -1,4 +1,4 @@
-"""What is looked at to see a choice, and the motion that is drawn."""
+"""The part of the record that a figure shows, and the motion that is drawn."""
 
 import numpy as np
 import pytest

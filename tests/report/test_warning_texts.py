@@ -9,7 +9,7 @@ from tests.command import ROOT, join_wrapped_lines, run
 
 
 def find_codes() -> set[str]:
-    """Codes of all warnings in the source: what stands first in a Caution, or names one."""
+    """Return the codes of all warnings in the source: first arguments of Caution, and codes in tables of warnings."""
     codes_found: set[str] = set()
     for path in (ROOT / "d2rpick").rglob("*.py"):
         text = path.read_text()
