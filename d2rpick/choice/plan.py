@@ -3,7 +3,7 @@
 A window in which nothing vibrates locks in nothing and leaves all landings where they are.  One that locks in energy
 moves the next landing by a little, for which the margin is kept, and those after it by more than any margin.  So one
 reference supports every window up to and with the first that locks in energy; the next ones are planned from the run
-that was switched so (docs/plan.md, "Why one run does not support all
+that was switched so (docs/explanation/planning.md, "Why one run does not support all
 windows").
 
 Each window that locks in energy costs a run of its own, so a short one is left out for a longer one behind it.

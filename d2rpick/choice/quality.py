@@ -131,7 +131,7 @@ _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
 # Of the energy that the next contact puts into the parts: an error of the vibration with less of it does not make a
-# pair worse than good, or than fair (docs/validation.md).
+# pair worse than good, or than fair (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 
 

@@ -403,7 +403,7 @@ def car() -> Reference:
 def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
     car: Reference,
 ) -> None:
-    """The car is rigid for 17 ms between two pushes, and for 108 ms after them; `parts` compares sets for the latter."""
+    """The car is rigid for 17 ms between two pushes, and for 108 ms after them; `parts` compares sets for 108 ms."""
     planned = plan_of(car, PLAIN)
     assert list_statuses(planned) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (
