@@ -443,19 +443,20 @@ def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    "rules", [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}]
+    "arguments",
+    [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}],
 )
-def test_a_check_names_the_command_that_repeats_it(rules: dict[str, Any]) -> None:
+def test_a_check_names_the_command_that_repeats_it(arguments: dict[str, Any]) -> None:
     check_report = d2.check(
-        DECK, history=d2.read(ENERGY, energy="internal_energy"), **rules
+        DECK, history=d2.read(ENERGY, energy="internal_energy"), **arguments
     )
     assert check_report.to_dict() == run_json(*check_report.command) | {
         "command": list(check_report.command)
     }
-    arguments = [
-        rule for rule in ("D2R202", "D2R203") if rule not in rules.get("ignore", ())
+    kept_rules = [
+        rule for rule in ("D2R202", "D2R203") if rule not in arguments.get("ignore", ())
     ]
-    assert check_report.to_frame()["rule"].tolist() == arguments
+    assert check_report.to_frame()["rule"].tolist() == kept_rules
 
 
 def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:

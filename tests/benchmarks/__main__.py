@@ -1,8 +1,8 @@
-"""Ratios that the project promises, measured on this machine: ``python -m tests.benchmarks``.
+"""Measure the ratios that the project promises on this machine: ``python -m tests.benchmarks``.
 
-``python -m tests.benchmarks noise window`` measures only the rows whose names hold one of the words.
-What is compared takes turns, and medians are divided; results are checked before they are timed.  Rows without
-a goal say how much a condition of the measurement matters.  Exit code 1 when a goal is missed.
+``python -m tests.benchmarks noise window`` measures only rows whose names contain one of the words.  Compared calls
+take turns, and medians are divided; results are checked before they are timed.  Rows without a goal show how much a
+condition of the measurement matters.  The exit code is 1 if a goal is missed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _ROUNDS = 5
 def process_ratio(
     libraries: str, *args: str, env: Mapping[str, str] | None = None
 ) -> float:
-    """Processor time of a command over that of a process that only imports what it cannot do without."""
+    """Return the processor time of a command over that of a process that only imports the required libraries."""
     own_settings = (THREADS, "PYTHONDONTWRITEBYTECODE")
     clean = {
         name: value
@@ -67,7 +67,7 @@ def process_ratio(
 
 
 def integration_ratio(repeats: int) -> float:
-    """DOP853 at a relative tolerance of 1e-10 over the closed form: full states at a million points to 0.15 s."""
+    """Return the time of DOP853 (relative tolerance 1e-10) over that of the closed form, for 1e6 states to 0.15 s."""
     import numpy as np
     from scipy.integrate import solve_ivp
 
@@ -113,7 +113,7 @@ def integration_ratio(repeats: int) -> float:
 def measured(
     module: str, name: str, *args: int | str | None
 ) -> Callable[[], float | None]:
-    """Give a measure of a module here, which is imported, and makes its files, when it is asked."""
+    """Return a measure of a benchmark module, which is imported and makes its files on the first call."""
 
     def measure() -> float | None:
         figure: float | None = getattr(
@@ -131,7 +131,7 @@ reading, choosing, deck, identification, study = (
 
 
 class Row(NamedTuple):
-    """A ratio to measure, and the most or the least it may be; the measure gives None where a library is missing."""
+    """Ratio to measure, with an upper or a lower limit; the measure returns None if a library is missing."""
 
     what: str
     measure: Callable[[], float | None]
@@ -529,7 +529,7 @@ ROWS = (
 
 
 def main() -> int:
-    """Print all ratios beside their goals, or those whose names hold a word that is given; tell which are missed."""
+    """Print all ratios and their goals, or those whose names contain a given word; return 1 if a goal is missed."""
     os.environ.setdefault(THREADS, "1")
     words = sys.argv[1:] or [""]
     print(f"{'ratio':<54}  measured  goal")

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class Chains(NamedTuple):
-    """n chains: masses (n, 3), springs and dampers between them (n, 2), and the force at which springs yield (n, 2).
+    """n chains: masses (n, 3), springs and dampers between them (n, 2), and the yield forces of the springs (n, 2).
 
-    They yield up to a time (n,) only: that of the end of the load, or later.
-    ``places`` and ``velocities`` (n, 3, 2) are those at the start.
+    Springs yield only up to a time (n,): the end of the load, or later.  ``places`` and ``velocities`` (n, 3, 2) are
+    the initial ones.
     """
 
     masses: Samples
@@ -34,7 +34,7 @@ class Chains(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One chain as files have it, and the impulse (states, 2) of all forces on it but gravity."""
+    """One chain as files store it, and the impulse (states, 2) of all forces on it except gravity."""
 
     written: Written
     impulse: Samples
@@ -43,7 +43,7 @@ class Run(NamedTuple):
 def integrate_chains(
     chains: Chains, force: Force, weight: Force, end: float, states: int, steps: int
 ) -> Iterator[Run]:
-    """Integrate chains up to ``end`` under a force and their weight, with so many ``steps`` from state to state."""
+    """Integrate chains up to ``end`` under a force and their weight, with this number of ``steps`` between states."""
     mass, dt = chains.masses[..., np.newaxis], end / (states * steps)
     stiffness, damping = (
         chains.stiffness[..., np.newaxis],
@@ -117,17 +117,17 @@ def integrate_chains(
 
 
 def draw_directions(random: np.random.Generator, count: int) -> Samples:
-    """Random directions (count, 2), every other one along x: there those of one chain have one line in common."""
+    """Draw directions (count, 2); every other one is along x, so that its chain moves on one line."""
     angle = random.uniform(0, 2 * np.pi, count)
     angle[::2] = 0
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def apply_half_sine(time: float, start: Samples, length: Samples) -> Samples:
-    """Half-sine from ``start`` (n,) on, so long; zero elsewhere."""
+    """Return a half-sine pulse of this length from ``start`` (n,) on, zero elsewhere."""
     return np.asarray(np.sin(np.pi * np.clip((time - start) / length, 0, 1)))
 
 
 def apply_to_first(forces: Samples) -> Samples:
-    """Forces (n, 2) at the first of three masses."""
+    """Apply forces (n, 2) to the first of three masses."""
     return np.stack([forces, np.zeros_like(forces), np.zeros_like(forces)], axis=1)

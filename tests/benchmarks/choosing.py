@@ -1,7 +1,7 @@
-"""How long choosing takes on the records that engineers have: a structure that rings in many modes, with noise.
+"""Cost of choosing times for records of engineers: structures with many modes and noise.
 
-All records are made up, seeded and lie in a temporary folder.  What is compared takes turns; processor seconds of
-whole processes count, since other work on the machine stretches the wall clock.
+All records are synthetic, seeded, and in a temporary folder.  Compared calls take turns.  Times are processor times of
+whole processes, because other work on the machine changes the elapsed time.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ MATSUM = (
 
 
 def noisy_to_pandas() -> float:
-    """`suggest --td` of 1e5 noisy states over pandas, which reads that csv and does nothing else."""
+    """Return the cost of `suggest --td` for 1e5 noisy states over that of pandas, which only reads the csv."""
     file = str(_make_noisy_energy(100_000))
     document = json.loads(
         read_output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file)
@@ -76,7 +76,7 @@ def noisy_to_pandas() -> float:
 
 
 def noisy_growth() -> float:
-    """`suggest --td` of 1e6 noisy states over the same of 1e5."""
+    """Return the cost of `suggest --td` for 1e6 noisy states over that for 1e5."""
     return _compare_processes(
         _suggest(str(_make_noisy_energy(1_000_000))),
         _suggest(str(_make_noisy_energy(100_000))),
@@ -85,7 +85,7 @@ def noisy_growth() -> float:
 
 
 def drowned_growth() -> float:
-    """`suggest --td` of 2e5 states of a vibration that decays into its noise over the same of 1e5."""
+    """Return the cost of `suggest --td` for 2e5 states over that for 1e5; the vibration decays into its noise."""
 
     def build(states: int) -> tuple[str, ...]:
         time = np.linspace(0.0, 1.0, states)
@@ -98,7 +98,7 @@ def drowned_growth() -> float:
 
 
 def window_to_td(kind: str, width: str, *options: str) -> float:
-    """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy", "clean" or "parts"."""
+    """Return the cost of `--td-window` over that of `--td` for 1e5 states; ``kind`` is "noisy", "clean" or "parts"."""
     file = str(
         {"noisy": _make_noisy_energy, "clean": _clean, "parts": _make_two_parts}[kind](
             100_000
@@ -114,7 +114,7 @@ def window_to_td(kind: str, width: str, *options: str) -> float:
 
 
 def open_window_to_td() -> float:
-    """The same where the end of the load is left to be found."""
+    """Return the cost of `--td-window` over that of `--td` if the end of the load must be found."""
     file = str(_make_noisy_energy(100_000))
     suggest = ("-m", "d2rpick", "suggest", "--exit-zero", file)
     return _compare_processes(
@@ -124,7 +124,7 @@ def open_window_to_td() -> float:
 
 
 def explore_to_td(file: str, td: str, *options: str) -> float:
-    """`explore` of 200 td over `suggest --td`: processes; a file of the samples, or "noisy" for 1e5 noisy states."""
+    """Return the cost of `explore` of 200 td over that of `suggest --td`; a sample, or "noisy" for 1e5 noisy states."""
     name = (
         str(_make_noisy_energy(100_000)) if file == "noisy" else f"sample_data/{file}"
     )
@@ -137,7 +137,7 @@ def explore_to_td(file: str, td: str, *options: str) -> float:
 
 
 def clean_growth(command: str) -> float:
-    """A command on a clean oscillator of 1e6 states over the same of 1e5."""
+    """Return the cost of a command for a clean oscillator of 1e6 states over that for 1e5."""
 
     def build(file: str) -> tuple[str, ...]:
         if command == "verify":
@@ -162,7 +162,7 @@ def clean_growth(command: str) -> float:
 
 
 def plan_to_pandas(trouble: str) -> float:
-    """`plan` of 1e5 states of some `_trouble` over pandas, which reads that csv and does nothing else."""
+    """Return the cost of `plan` for 1e5 states of a troubled record over that of pandas, which only reads the csv."""
     file = str(_make_troubled_record(trouble, 100_000))
     return _compare_processes(
         ("-m", "d2rpick", "plan", "--exit-zero", file), ("-c", PANDAS, file), rounds=1
@@ -170,7 +170,7 @@ def plan_to_pandas(trouble: str) -> float:
 
 
 def search_to_td(trouble: str, states: int, *command: str) -> float:
-    """A command that looks for td over `suggest --td` where nobody says when the load ends."""
+    """Return the cost of a command that searches td over that of `suggest --td`; the end of the load is unknown."""
     arguments = ("--exit-zero", "-q", str(_make_troubled_record(trouble, states)))
     return _compare_processes(
         ("-m", "d2rpick", *command, *arguments),
@@ -180,19 +180,19 @@ def search_to_td(trouble: str, states: int, *command: str) -> float:
 
 
 def wait(trouble: str, states: int, *command: str) -> float:
-    """Processor time of a command on a record of some `_trouble` [s]."""
+    """Return the processor time of a command for a troubled record [s]."""
     return _measure_cost(
         *command, "--exit-zero", "-q", str(_make_troubled_record(trouble, states))
     )
 
 
 def wait_for_info(trouble: str, states: int) -> float:
-    """Processor time of `info` of that record [s]."""
+    """Return the processor time of `info` for a troubled record [s]."""
     return _measure_cost("info", "-q", str(_make_troubled_record(trouble, states)))
 
 
 def wait_for_parts(parts: int) -> float:
-    """Processor time of `explore` of so many parts and 2000 states [s]."""
+    """Return the processor time of `explore` for this number of parts and 2000 states [s]."""
     names = (
         "--part",
         f"2001-{2000 + parts}",
@@ -204,7 +204,7 @@ def wait_for_parts(parts: int) -> float:
 
 
 def explore_memory() -> float:
-    """Peak memory of `explore` of three impacts, 1e5 states [MB]."""
+    """Return the peak memory of `explore` for three impacts, 1e5 states [MB]."""
     file = str(_make_troubled_record("several flights", 100_000))
     return float(
         read_output(
@@ -222,7 +222,7 @@ def explore_memory() -> float:
 
 
 def study_of_small_runs() -> float:
-    """Processor time of `study` of 1000 csv of 1501 states in one process, for each run [ms]."""
+    """Return the processor time per run of `study` for 1000 csv of 1501 states in one process [ms]."""
     folder = Path(_folder.name) / "small runs"
     if not folder.exists():
         folder.mkdir()
@@ -232,7 +232,7 @@ def study_of_small_runs() -> float:
 
 
 def parts_to_matsum(parts: int) -> float:
-    """`suggest --part` of so many parts and 2000 states over reading that matsum: processes."""
+    """Return the cost of `suggest --part` for this number of parts and 2000 states over that of reading the matsum."""
     file = str(_write_matsum(parts))
     choosing = (
         "-m",
@@ -249,7 +249,7 @@ def parts_to_matsum(parts: int) -> float:
 
 
 def study_to_loop() -> float:
-    """`study` of runs of 1e4 states, one process, over `suggest` of the library on each: per run, start-up in both."""
+    """Return the cost per run of `study` over that of a loop over the library's `suggest`; 1e4 states each."""
     names = _write_runs()
     return _compare_processes(
         ("-m", "d2rpick", *_study_runs(names, "1")), ("-c", LOOP, *names), rounds=1
@@ -257,12 +257,12 @@ def study_to_loop() -> float:
 
 
 def study_speed_up() -> float | None:
-    """Wall time of a `study` in one process over that in two; None on one core."""
+    """Return the elapsed time of a `study` in one process over that in two; None on one core."""
     return _measure_speed_up(lambda jobs: _study_runs(_write_runs(), jobs), rounds=2)
 
 
 def scan_speed_up() -> float | None:
-    """Wall time of `rollover --scan` in one process over that in two; None on one core."""
+    """Return the elapsed time of `rollover --scan` in one process over that in two; None on one core."""
     return _measure_speed_up(
         lambda jobs: (
             "rollover",
@@ -279,7 +279,7 @@ def scan_speed_up() -> float | None:
 
 
 def report_to_matplotlib() -> float:
-    """`suggest --report` of a sample over importing matplotlib and drawing one Figure to svg."""
+    """Return the cost of `suggest --report` for a sample over that of importing matplotlib and drawing one svg."""
     page = str(Path(_folder.name) / "report.html")
     ours = (
         "-m",
@@ -328,12 +328,12 @@ def _study_runs(names: Sequence[str], jobs: str) -> tuple[str, ...]:
 
 
 def _make_noisy_energy(states: int) -> Path:
-    """Energy of five modes of one damping, with white noise."""
+    """Write the energy of five equally damped modes with white noise."""
     return _make_ringing_energy(f"noisy{states}.csv", states, _MODES, _NOISE)
 
 
 def _make_troubled_record(name: str, states: int) -> Path:
-    """A record of a kind that is hard to choose in: many modes, noise, impacts, energies that rise or are negative."""
+    """Write a record that is hard to choose in: many modes, noise, impacts, rising or negative energies."""
     rng = np.random.default_rng(14)
     if name == "random walk":
         steps = rng.standard_normal(states)
@@ -376,7 +376,7 @@ def _make_troubled_record(name: str, states: int) -> Path:
 
 
 def _draw_chaotic_impacts(count: int) -> list[tuple[float, float]]:
-    """Times and heights of impacts in the first half of a record, by the logistic map."""
+    """Return times and heights of impacts in the first half of a record, by the logistic map."""
     heights = [0.3]
     while len(heights) < count:
         heights.append(3.9 * heights[-1] * (1 - heights[-1]))
@@ -394,7 +394,7 @@ def _make_ringing_energy(
     impacts: Sequence[tuple[float, float]] = (),
     line: tuple[float, float] = (0.0, 0.0),
 ) -> Path:
-    """Energy of modes of one damping over a line, with white noise [of its largest] and impacts at (time, height)."""
+    """Write the energy of equally damped modes above a line, with white noise (share of the maximum) and impacts."""
     time = np.linspace(0.0, 1.0, states)
     swings = (
         share * np.sin(2 * np.pi * cycles * time + phase) ** 2
@@ -415,13 +415,13 @@ def _make_ringing_energy(
 
 
 def _clean(states: int) -> Path:
-    """Energy of the oscillator of the paper."""
+    """Write the energy of the paper's oscillator."""
     time = np.linspace(0.0, 1.0, states)
     return _write_record(f"clean{states}.csv", time, MODE.energy(0.15 * time))
 
 
 def _make_two_parts(states: int) -> Path:
-    """Energies of two parts, each of which vibrates in a mode of its own: in several, noise hides the signs."""
+    """Write the energies of two parts with one mode each; several modes and noise would hide the signs."""
     time = np.linspace(0.0, 1.0, states)
     swing = [
         size * np.sin(2 * np.pi * cycles * time)
@@ -455,7 +455,7 @@ def _write_record(
 
 
 def _write_matsum(parts: int) -> Path:
-    """Parts that vibrate in the modes of a chain, noise beside."""
+    """Write parts that vibrate in the modes of a chain, with noise."""
     file = Path(_folder.name) / f"matsum{parts}"
     if not file.exists():
         rng = np.random.default_rng(14)
@@ -477,7 +477,7 @@ def _write_runs() -> list[str]:
 
 
 def _measure_cost(*command: str) -> float:
-    """Processor time of a command, the less of two [s]."""
+    """Return the processor time of a command, the smaller of two [s]."""
     return min(
         measure_processor_seconds(lambda: read_output("-m", "d2rpick", *command))
         for _ in range(2)
@@ -487,7 +487,7 @@ def _measure_cost(*command: str) -> float:
 def _compare_processes(
     ours: Sequence[str], reference: Sequence[str], rounds: int = _ROUNDS
 ) -> float:
-    """Processor time of the first process over that of the second, in turns."""
+    """Return the processor time of one process over that of another, in turns."""
     return measure_ratio(
         lambda: read_output(*ours),
         lambda: read_output(*reference),
@@ -499,7 +499,7 @@ def _compare_processes(
 def _measure_speed_up(
     command: Callable[[str], Sequence[str]], rounds: int
 ) -> float | None:
-    """Wall time of the quickest of some runs with one process over that with two; None on one core."""
+    """Return the shortest elapsed time with one process over that with two; None on one core."""
     if len(os.sched_getaffinity(0)) < 2:
         return None
     times: dict[str, list[float]] = {"1": [], "2": []}

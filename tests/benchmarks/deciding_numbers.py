@@ -1,9 +1,9 @@
-"""Which constants decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
+"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
 
-Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled, in a process of its own, and the
-questions that run through the code that names it are asked again: the frozen questions of the tests, and random
-records of each class of `promise`.  The table says in how many of them the answer changed.  A constant that changes
-none of them is not needed, or needs a question of its own.
+Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
+that run through code with this constant are asked again: the frozen questions of the tests, and random records of each
+class of `promise`.  The table shows how many answers changed.  A constant that changes no answer is not needed, or
+needs a question of its own.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Place = tuple[str, int]
 
 
 class Constant(NamedTuple):
-    """A numeric constant: where it stands, its value, and the comment above it or beside it."""
+    """Numeric constant: its module, its value, and its comment."""
 
     module: str
     name: str
@@ -51,7 +51,7 @@ class Constant(NamedTuple):
 
 
 class Baseline(NamedTuple):
-    """The unchanged answer to a question, the seconds that it took, and the functions that it ran through."""
+    """Unchanged answer to a question, its duration [s], and the functions it runs through."""
 
     answer: str
     seconds: float
@@ -59,7 +59,7 @@ class Baseline(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Of the questions asked with one constant scaled by a factor, the number, and how many answers changed."""
+    """Number of questions asked with one scaled constant, and how many answers changed."""
 
     asked: int
     changed: int

@@ -1,4 +1,4 @@
-"""Finding the cards in a 50 MB deck against a plain line loop, and the memory it takes; checking many small decks."""
+"""Cost and memory of finding the cards in a 50 MB deck, compared with a loop over lines; checks of many small decks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ROUNDS = 5
 
 @contextmanager
 def write_large_deck() -> Iterator[Path]:
-    """50 MB of mesh with the switching cards behind it."""
+    """Write 50 MB of mesh followed by the D2R cards; yield the path."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "large.k"
         with path.open("w", encoding="ascii") as deck:
@@ -68,7 +68,7 @@ def number_cards(path: Path) -> None:
 
 
 def inventory(path: Path) -> None:
-    """Count the elements of every part, with masses, steps and shared nodes."""
+    """Count the elements of every part, with masses, time steps and shared nodes."""
     from d2rpick.deck import read_inventory
     from d2rpick.deck.geometry import compute_masses_and_steps
 
@@ -84,7 +84,7 @@ def check(path: Path) -> None:
 
 
 def dynars_parser() -> Callable[[Path], None] | None:
-    """Give the parser of dynars, which finds the keywords and the first rows of their cards; None without it."""
+    """Return the parser of dynars, which finds keywords and the first rows of their cards; None if not installed."""
     try:
         parse_deck = import_module("dynars").parse_deck
     except ImportError:
@@ -98,7 +98,7 @@ def dynars_parser() -> Callable[[Path], None] | None:
 
 
 def to_loop(task: str) -> float:
-    """Finding cards, the numbers of their lines, or parts and elements of the deck over a loop over all lines."""
+    """Return the cost of finding cards, line numbers, or parts and elements over that of a loop over all lines."""
     ours = {
         "cards": find_cards,
         "lines of cards": number_cards,
@@ -111,7 +111,7 @@ def to_loop(task: str) -> float:
 
 
 def troubled_to_loop(trouble: str) -> float:
-    """Checking a deck of 20,000 of something over a loop over its lines: CPU of this process."""
+    """Return the processor time of checking a deck with 20,000 faults over that of a loop over its lines."""
     numbers = range(10, 20_010)
     deck = {
         "parts on one card": "*PART\n"
@@ -134,7 +134,7 @@ def troubled_to_loop(trouble: str) -> float:
 
 
 def check_to_dynars() -> float | None:
-    """Checking the deck over parsing it with dynars; None where that is not installed."""
+    """Return the cost of checking the deck over that of parsing it with dynars; None if it is not installed."""
     parse = dynars_parser()
     if parse is None:
         return None
@@ -145,7 +145,7 @@ def check_to_dynars() -> float | None:
 
 
 def many_to_parse() -> float:
-    """Checking 1000 small decks, as a user asks for it, over finding their cards: CPU of this process."""
+    """Return the processor time of checking 1000 small decks by command over that of finding their cards."""
     with TemporaryDirectory() as folder:
         names = [str(Path(folder) / f"{number}.k") for number in range(1000)]
         for name in names:
@@ -160,7 +160,7 @@ def many_to_parse() -> float:
 
 
 def memory() -> float:
-    """Most memory that finding the cards takes [MB]."""
+    """Return the peak memory of finding the cards [MB]."""
     with write_large_deck() as path:
         tracemalloc.start()
         find_cards(path)

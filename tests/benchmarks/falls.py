@@ -1,9 +1,9 @@
-"""Flights found of bodies that fall while their vibration is damped, in all formats, with and without kinetic energy.
+"""Flights found for falling bodies with damped vibration, in all formats, with and without kinetic energy.
 
-``python -m tests.benchmarks.falls [RUNS [SEED]]``: chains are pushed while they are carried, fall freely under gravity
-while dampers and yielding springs take their vibration, and land.  Half of the chains yield in the flight, too.  Each
-is read as a table, a glstat, a binout and a T01, with and without kinetic energy.  A flight is right that begins within
-two states of the true one.
+``python -m tests.benchmarks.falls [RUNS [SEED]]``: supported chains are pushed, then fall freely under gravity while
+dampers and yielding springs dissipate their vibration, and land.  Half of the chains also yield in flight.  Each run is
+written as a table, a glstat, a binout and a T01, with and without kinetic energy.  A flight is correct if it begins
+within two states of the true one.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 STEPS, GRAVITY = 24, 9.81
-# A flight is right that begins no more than so many states from the true one.
+# A flight is correct if it begins within this number of states of the true one.
 WITHIN: Final = 2
 
 
 class Fall(NamedTuple):
-    """A run that is carried up to ``start`` and lands at ``end`` [time]."""
+    """Run that is supported until ``start`` and lands at ``end`` [time]."""
 
     run: Written
     start: float
@@ -43,7 +43,7 @@ class Fall(NamedTuple):
 def integrate_falls(
     random: np.random.Generator, count: int, states: int
 ) -> Iterator[Fall]:
-    """Integrate ``count`` falls over so many states, in one record length."""
+    """Integrate ``count`` falls of this number of states, all of the same record length."""
     length = 10 ** random.uniform(-0.8, 0.2)
     masses = random.uniform(5, 50, (count, 3))
     periods = 10 ** random.uniform(-1.6, -0.9, (count, 2)) * length
@@ -81,7 +81,7 @@ def integrate_falls(
 
 
 def find_flight_start(path: str, td: float) -> float | None:
-    """Start of the flight around td that a file shows; None without one."""
+    """Return the start of the flight around td found in a file; None if there is no flight."""
     try:
         flight = examine(read([path]).history, td, Settings(replay=False)).flight
     except D2RPickError:
@@ -90,7 +90,7 @@ def find_flight_start(path: str, td: float) -> float | None:
 
 
 def main(count: int = 100, seed: int = 48) -> None:
-    """Print the counts of each format."""
+    """Print the counts for each format."""
     right_counts: Counter[str] = Counter()
     shorter: Counter[str] = Counter()
     total: Counter[str] = Counter()

@@ -52,7 +52,7 @@ TIME: Final = np.linspace(0, 1, STATES + 1)
 def compute_runs(
     random: np.random.Generator, count: int, force: Force, *, falling: bool
 ) -> Iterator[Flown]:
-    """Integrate ``count`` chains in time at once."""
+    """Integrate ``count`` chains at the same time."""
     masses, stiffness = (
         random.uniform(5, 50, (count, 3, 1)),
         random.uniform(5e4, 2e5, (count, 2, 1)),
@@ -98,7 +98,7 @@ def compute_runs(
 
 
 def fading(random: np.random.Generator, count: int) -> Force:
-    """A push that fades exponentially, by a power of time, or as a half-sine."""
+    """Draw a push that fades exponentially, by a power of time, or as a half-sine."""
     kind, lasts = random.integers(0, 3, count), random.uniform(0.02, 0.3, count)
     power, vectors = random.uniform(1.5, 6, count), pushes(random, count)
 
@@ -114,7 +114,7 @@ def fading(random: np.random.Generator, count: int) -> Force:
 
 
 def repeated(random: np.random.Generator, count: int) -> Force:
-    """Two to five half-sine pushes."""
+    """Draw two to five half-sine pushes."""
     starts, lengths = (
         random.uniform(0, 0.9, (5, count)),
         random.uniform(0.01, 0.08, (5, count)),
@@ -135,7 +135,7 @@ def repeated(random: np.random.Generator, count: int) -> Force:
 
 
 def wall(random: np.random.Generator, count: int) -> Force:
-    """A fixed elastic wall: it throws back what hits it, and what it stores for a moment is written nowhere."""
+    """Draw a fixed elastic wall; its stored energy is not written."""
     wall_position, stiffness = (
         random.uniform(0.02, 1.0, count),
         10 ** random.uniform(4, 6.5, count),
@@ -151,13 +151,13 @@ def wall(random: np.random.Generator, count: int) -> Force:
 
 
 def friction(random: np.random.Generator, count: int) -> Force:
-    """Friction of the ground, which carries the chain, until it stands."""
+    """Draw friction of the ground that carries the chain, until it stands still."""
     pull = random.uniform(10, 3000, (count, 1))
     return lambda _, __, velocity: np.asarray(-pull * np.tanh(velocity / 0.01))
 
 
 def pushes(random: np.random.Generator, count: int) -> Samples:
-    """Random forces, (n, 2)."""
+    """Draw random forces, (n, 2)."""
     return np.asarray(
         random.normal(size=(count, 2)) * 10 ** random.uniform(3, 5, (count, 1))
     )
@@ -204,7 +204,7 @@ def make_history(run: Flown, form: str) -> History:
 
 
 def count_flights(run: Flown, form: str) -> Counter[str]:
-    """Count flights claimed that are not graded poor, those that are wrong, true flights, and those that are missed."""
+    """Count claimed flights not graded poor, wrong ones among them, true flights, and missed ones."""
     claimed_flights = flights_of(make_history(run, form), Settings(replay=False))
     claims = [
         (f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in claimed_flights
@@ -254,14 +254,14 @@ def count_flights(run: Flown, form: str) -> Counter[str]:
 def _measure_steady_time(
     impulse: Samples, flight: tuple[float, float], limit: float
 ) -> float:
-    """How long the end of a flight lasts in which the force changes the momentum by at most ``most``."""
+    """Return how long the force changes the momentum by at most ``limit`` at the end of a flight."""
     first, last = (round(impulse_in_flight * STATES) for impulse_in_flight in flight)
     momentum_change = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
     return float(np.count_nonzero(momentum_change <= limit)) / STATES
 
 
 def main(count: int = 300, seed: int = 27) -> None:
-    """Print the counts of each load and form."""
+    """Print the counts for each load and form."""
     names = ("claimed", "wrong", "flights", "missed")
     print(f"{'load':10s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
     for number, (name, load) in enumerate(CLASSES.items()):

@@ -1,7 +1,7 @@
-"""Identification against one least_squares fit of scipy that is started at the right answer, and how well it tells.
+"""Cost of an identification over one scipy least_squares fit started at the truth, and the accuracy of residuals.
 
-The records of the second are random: 3 to 12 periods of a mode, 15 to 200 states each, noise to 3 %, and beside it
-no other, one that holds 0.3 to 3 % of the energy, or one with 3 to 30 %.
+The accuracy is measured on random records: 3 to 12 periods of a mode, 15 to 200 states per period, noise up to 3 %, and
+no other mode, one with 0.3 to 3 % of the energy, or one with 3 to 30 %.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _NEAR = 1 / 8
 
 
 def to_scipy() -> float:
-    """Time of one identification over time of one such fit: medians of interleaved runs, 6 digits."""
+    """Return the time of one identification over that of one such fit: medians of interleaved runs, 6 digits."""
     energy = round_as_printed(ENERGY)
 
     def residuals(parameters: Samples) -> Samples:
@@ -61,14 +61,14 @@ def to_scipy() -> float:
 
 
 def residual_error(kind: str, count: int) -> float:
-    """How far the stated residual is off at most in 95 % of so many random records [-]."""
+    """Return the error of the stated residual that 95 % of this number of random records do not exceed [-]."""
     return summarize_records(small_second_modes(kind, range(count)))[0]
 
 
 class Stated(NamedTuple):
-    """Residual of a recommended pair as it is stated, the highest it may be, and the true one [-].
+    """Stated residual of a recommended pair, its upper limit, and the true residual [-].
 
-    ``held``: whether tr_low..tr_high holds the true crossing; None where the record itself hardly shows one.
+    ``held`` is True if tr_low..tr_high contains the true crossing; None if the record hardly shows a crossing.
     """
 
     stated: float
@@ -78,7 +78,7 @@ class Stated(NamedTuple):
 
 
 def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
-    """What is stated of random records, seeded, of one of the kinds; those without a recommended pair left out."""
+    """Return the results for seeded random records of one kind that have a recommended pair."""
     return [
         stated_records
         for seed in seeds
@@ -91,7 +91,7 @@ def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
 
 
 def summarize_records(records: list[Stated]) -> tuple[float, float, float]:
-    """95th percentile of how far residuals are off, and off their range; share of the intervals that hold tr."""
+    """Return 95th percentiles of the errors of residuals and of their ranges, and the share of right intervals."""
     deviations = [abs(record.stated - record.true) for record in records]
     beyond = [
         max(record.stated - record.true, record.true - record.highest, 0.0)
@@ -139,7 +139,7 @@ def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | No
 def _draw_modes(
     rng: np.random.Generator, share: float
 ) -> tuple[list[Mode], Samples, float]:
-    """Modes of one damping, the first with period 1, the other with that share of the energy; times, and noise."""
+    """Draw two equally damped modes, the first with period 1, the second with ``share`` of its energy; and noise."""
     alpha, periods = rng.uniform(0, 0.5), rng.uniform(3, 12)
     rates = (
         2

@@ -1,8 +1,8 @@
-"""Pairs called good or fair under loads that last, against the momentum that these loads truly change.
+"""Pairs graded good or fair under loads that last, compared with the momentum that the loads really change.
 
 ``python -m tests.benchmarks.loads [RECORDS [SEED]]``: chains of three masses and two springs move in a plane and
-vibrate, while a load of one kind acts.  Each run is written as four files: totals in a table, momenta of the model
-in a table, a glstat and a matsum, with the digits of these formats.
+vibrate under a load of one kind.  Each run is written as four files with the digits of their formats: totals in a
+table, momenta of the model in a table, a glstat and a matsum.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ OTHER_GRAVITIES: Final = (1.62, 3.71, 8.87, 24.8, 49.05)
 
 
 class Load(NamedTuple):
-    """Forces on ``count`` chains: ``force`` of time, masses (n, 3), places and velocities (n, 3, 2) is (n, 3, 2).
+    """Forces on ``count`` chains: ``force`` (n, 3, 2) of time, masses (n, 3), positions and velocities (n, 3, 2).
 
-    ``falling``: half of the chains fall on earth.
+    If ``falling``, half of the chains fall on earth.
     """
 
     force: Motion
@@ -62,7 +62,7 @@ class Load(NamedTuple):
 
 
 def friction(random: np.random.Generator, count: int) -> Load:
-    """Friction of the ground, as constant a deceleration as a dry one is, of all masses or of the first."""
+    """Draw dry friction of the ground, a constant deceleration of all masses or of the first."""
     size = 10 ** random.uniform(-1, 1.3, (count, 1, 1))
     only_first = random.random((count, 1)) < 1 / 3
 
@@ -78,7 +78,7 @@ def friction(random: np.random.Generator, count: int) -> Load:
 
 
 def drag(random: np.random.Generator, count: int) -> Load:
-    """Drag by the square of the speed, on the first mass or on two of them."""
+    """Draw drag by the square of the speed, on one or two masses."""
     size, on_first = (
         10 ** random.uniform(-2.5, 0, (count, 1, 1)),
         random.uniform(0.5, 2.0, (count, 1, 1)).clip(max=1),
@@ -94,7 +94,7 @@ def drag(random: np.random.Generator, count: int) -> Load:
 
 
 def late_contact(random: np.random.Generator, count: int) -> Load:
-    """A light contact late in the record, at the first mass."""
+    """Draw a light contact of the first mass late in the record."""
     start, length = (
         random.uniform(0.4, 0.85, count),
         10 ** random.uniform(-2, -0.7, count),
@@ -111,7 +111,7 @@ def late_contact(random: np.random.Generator, count: int) -> Load:
 
 
 def airbag(random: np.random.Generator, count: int) -> Load:
-    """A pressure that rises at once and leaks away."""
+    """Draw a pressure that rises at once and leaks away."""
     start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
     size, along = 10 ** random.uniform(-0.5, 1.5, count), draw_directions(random, count)
 
@@ -126,7 +126,7 @@ def airbag(random: np.random.Generator, count: int) -> Load:
 
 
 def rope(random: np.random.Generator, count: int) -> Load:
-    """A rope to the ground that is slack up to its length."""
+    """Draw a rope to the ground that is slack up to its length."""
     length, pull = (
         random.uniform(0.3, 3, (count, 1)),
         10 ** random.uniform(1, 4, (count, 1)),
@@ -143,7 +143,7 @@ def rope(random: np.random.Generator, count: int) -> Load:
 
 
 def couple(random: np.random.Generator, count: int) -> Load:
-    """Two opposite forces on two masses: they change no momentum."""
+    """Draw two opposite forces on two masses, which change no momentum."""
     start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
     size, along = 10 ** random.uniform(-1, 1, count), draw_directions(random, count)
 
@@ -157,7 +157,7 @@ def couple(random: np.random.Generator, count: int) -> Load:
 
 
 def other_gravity(random: np.random.Generator, count: int) -> Load:
-    """Gravity of another planet, which without a deck no file tells from a load."""
+    """Draw the gravity of another planet, which no file distinguishes from a load without a deck."""
     size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
 
     def force(_: float, masses: Samples, positions: Samples, __: Samples) -> Samples:
@@ -178,9 +178,9 @@ CLASSES: Final = {
 
 
 def compute_runs(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
-    """Integrate ``count`` chains that are pushed, and then fly but for their load.
+    """Integrate ``count`` chains that are pushed and then fly, except for their load.
 
-    Every other one has a single spring and moves along x: one oscillator describes its energy.
+    Every other chain has a single spring and moves along x: one oscillator describes its energy.
     """
     masses = random.uniform(5, 50, (count, 3))
     stiffness = (
@@ -215,13 +215,13 @@ def compute_runs(random: np.random.Generator, count: int, load: Load) -> Iterato
 
 
 def measure_change(impulse: Samples, time: Samples, start: float, end: float) -> float:
-    """Largest change of an impulse (n, 2) from ``start`` to ``end``."""
+    """Return the largest change of an impulse (n, 2) from ``start`` to ``end``."""
     inside = impulse[(time >= start) & (time <= end)]
     return float(np.linalg.norm(inside - inside[:1], axis=1).max(initial=0.0))
 
 
 def count_pairs(reference: Reference, run: Run) -> Counter[str]:
-    """Count the pairs that are not called poor, those that are wrong, true flights, and those that no source shows."""
+    """Count pairs not graded poor, wrong ones among them, true flights, and flights that no source shows."""
     counts: Counter[str] = Counter()
     time, impulse = run.written.time, run.impulse
     largest = float(np.linalg.norm(run.written.momentum.sum(axis=1), axis=1).max())
@@ -255,7 +255,7 @@ def count_pairs(reference: Reference, run: Run) -> Counter[str]:
 def _find_true_flights(
     impulse: Samples, time: Samples, room: float
 ) -> Iterator[tuple[float, float]]:
-    """Give the longest stretches in which an impulse changes by at most ``room``, one after the other."""
+    """Yield the longest stretches in which an impulse changes by at most ``room``, one after the other."""
     first = 0
     while first < time.size - 1:
         last = first
@@ -275,7 +275,7 @@ def _find_true_flights(
 
 
 def main(count: int = 60, seed: int = 48) -> None:
-    """Print the counts of each load and form."""
+    """Print the counts for each load and form."""
     names = ("pairs", "wrong", "flights", "missed")
     print(f"{'load':15s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
     with TemporaryDirectory() as folder:

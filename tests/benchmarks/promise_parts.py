@@ -1,10 +1,10 @@
-"""What a good grade is worth on parts: random records, seeded, held against the exact motion of their modes.
+"""What a good grade of parts is worth: random records, seeded, compared with the exact motion of their modes.
 
-    python -m tests.benchmarks.promise_parts [N [SEED]]
+python -m tests.benchmarks.promise_parts [N [SEED]]
 
-The motion is written down here in the coordinates of its modes, by no code of d2rpick.  Springs with one mode each; two
-parts of a larger structure, or a free chain of masses whose springs, or groups of springs, are the parts, so that the
-modes mix in each; and a part that bends in two planes beside another one.  Damping is proportional to mass.
+The motion is computed here from its modes, independently of d2rpick.  The classes are: springs with one mode each; two
+parts of a larger structure, or a free chain of masses whose springs or groups of springs are the parts, so that modes
+mix in each part; and a part that bends in two planes next to another part.  Damping is proportional to mass.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 
 class Motion(NamedTuple):
-    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``, whose parts have the energies ``x' form x``.
+    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``; a part has the energy ``x' form x``.
 
-    ``rate`` and ``phase`` are of shape (m,), ``forms``, the stiffness of each of k parts in the modes, (k, m, m).
+    ``rate`` and ``phase`` have shape (m,); ``forms`` (k, m, m) are the stiffnesses of k parts in the modes.
     """
 
     alpha: float
@@ -38,7 +38,7 @@ class Motion(NamedTuple):
     forms: Samples
 
     def state(self, time: Samples | float) -> tuple[Samples, Samples]:
-        """Give coordinates and velocities over the undamped rates, both of the shape of ``time`` and an axis for m."""
+        """Return coordinates, and velocities over the undamped rates, in the shape of ``time`` with an axis for m."""
         angle, half = np.multiply.outer(time, self.rate) + self.phase, self.alpha / 2
         decay = np.exp(-half * np.asarray(time))[..., np.newaxis]
         own_rate = np.hypot(self.rate, half)
@@ -47,16 +47,17 @@ class Motion(NamedTuple):
         ) / own_rate
 
     def energies(self, time: Samples) -> Samples:
-        """Energies of the parts, shape (n, k)."""
+        """Return the energies of the parts, shape (n, k)."""
         state_at_times = self.state(time)[0]
         return np.asarray(
             np.einsum("ni,kij,nj->nk", state_at_times, self.forms, state_at_times)
         )
 
     def residual(self, tr: float, td: float) -> float:
-        """Energy norm of what the switched run lacks at td over that of the reference, summed over the modes.
+        """Return the energy norm of the missing motion at td over that of the reference, summed over the modes.
 
-        Of the parts of a larger structure that is the mean over time after td: there it is no sum at any time.
+        For parts of a larger structure it is the mean over time after td, because their energy is no sum at any one
+        time.
         """
         (state_at_tr, _), (state_at_td, velocity) = self.state(tr), self.state(td)
         stiffness = np.einsum("kii->i", self.forms)
@@ -68,7 +69,7 @@ class Motion(NamedTuple):
 
 
 class Record(NamedTuple):
-    """A history, the settings and window of td it is asked with, a single td as a window of no width, and the truth."""
+    """History, settings, td range (of width 0 for one td), and the true motion."""
 
     history: History
     settings: Settings
@@ -77,7 +78,7 @@ class Record(NamedTuple):
 
 
 def draw_one_mode_each(rng: np.random.Generator) -> Motion:
-    """Two or three parts with a mode each."""
+    """Draw two or three parts with one mode each."""
     count = int(rng.integers(2, 4))
     return _draw_planes(
         rng, [(i, energy) for i, energy in enumerate(rng.uniform(0.1, 1, count))]
@@ -85,7 +86,7 @@ def draw_one_mode_each(rng: np.random.Generator) -> Motion:
 
 
 def draw_mixed_modes(rng: np.random.Generator) -> Motion:
-    """Two parts of a larger structure; or a free chain of three to six masses, whose springs are the parts.
+    """Draw two parts of a larger structure, or a free chain of three to six masses whose springs are the parts.
 
     In a third of the chains several springs are one part.
     """
@@ -119,7 +120,7 @@ def draw_mixed_modes(rng: np.random.Generator) -> Motion:
 
 
 def draw_two_planes(rng: np.random.Generator) -> Motion:
-    """A part whose second plane holds 0.3 to 50 % of its energy, beside one with a mode, or with two planes too."""
+    """Draw a part whose second plane holds 0.3 to 50 % of its energy, next to a part with one mode or two planes."""
     modes = [
         (0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))),
         (0, share),
@@ -134,7 +135,7 @@ def draw_two_planes(rng: np.random.Generator) -> Motion:
 
 
 def _draw_planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
-    """Modes that belong to a part, by its number, and have an energy."""
+    """Draw modes with an energy and the number of the part they belong to."""
     part, energy = (np.array(column) for column in zip(*modes, strict=True))
     rate = 2 * np.pi * rng.uniform(1, 3.5, len(modes))
     forms = np.array(
@@ -156,7 +157,7 @@ CLASSES: Final = {
 
 
 def draw_records(kind: str, seed: int, number: int) -> Iterator[Record]:
-    """Give so many random records of a class: 4 to 14 slow periods, 20 to 150 states a fast one, some with noise."""
+    """Yield random records of a class: 4 to 14 slow periods, 20 to 150 states per fast period, some with noise."""
     for record_number in range(number):
         rng = np.random.default_rng([seed, list(CLASSES).index(kind), record_number])
         motion = CLASSES[kind](rng)
@@ -183,7 +184,7 @@ def draw_records(kind: str, seed: int, number: int) -> Iterator[Record]:
 
 
 def make_history_of_parts(time: Samples, energies: Samples) -> History:
-    """Give parts the energies, shape (n, k), as a file of them is read."""
+    """Return the history of parts with these energies, shape (n, k), as a reader gives it."""
     names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
     return History(
         time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
@@ -192,7 +193,7 @@ def make_history_of_parts(time: Samples, energies: Samples) -> History:
 
 
 def recommend_pair(record: Record) -> Pair | None:
-    """Ask for a pair; None where none is recommended."""
+    """Ask for a pair; return None if none is recommended."""
     first, last = record.window
     ask = (
         partial(suggest, td=first)
@@ -217,7 +218,7 @@ def recommend_pair(record: Record) -> Pair | None:
 
 
 def try_class(kind: str, count: int, seed: int) -> list[Trial]:
-    """Try so many records of a class, without an oracle."""
+    """Try this number of records of a class, without an oracle."""
     return [Trial(recommend_pair(record)) for record in draw_records(kind, seed, count)]
 
 

@@ -79,12 +79,12 @@ class Structure(NamedTuple):
 
     @property
     def is_linear(self) -> bool:
-        """Whether the sum of two free motions is another."""
+        """True if the sum of two free motions is a free motion."""
         return self.joint is None and not self.stiffening.any()
 
     @property
     def _settings(self) -> dict[str, Any]:
-        """How exactly scipy integrates one run."""
+        """Accuracy with which scipy integrates one run."""
         return _EXACT if self.joint is None else _EXACT_WITH_KINKS
 
     def move(

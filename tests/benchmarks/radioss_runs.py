@@ -1,8 +1,9 @@
-"""Random Radioss runs against the listings of OpenRadioss: when which part is rigid.
+"""Compare `check` with the listings of OpenRadioss for random Radioss runs: which part is rigid when.
 
 ``OPENRADIOSS_PATH=... python -m tests.benchmarks.radioss_runs 20 1`` writes 20 runs with seeds from 1 on, lets the
-solver compute them, and compares the windows of `check`.  Bodies have groups of parts or of nodes, are merged, switched
-by legs and by sensors that are reset; decks have included files, and files whose last line has no end.
+solver compute them, and compares the windows of `check` with the listings.  Bodies have groups of parts or of nodes,
+are merged, and are switched by engine files and by sensors that are reset.  Decks have included files, and files
+without a final line end.
 """
 
 import random
@@ -32,7 +33,7 @@ PARTS = (1, 2, 3)
 
 
 def write_group(chance: random.Random, part: int) -> tuple[int, str]:
-    """Give a group with all nodes of a part, and its number: that of parts, of nodes, or of groups."""
+    """Return the card and number of a group with all nodes of a part: a group of parts, of nodes, or of groups."""
     number = 10 * part
     nodes = [number + corner for corner in range(1, 5)]
     kind = chance.choice(["PART", "NODE", "NODENS", "GRNOD", "GENE"])
@@ -130,7 +131,7 @@ def draw_run(seed: int) -> Listed:
 
 
 def spread_over_files(folder: Path, chance: random.Random, starter: str) -> None:
-    """Move what a run adds to the plates into an included file, or one that this includes; cut ends of files."""
+    """Move the bodies of a run into an included file, or into a file that this one includes; drop final line ends."""
     main = folder / "X_0000.rad"
     text = main.read_text()
     if starter and chance.random() < 0.5:
@@ -181,7 +182,7 @@ def compare(folder: Path, seed: int) -> str:
 
 
 def main(count: int, seed: int) -> None:
-    """Compute some runs, and say in how many `check` agrees with the listing."""
+    """Compute some runs, and print in how many `check` agrees with the listing."""
     wrong_count = 0
     for number in range(seed, seed + count):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,7 @@
-"""How fast and in how much memory big databases are read, against plain loops and against lasso-python.
+"""Time and memory of reading large databases, compared with plain loops and with lasso-python.
 
-The files are made in a temporary folder, read once by both to compare the results, and lie in the page cache.
-lasso-python is looked for in this interpreter, or in the one that D2RPICK_LASSO_PYTHON names.
+The files are made in a temporary folder, read once by both to compare the results, and are in the page cache.
+lasso-python must be installed for this interpreter, or for the one named by D2RPICK_LASSO_PYTHON.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ Numbers = tuple[list[float], list[float]]
 
 
 def glstat_to_loop() -> float:
-    """A loop over the lines of glstat, 1e5 states, over reading time and internal energy."""
+    """Return the cost of a loop over the lines of glstat (1e5 states) over that of reading time and internal energy."""
     file = _write_glstat()
     _check_agreement(_read(file), _read_glstat_by_loop(file))
     return measure_ratio(
@@ -62,14 +62,14 @@ def glstat_to_loop() -> float:
 
 
 def glstat_to_bare_read() -> float:
-    """Reading time and internal energy of the same glstat over reading its bytes."""
+    """Return the cost of reading time and internal energy of the same glstat over that of reading its bytes."""
     file = _write_glstat()
     return measure_ratio(lambda: _read(file), lambda: _read_bytes(file), _ROUNDS)
 
 
 @cache
 def _find_first_version() -> Path | None:
-    """Folder of version 0.6.0, compiled, as the git history has it; None without that."""
+    """Return the folder of version 0.6.0 from the git history, compiled; None without the history."""
     packed = subprocess.run(
         ["git", "archive", _FIRST, "d2rpick"],
         cwd=ROOT,
@@ -86,7 +86,7 @@ def _find_first_version() -> Path | None:
 
 
 def suggest_to_first() -> float | None:
-    """CPU of `suggest` of a glstat of 1e5 states of one free oscillator over that of version 0.6.0: processes."""
+    """Return the processor time of `suggest` for 1e5 states of one oscillator over that of version 0.6.0."""
     then, time = _find_first_version(), np.linspace(0, 9, _STATES)
     if then is None:
         return None
@@ -108,7 +108,7 @@ def suggest_to_first() -> float | None:
 
 
 def glstat_to_first() -> float | None:
-    """CPU of reading a glstat of 1e5 states over that of version 0.6.0; None without the git history."""
+    """Return the processor time of reading 1e5 states of glstat over that of version 0.6.0; None without history."""
     then = _find_first_version()
     if then is None:
         return None
@@ -134,7 +134,7 @@ def _call_measure(measure: Callable[[], object]) -> float:
 
 
 def matsum_to_loop(part: int | None) -> float:
-    """A loop over the lines of matsum, 500 parts and 2000 states, over reading all parts or one."""
+    """Return the cost of a loop over a matsum (500 parts, 2000 states) over that of reading all parts or one."""
     file = _write_matsum()
     start = b" mat.#=" if part is None else b" mat.#=%5d " % part
 
@@ -148,7 +148,7 @@ def matsum_to_loop(part: int | None) -> float:
 
 
 def lasso_to_binout() -> float | None:
-    """lasso-python over reading time and internal energy of a binout of 1e5 states; None where it is not installed."""
+    """Return the cost of lasso-python over that of d2rpick for 1e5 states of a binout; None if it is not installed."""
     file = _write_binout()
     code = (
         "import sys, time; from lasso.dyna import Binout; times = []\n"
@@ -172,7 +172,7 @@ def lasso_to_binout() -> float | None:
 
 
 def binout_to_dynars() -> float | None:
-    """Reading time and internal energy of a binout of 1e5 states over dynars; None where that is not installed."""
+    """Return the cost of reading 1e5 states of a binout over that of dynars; None if it is not installed."""
     try:
         opened = import_module("dynars").Binout
     except ImportError:
@@ -190,7 +190,7 @@ def binout_to_dynars() -> float | None:
 
 
 def memory_over_limit(kind: str) -> float:
-    """Anonymous memory of a process at its peak while it reads, over twice the answer plus 64 MB."""
+    """Return the peak anonymous memory of a reading process over its limit: twice the answer plus 64 MB."""
     return _measure_memory(
         {"glstat": _write_glstat, "matsum": _write_matsum, "binout": _write_binout}[
             kind
@@ -200,7 +200,7 @@ def memory_over_limit(kind: str) -> float:
 
 
 def _measure_memory(file: Path, times: int) -> float:
-    """Peak of the memory that reading takes over so many times the energies plus some room."""
+    """Return the peak memory of reading over its limit: ``times`` the energies plus some room."""
     code = (
         "import sys; from pathlib import Path; from d2rpick.histories.opening import Selection, open_run\n"
         "def anonymous():\n"
@@ -231,7 +231,7 @@ def _measure_memory(file: Path, times: int) -> float:
 
 
 def d3plot_to_bare_read(files: int, states: int) -> float:
-    """Reading a d3plot of so many files and states of 5 MB over seeking and reading what its states begin with."""
+    """Return the cost of reading a d3plot with states of 5 MB over that of seeking and reading the state headers."""
     first, size, head = _write_d3plot(files, states)
 
     def bare() -> list[bytes]:
@@ -249,14 +249,14 @@ def d3plot_to_bare_read(files: int, states: int) -> float:
 
 
 def csv_to_loadtxt() -> float:
-    """Reading a csv of 1e6 rows and two columns over numpy.loadtxt, of the same file."""
+    """Return the cost of reading a csv of 1e6 rows and two columns over that of numpy.loadtxt."""
     file = _write_csv(_ROWS, 2)
     np.testing.assert_array_equal(_read(file).energy, _read_by_loadtxt(file)[:, 1])
     return measure_ratio(lambda: _read(file), lambda: _read_by_loadtxt(file), _ROUNDS)
 
 
 def csv_to_pandas(columns: int) -> float:
-    """Reading time and energy of a csv of 1e6 rows and some columns over pandas.read_csv of all of it: CPU."""
+    """Return the processor time of reading two columns of a csv of 1e6 rows over that of pandas for all columns."""
     import pandas as pd
 
     file = _write_csv(_ROWS, columns)
@@ -269,7 +269,7 @@ def csv_to_pandas(columns: int) -> float:
 
 
 def suggest_memory() -> float:
-    """Peak memory of `suggest` of that csv, pandas with it [MB]."""
+    """Return the peak memory of `suggest` for that csv, with pandas [MB]."""
     code = (
         "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
@@ -288,7 +288,7 @@ def suggest_memory() -> float:
 
 
 def hdf5_to_h5py() -> float:
-    """Reading an hdf5 of 1e6 rows over h5py alone: processes."""
+    """Return the cost of reading an hdf5 of 1e6 rows over that of h5py alone, both as processes."""
     file = _write_hdf5()
     ours = "import sys; from d2rpick.choice.question import read; read(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
@@ -300,7 +300,7 @@ def hdf5_to_h5py() -> float:
 
 
 def hdf5_to_h5py_here() -> float:
-    """The same in this process, with the child process that looks whether the library crashes on the file."""
+    """Return the same in this process, with the child process that tests if the library crashes on the file."""
     import h5py
 
     file = _write_hdf5()
@@ -314,7 +314,7 @@ def hdf5_to_h5py_here() -> float:
 
 
 def extract_to_pandas() -> float:
-    """Command extract of 1e6 rows to csv, start-up and reading included, over pandas to_csv of the same frame alone."""
+    """Return the cost of `extract` of 1e6 rows to csv, start-up included, over that of pandas to_csv alone."""
     import pandas as pd
 
     file, out = _write_csv(_ROWS, 2), str(_name_file("out.csv"))
@@ -329,7 +329,7 @@ def extract_to_pandas() -> float:
 
 
 def write_to_pandas() -> float:
-    """Writing 1e6 rows of two columns as csv over pandas to_csv of the same frame."""
+    """Return the cost of writing 1e6 rows of two columns as csv over that of pandas to_csv."""
     import pandas as pd
 
     time, energy = _make_rows(_ROWS, 2).T
@@ -342,7 +342,7 @@ def write_to_pandas() -> float:
 
 
 def csv_memory_over_limit() -> float:
-    """Anonymous memory of a process at its peak while it reads 1e6 rows, over three times the answer plus 64 MB."""
+    """Return the peak anonymous memory of reading 1e6 rows over its limit: three times the answer plus 64 MB."""
     return _measure_memory(_write_csv(_ROWS, 2), times=3)
 
 
@@ -351,7 +351,7 @@ def _read(file: Path) -> History:
 
 
 def _make_rows(rows: int, columns: int) -> Samples:
-    """Made-up noisy columns, shape (rows, columns), the first of them a time."""
+    """Return noisy columns, shape (rows, columns), the first of them a time."""
     values = np.random.default_rng(14).normal(size=(rows, columns))
     values[:, 0] = np.arange(rows) * 1e-6
     return values
@@ -433,7 +433,7 @@ def _write_matsum() -> Path:
 
 @cache
 def _write_d3plot(files: int, states: int) -> tuple[Path, int, int]:
-    """A family of sparse files, what of each state is not nodes and elements written: its name, bytes of both."""
+    """Write a family of sparse files without nodes and elements; return its name, and the sizes of both [bytes]."""
     writer = D3plotWriter(
         ids=range(1, 101),
         titles=(),

@@ -1,7 +1,7 @@
-"""The twenty-one rehearsals as they are, and what switching saves: ``python -m tests.benchmarks.rollover``.
+"""Print the 21 rehearsals and the savings of switching: ``python -m tests.benchmarks.rollover``.
 
-Exit code 1 when a recommended tr rolls wrong, an energy comes back that was not announced, or a run costs more than a
-hundred of ``suggest`` on its history.
+The exit code is 1 if a recommended tr gives a wrong roll, if the energy after td is not the announced one, or if a run
+costs more than 100 calls of ``suggest`` for its history.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ HEAD = (
 
 
 def rehearse_set(number: int) -> Rehearsal:
-    """One set, a tr every 6 ms in the trip."""
+    """Rehearse one set with a tr every 6 ms in the trip."""
     with TemporaryDirectory() as folder:
         return rehearse(SETS[number], Path(folder), stride=2)
 
 
 def format_line(number: int, trial: Rehearsal) -> tuple[str, bool]:
-    """Everything about one set, and whether it is right."""
+    """Return the line about one set, and True if it is right."""
     p, run = trial.parameters, trial.reference
     good = trial.roll_share < 0.1 and abs(trial.energy_off) < 0.25
     text = (
@@ -52,7 +52,7 @@ def format_line(number: int, trial: Rehearsal) -> tuple[str, bool]:
 
 
 def measure_saving(mesh: int) -> str:
-    """Bar updates and wall time of a switched run over those of the run without switching."""
+    """Return a text with bar updates and elapsed time of a switched run over those of the reference run."""
     parameters = Parameters(mesh=mesh)
     pairs = [
         (simulate(parameters, 0.42), simulate(parameters, 0.42, WINDOW))
@@ -64,7 +64,7 @@ def measure_saving(mesh: int) -> str:
 
 
 def main() -> int:
-    """Print all rehearsals, the saving, and the cost of a run; tell whether all is well."""
+    """Print all rehearsals, the saving, and the cost of a run; return 1 if one of them fails."""
     missed = 0
     print(HEAD)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:

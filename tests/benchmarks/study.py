@@ -1,9 +1,9 @@
-"""Cost of a study per run against a plain loop over the library call, and its memory.
+"""Cost of a study per run compared with a plain loop over the library call, and its memory.
 
-``python -m tests.benchmarks.study``: 1000 runs of 1e4 states each; every study is a process of its own.  What is
-compared takes turns, medians are told.
-Exit code 1 when a goal is missed: a study in one process costs no more than a quarter more than the loop, for it finds
-all windows of acceptable tr beside; a further run needs much less memory than its 160 kB of numbers.
+``python -m tests.benchmarks.study``: 1000 runs of 1e4 states each; every study is a separate process.  Compared calls
+take turns, and medians are printed.  The exit code is 1 if a goal is missed: a study in one process may cost 25 % more
+than the loop, because it also finds all windows of acceptable tr; each further run needs much less memory than its 160
+kB of numbers.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ assert all(found)
 
 
 def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> list[str]:
-    """Write records of the paper's oscillator whose rate scatters by a thousandth; names of the files.
+    """Write records of the paper's oscillator with frequencies scattered by 0.1 %; return the file names.
 
-    ``noise`` is the standard deviation of white noise, of the highest energy [-].
+    ``noise`` is the standard deviation of white noise over the highest energy [-].
     """
     rng = np.random.default_rng(7)
     time = np.linspace(0.0, 0.15, states)
@@ -72,7 +72,7 @@ def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> li
 
 
 def cluster_overhead(workers: int) -> float | None:
-    """Milliseconds that a run takes which does nothing, on a Dask cluster of so many workers on this machine."""
+    """Return the time of an empty run on a Dask cluster of this number of workers on this machine [ms]."""
     if not find_spec("distributed"):
         return None
     from distributed import Client
@@ -95,7 +95,7 @@ def cluster_overhead(workers: int) -> float | None:
 
 
 def process(*args: str) -> tuple[float, float, bytes]:
-    """Seconds and peak memory of the largest process [MB] of a command, and what it prints."""
+    """Run a command; return its time [s], the peak memory of its largest process [MB], and its output."""
     # the peak is that of the largest child so far, so each command has a parent of its own
     code = (
         "import json, subprocess, sys, time; from resource import *; start = time.perf_counter();"
@@ -113,7 +113,7 @@ def process(*args: str) -> tuple[float, float, bytes]:
 
 
 def measure_study(names: list[str], *options: str) -> tuple[float, float]:
-    """Seconds and peak memory of a study in which every run has a tr and all share one."""
+    """Return time [s] and peak memory [MB] of a study in which every run has a tr and all share one."""
     args = (
         "-m",
         "d2rpick",
@@ -134,7 +134,7 @@ def measure_study(names: list[str], *options: str) -> tuple[float, float]:
 
 
 def main() -> int:
-    """Measure and tell; 1 when a goal is missed."""
+    """Measure and print the results; return 1 if a goal is missed."""
     everything = str(len(os.sched_getaffinity(0)))
     with TemporaryDirectory() as folder:
         names = write_runs(Path(folder), RUNS, STATES)

@@ -1,4 +1,4 @@
-"""How what is compared is timed: in turns, by medians."""
+"""Timing of compared calls: in turns, by medians."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def measure_seconds(call: Callable[[], object]) -> float:
-    """How long a call takes."""
+    """Return the elapsed time of a call [s]."""
     start = perf_counter()
     call()
     return perf_counter() - start
 
 
 def measure_own_seconds(call: Callable[[], object]) -> float:
-    """Processor time of this process for a call."""
+    """Return the processor time of this process for a call [s]."""
     start = process_time()
     call()
     return process_time() - start
 
 
 def measure_processor_seconds(call: Callable[[], object]) -> float:
-    """Processor time of the processes that a call starts."""
+    """Return the processor time of the child processes of a call [s]."""
     usage_before = getrusage(RUSAGE_CHILDREN)
     call()
     usage_after = getrusage(RUSAGE_CHILDREN)
@@ -52,7 +52,7 @@ def measure_ratio(
     repeats: int = 1,
     cost: Callable[[Callable[[], object]], float] = measure_seconds,
 ) -> float:
-    """``cost`` of ``one`` over that of ``other``, taking turns of so many repeats.
+    """Return ``cost`` of ``first_call`` over that of ``second_call``, in turns of this number of repeats.
 
     With more than one repeat each turn begins with an unmeasured call, so that the measured ones find their memory.
     """
@@ -65,7 +65,7 @@ def measure_ratio(
 
 
 def read_output(*command: str) -> bytes:
-    """What a process of this Python prints, in the folder of the project."""
+    """Return the output of a process of this Python, run in the folder of the project."""
     result = subprocess.run(
         [sys.executable, *command],
         check=True,
@@ -78,7 +78,7 @@ def read_output(*command: str) -> bytes:
 
 @cache
 def make_environment() -> dict[str, str]:
-    """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
+    """Return an environment for child processes that use compiled files, like an installed package."""
     own_variable = "PYTHONDONTWRITEBYTECODE"
     clean = {
         name: value

@@ -95,7 +95,7 @@ def test_the_landings_of_plans_that_the_docs_sum_up_are_those_of_the_results_and
     None
 ):
     rows = read_results("drop_plans")
-    docs = (ROOT / "docs / explanation/validation-motion.md").read_text("utf-8")
+    docs = (ROOT / "docs/explanation/validation-motion.md").read_text("utf-8")
     assert np.all(rows["td_s"] < rows["landing_s"])
     assert np.all(rows["tr_s"] < rows["td_s"])
     number = r"\**([-+]?[\d.]+)\**"

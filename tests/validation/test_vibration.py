@@ -35,7 +35,7 @@ VECTORS = arrays(float, 3, elements=st.floats(-5, 5, allow_nan=False))
 SWITCHED = read_results("vibration")[~np.isnan(read_results("vibration")["tr_s"])]
 TOTALS = SWITCHED[SWITCHED["energy"] == "total"]
 PARTS_OF_LANDING = find_absorbing_parts(SWITCHED)
-DOCS = (ROOT / "docs / explanation/validation-vibration.md").read_text("utf-8")
+DOCS = (ROOT / "docs/explanation/validation-vibration.md").read_text("utf-8")
 
 
 def move_nodes(velocities: np.ndarray) -> Motion:
