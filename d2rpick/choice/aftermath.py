@@ -54,9 +54,11 @@ def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
     known = [ratio for ratio in ratios if np.isfinite(ratio)]
     if not known:
         return None
-    low, high = min(known), max(known)
+    low = min(known)
+    high = max(known)
     if situation.basis != "oscillator":
-        low, high = low - _OF_SOLVER, high + _OF_SOLVER
+        low = low - _OF_SOLVER
+        high = high + _OF_SOLVER
     # parts that were not chosen may hand over what they hold
     beside = situation.together.beside.energy
     return Kept(
@@ -71,11 +73,9 @@ def _ratio(
     """Mean energy after td over that of the reference, from the elastic and the whole vibration energy at td [-]."""
     static = max(energy_td - elastic_td, 0.0)
     reference = static + whole / 2
-    return (
-        (static + max(energy_tr - static, 0.0) / 2) / reference
-        if reference > 0
-        else np.nan
-    )
+    if reference > 0:
+        return (static + max(energy_tr - static, 0.0) / 2) / reference
+    return np.nan
 
 
 def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
@@ -84,11 +84,10 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
         whole = float(compared.deformation.vibration_energy(situation.td))
-        scales = (
-            (1.0,)
-            if situation.basis == "oscillator"
-            else (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
-        )
+        if situation.basis == "oscillator":
+            scales: tuple[float, ...] = (1.0,)
+        else:
+            scales = (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
         return [(scale * elastic, scale * whole) for scale in scales]
     bounds = vibration_energy_bounds(situation)
     if bounds is None:
@@ -131,7 +130,8 @@ def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
 
 def _energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Times and energies of the flight, up to td if its end is not known [time], [energy]."""
-    start, end = situation.flight.start, situation.flight.end
+    start = situation.flight.start
+    end = situation.flight.end
     return situation.history.between(
         np.inf if start is None else start, situation.td if end is None else end
     )
@@ -176,7 +176,8 @@ def energy_of_next_contact(situation: Situation) -> float | None:
     That is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy
     of the fall at the end of the flight.
     """
-    history, end = situation.history, situation.flight.end
+    history = situation.history
+    end = situation.flight.end
     if end is None:
         return None
     _, after = history.between(end, np.inf)

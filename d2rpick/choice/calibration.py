@@ -200,11 +200,10 @@ def observations_of_runs(
                 content = hashlib.file_digest(stream, "sha256").hexdigest()
             if content in found:
                 same = found[content][0].name
-                what = (
-                    "is given twice"
-                    if Path(same).samefile(name)
-                    else f"has the content of {same}"
-                )
+                if Path(same).samefile(name):
+                    what = "is given twice"
+                else:
+                    what = f"has the content of {same}"
                 cautions.append(
                     Caution("same-leg-twice", f"{name} {what}; it counts once")
                 )
@@ -232,9 +231,10 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
     """
     decks = main_decks(folder)
     if len(decks) != 1:
-        count = (
-            f"{len(decks)} main decks were found" if decks else "no main deck was found"
-        )
+        if decks:
+            count = f"{len(decks)} main decks were found"
+        else:
+            count = "no main deck was found"
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
     found = tuple(
         _of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0])
@@ -257,7 +257,8 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
     start = 0.0
     for leg in run.legs:
         listing = Path(deck).parent / f"{leg.name}_{leg.number:04d}.out"
-        middle, start = (start + leg.stop.value) / 2, leg.stop.value
+        middle = (start + leg.stop.value) / 2
+        start = leg.stop.value
         if listing.is_file():
             parts = {one.part for one in rigid if one.tr <= middle < one.td}
             yield _of_timing(
@@ -280,11 +281,10 @@ def _of_ls_dyna(deck: str) -> Iterator[Observation]:
         path = str(Path(deck).parent / name)
         if name == "d3hsp":
             end = _end(read)
-            lasting = (
-                {one.part: (min(one.td, end) - one.tr) / end for one in rigid}
-                if end
-                else {}
-            )
+            if end:
+                lasting = {one.part: (min(one.td, end) - one.tr) / end for one in rigid}
+            else:
+                lasting = {}
             if not rigid or end:
                 yield _of_timing(read_timing(path), inventory, lasting)
         elif name.startswith("glstat") and is_glstat(path):

@@ -121,12 +121,11 @@ class Judged:
         """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
         sizes = [len(one) for one in each]
         ends = [0, *accumulate(sizes)]
-        moments, place = (
-            Moments.joined(each),
-            np.repeat(np.arange(len(sizes), dtype=np.int32), sizes),
-        )
+        moments = Moments.joined(each)
+        place = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
         if len(each) == 1:  # of a noisy record, which memory is to hold once
-            moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
+            moments = each[0]
+            place = np.broadcast_to(np.int32(0), sizes[0])
         tr = moments.tr
         energy, known = measured_of([one.vibration for one in situations], tr, ends)
         still = np.array([one.at_rest for one in situations])[place]
@@ -184,7 +183,8 @@ class Judged:
     @property
     def kept(self) -> NDArray[np.bool_]:
         """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
-        settings, found = self.situations[0].settings, self.acceptable
+        settings = self.situations[0].settings
+        found = self.acceptable
         if settings.max_kinetic_share is not None:
             shares = [
                 np.inf if one.kinetic_share is None else one.kinetic_share
@@ -318,7 +318,9 @@ class Candidates(Sequence[Candidate]):
         return iter(self[:])
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
-        i, situation, found = int(self.order[rank]), self.situation, self.judged
+        i = int(self.order[rank])
+        situation = self.situation
+        found = self.judged
         tr, kind, rising = found.moments[i]
         values: dict[str, Any] = {
             name: _known(column[i].item()) for name, column in found.columns.items()
@@ -327,7 +329,9 @@ class Candidates(Sequence[Candidate]):
             values["sign_match"] is not None
         )  # whether its deformation was compared with that at td
         values["sign_match"] = values["sign_match"] > 0 if known else None
-        history, td, energy = situation.history, situation.td, values["energy"]
+        history = situation.history
+        td = situation.td
+        energy = values["energy"]
         if values["position_error"] is not None and situation.bodies:
             values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
@@ -408,7 +412,8 @@ def _at_start(situation: Situation) -> Moments | None:
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
     """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
-    given, vibration = moments.are("given"), situation.vibration
+    given = moments.are("given")
+    vibration = situation.vibration
     if situation.at_rest or not (given.any() and vibration.profile):
         return moments
     found = _distinct(situation, vibration.moments(situation.settings.tolerance))
@@ -425,17 +430,16 @@ def _distinct(situation: Situation, found: Moments) -> Moments:
     """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
     matches = found.are("match")
     if matches.any():
-        kept, of_level = ~matches, found.tr[~matches]
+        kept = ~matches
+        of_level = found.tr[~matches]
         for place in np.flatnonzero(matches).tolist():
             kept[place] = np.all(
                 np.abs(of_level - found.tr[place]) > situation.history.step
             )
         found = found.at(kept)
-    return (
-        found
-        if np.all(found.tr[1:] >= found.tr[:-1])
-        else found.at(np.argsort(found.tr, kind="stable"))
-    )
+    if np.all(found.tr[1:] >= found.tr[:-1]):
+        return found
+    return found.at(np.argsort(found.tr, kind="stable"))
 
 
 def _remarks(

@@ -87,7 +87,9 @@ def compare(
     RangeError
         If one of the two runs does not go on after td.
     """
-    flight, parts, run = situation.flight, situation.history.parts, reference.run
+    flight = situation.flight
+    parts = situation.history.parts
+    run = reference.run
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
     judged = same_parts(reference, switched, pair)
@@ -154,21 +156,25 @@ def compare_runs(
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    after, reference_after = switched.between(td, end)[1], reference.between(td, end)[1]
+    after = switched.between(td, end)[1]
+    reference_after = reference.between(td, end)[1]
     _refuse_few(reference, switched, min(after.size, reference_after.size), td, end)
-    before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
+    before = switched.energy[switched.time < td]
+    rest = switched.between(td, np.inf)[1]
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
-        after, rest = (
-            after[1:],
-            rest[1:],
-        )  # the switch comes at the first step from td on: this state was still rigid
-    frozen, wanted = float(after[0]), reference.energy_at(td)
+        after = after[1:]
+        rest = rest[
+            1:
+        ]  # the switch comes at the first step from td on: this state was still rigid
+    frozen = float(after[0])
+    wanted = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
     if before.size and _reported_wrong(before[-1], rest):
         found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
         notes.append(f"{found}; some solvers report rigid solid elements wrongly")
     still = _still(reference, switched, tr, td)
-    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td, still)
+    error = _relative(*momenta, td, end)
+    rigid = _rigid_window(switched, tr, td, still)
     mean, mean_reference = float(after.mean()), float(reference_after.mean())
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
@@ -203,7 +209,8 @@ def _refuse_few(
     """RangeError where a run holds too few states after td."""
     if states < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
-        name, last = ", ".join(short.source), float(short.time[-1])
+        name = ", ".join(short.source)
+        last = float(short.time[-1])
         if last <= td:
             raise RangeError(
                 f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
@@ -216,7 +223,8 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
     """Give the change up to which an energy stands still: beside what vibrates it is nothing, or digits [energy]."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
-    vibrates, least = _range(reference, tr, td), round_off(reference)
+    vibrates = _range(reference, tr, td)
+    least = round_off(reference)
     return max(
         digits,
         least
@@ -241,7 +249,8 @@ def _rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
     """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
-    time, energy = switched.time, switched.energy
+    time = switched.time
+    energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
     if not tr <= time[middle] <= td:
         return None
@@ -322,7 +331,8 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     RangeError
         If there is no such time, as where nothing vibrates in the flight.
     """
-    time, energy = switched.time, switched.energy
+    time = switched.time
+    energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST)
     spans = [(max(one.start - 1, 0), one.stop - 1) for one in still]

@@ -95,11 +95,11 @@ def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> flo
     >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
     0.45
     """
-    return (
-        max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total)
-        if total
-        else 0.0
-    )
+    if total:
+        return max(
+            0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total
+        )
+    return 0.0
 
 
 class Amount(NamedTuple):
@@ -146,7 +146,8 @@ class CostModel:
 
     def share_of(self, part: int) -> Share:
         """Share of a part's elements in the cost of all elements [-]."""
-        own, total = self.of_part(part), self.total
+        own = self.of_part(part)
+        total = self.total
         return self._share(own, own.cost / total.cost if total.cost else 0.0)
 
     def saved(self, parts: Collection[int]) -> Share:
@@ -178,7 +179,8 @@ class CostModel:
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
         if part in self._rigid:
             return Amount(0.0)
-        cost, unknown = 0.0, list[str]()
+        cost = 0.0
+        unknown = list[str]()
         for kind, count in counts.items():
             formulation = self.inventory.formulation(part, kind)
             weight = self.weights.per_element.get(formulation.name)
@@ -213,7 +215,8 @@ class CostModel:
 
 
 def _sum(amounts: Iterable[Amount]) -> Amount:
-    cost, unknown = 0.0, list[str]()
+    cost = 0.0
+    unknown = list[str]()
     for one in amounts:
         cost += one.cost
         unknown += one.unknown

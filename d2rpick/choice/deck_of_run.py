@@ -100,22 +100,18 @@ def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
     """Say so where ties that are not followed may join the rigid bodies that parts become, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
-        more = (
-            f" and {len(inventory.ties) - 1} more ties"
-            if len(inventory.ties) > 1
-            else ""
-        )
+        if len(inventory.ties) > 1:
+            more = f" and {len(inventory.ties) - 1} more ties"
+        else:
+            more = ""
         found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
         yield Caution(
             "ties-not-followed",
             f"{found}; parts that are tied belong in one rigid body",
         )
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
-    cure = (
-        cure
-        if inventory.solver == "ls-dyna"
-        else "each of them needs a rigid body of its own"
-    )
+    if not (inventory.solver == "ls-dyna"):
+        cure = "each of them needs a rigid body of its own"
     for body in bodies_of(inventory, parts):
         if not (body.whole or inventory.ties):
             lies = (
@@ -171,7 +167,8 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
 
 def _named(other: Sequence[Part], inventory: Inventory) -> str:
     """Name the first of the parts whose titles differ."""
-    first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
+    first = other[0]
+    more = f", and {len(other) - 1} more" if len(other) > 1 else ""
     return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
 
 
@@ -205,17 +202,14 @@ def with_deck(
     ruined = tuple(
         RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS
     )
-    history, settings = (
-        reference.history,
-        replace(settings, kept_off=inventory.kept_off, ruined=ruined),
-    )
+    history = reference.history
+    settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
-        open_ = (
-            [Caution("cost-unknown", f"the run time stays open: {why}")]
-            if settings.cost_share is None
-            else []
-        )
+        if settings.cost_share is None:
+            open_ = [Caution("cost-unknown", f"the run time stays open: {why}")]
+        else:
+            open_ = []
         return replace(settings, bodies=()), (*told, *open_)
     asked = settings.cost_share is None
     share = model.saved(ids) if asked else Share(settings.cost_share)

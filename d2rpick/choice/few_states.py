@@ -25,7 +25,9 @@ def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
 
     Whoever sees no period may have missed all of them, since a d3plot has some hundred states at most.
     """
-    history, td, start = situation.history, situation.td, situation.flight.start
+    history = situation.history
+    td = situation.td
+    start = situation.flight.start
     if history.energy_format not in FAMILIES or situation.at_rest:
         return
     begin = float(history.time[0]) if start is None else start

@@ -46,11 +46,10 @@ def longest_flight(
         found = (
             held or "nothing in the record shows a flight, in which td could be chosen"
         )
-        cure = (
-            "give `td`"
-            if settings.after is not None
-            else "give the end of the load as `after` where it is known"
-        )
+        if settings.after is not None:
+            cure = "give `td`"
+        else:
+            cure = "give the end of the load as `after` where it is known"
         cure = "only what nothing holds can be switched" if held else cure
         raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
@@ -104,18 +103,17 @@ def flights_of(
     from d2rpick.choice.situation import examine
 
     before = examine(history, landing, settings, fits).flight
-    return (
-        _in_order(history, found, before)
-        if before.end == landing and not before.refusal
-        else found
-    )
+    if before.end == landing and not before.refusal:
+        return _in_order(history, found, before)
+    return found
 
 
 def _with_given_start(
     history: History, settings: Settings, found: tuple[Flight, ...], fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Add the flight that begins where the user says that the load ends, if none of those found holds that time."""
-    after, last = settings.after, float(history.time[-1])
+    after = settings.after
+    last = float(history.time[-1])
     windows = [one.within(history.time) for one in found]
     if after is None or any(start <= after < end for start, end in windows):
         return found
@@ -224,7 +222,8 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
     momenta = next(
         (one for one in asked if all_flights(one, history.balance)), asked[0]
     )
-    flights, members = all_flights(momenta, history.balance), momenta.chosen
+    flights = all_flights(momenta, history.balance)
+    members = momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         members = tuple(

@@ -160,7 +160,8 @@ def _above(value: float | None, limit: float) -> bool:
 
 
 def _gains_or_loses(health: Health) -> bool:
-    low, high = health.energy_ratio_min, health.energy_ratio_max
+    low = health.energy_ratio_min
+    high = health.energy_ratio_max
     return (
         low is not None
         and high is not None
@@ -211,9 +212,9 @@ def _peak(balance: Balance) -> float | None:
 
 def _share(energy: Samples | None, peak: float | None) -> float | None:
     """Highest value over the peak of the internal energy, 0 where it is never positive."""
-    return (
-        None if energy is None or peak is None else max(0.0, float(energy.max())) / peak
-    )
+    if energy is None or peak is None:
+        return None
+    return max(0.0, float(energy.max())) / peak
 
 
 def _without_friction(balance: Balance) -> Samples | None:
@@ -236,7 +237,9 @@ def _worst_part(balance: Balance) -> dict[str, Any]:
 
 def _ratio(balance: Balance) -> dict[str, Any]:
     """Range of the energy ratio, the solver's own or that of its terms, where its reference counts."""
-    ratio, total, reference = balance.ratio, _total(balance), None
+    ratio = balance.ratio
+    total = _total(balance)
+    reference = None
     if ratio is not None and balance.total is not None:
         reference = np.divide(
             balance.total, ratio, out=np.zeros_like(ratio), where=ratio != 0
@@ -278,11 +281,10 @@ def _in_window(
     """What should not happen in free flight, as shares of the energy there."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
-        locked = (
-            float(np.mean(balance.internal[inside]))
-            if balance.time[inside].size
-            else None
-        )
+        if balance.time[inside].size:
+            locked = float(np.mean(balance.internal[inside]))
+        else:
+            locked = None
     if locked is None or locked <= _FLOOR:
         return {}
     found = {}
@@ -362,11 +364,9 @@ def _blew_up(history: History) -> str | None:
         or balance.time.size <= _FEWEST
     ):
         return None
-    time, kinetic, internal = (
-        balance.time,
-        np.abs(balance.kinetic),
-        np.abs(balance.internal),
-    )
+    time = balance.time
+    kinetic = np.abs(balance.kinetic)
+    internal = np.abs(balance.internal)
     earlier = np.searchsorted(
         time, time - _WITHIN * (time[-1] - time[0])
     )  # states before the twentieth up to each

@@ -30,7 +30,8 @@ def bodies_of(
     )  # not above: a table has no parts
 
     known = history.known if fits is None else fits
-    told, placement = settings.bodies, settings.placement
+    told = settings.bodies
+    placement = settings.placement
     return known.once(
         ("drift", flight, told),
         lambda: bodies_in_flight(history, flight, told, placement),

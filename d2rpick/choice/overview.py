@@ -113,7 +113,8 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     ]
     notes += doubts(run.databases)
     notes += run.unused_energies(selection)
-    states, time = None, np.empty(0)
+    states = None
+    time = np.empty(0)
     try:
         if first.span is not None:
             time = first.time if first.channels else first.part_time
@@ -187,11 +188,12 @@ def _missing(run: Run) -> str:
     elif written & {"glstat", "matsum", "binout", "d3plot", "d3thdt"}:
         what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
     else:
-        momentum = (
-            ""
-            if run.momenta(None, None)
-            else ", at least columns x_momentum, y_momentum, z_momentum of the model"
-        )
+        if run.momenta(None, None):
+            momentum = ""
+        else:
+            momentum = (
+                ", at least columns x_momentum, y_momentum, z_momentum of the model"
+            )
         what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
     return f"{what}: only momenta of the parts show for sure when they fly"
 
@@ -204,11 +206,10 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
-    energies = (
-        if_written(lambda: run.part_energies(run.parts))
-        if run.parts
-        else np.empty((0, 0))
-    )
+    if run.parts:
+        energies = if_written(lambda: run.part_energies(run.parts))
+    else:
+        energies = np.empty((0, 0))
     if energies is None:  # some parts come and go, so that their columns have holes
         return (PartOverview(part, _highest(run, part)) for part in run.parts)
     return (

@@ -100,8 +100,6 @@ class Settings:
     def run_time_share(self, rigid_fraction: float) -> float | None:
         """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
         share = self.cost_share
-        return (
-            None
-            if share is None
-            else run_time_share(rigid_fraction, share, self.step_ratio)
-        )
+        if share is None:
+            return None
+        return run_time_share(rigid_fraction, share, self.step_ratio)

@@ -96,7 +96,8 @@ class PartSet(NamedTuple):
     @property
     def out_of_place(self) -> bool:
         """Whether the position error is beyond its limit, or a part flies away from the body it is to be one with."""
-        error, limit = self.position_error, self.position_limit
+        error = self.position_error
+        limit = self.position_limit
         return self.apart or (error is not None and limit is not None and error > limit)
 
 
@@ -165,11 +166,10 @@ def parts_of(
             (other.window[1] for other in sets if other.window), None
         )  # the same for all, to be compared
         sets.append(comparison.of(one, times or td))
-        left = (
-            tuple(part for part in one.parts if part not in sets[-1].moving)
-            if one.name == _ALL
-            else ()
-        )
+        if one.name == _ALL:
+            left = tuple(part for part in one.parts if part not in sets[-1].moving)
+        else:
+            left = ()
         if left and sets[-1].moving:  # they may fly longer without what moves
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
@@ -253,7 +253,9 @@ def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
     masses = {row.id: row.mass for row in movable if row.mass is not None}
     if len(masses) < len(movable):
         return []
-    total, taken, found = sum(masses.values()), 0.0, set[int]()
+    total = sum(masses.values())
+    taken = 0.0
+    found = set[int]()
     for part in sorted(masses, key=lambda part: -masses[part]):
         if taken >= _HEAVY * total:
             break
@@ -383,11 +385,9 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         angle_error=None if np.isnan(angle) else angle,
         position_is_lower_bound=worst.at_least,
     )
-    return (
-        placed._replace(moving=one.moving | {*worst.drift.moving})
-        if placed.out_of_place
-        else placed
-    )
+    if placed.out_of_place:
+        return placed._replace(moving=one.moving | {*worst.drift.moving})
+    return placed
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:

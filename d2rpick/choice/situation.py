@@ -170,17 +170,17 @@ class Situation:
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" and at rest [-]."""
         share = self.vibration.kinetic_share
-        return (
-            None if share is None or self.at_rest else share
-        )  # where nothing vibrates there is no share
+        if share is None or self.at_rest:
+            return None
+        return share  # where nothing vibrates there is no share
 
     @property
     def earliest_tr(self) -> float | None:
         """Start of the flight with the margin, or None when unknown [time]."""
         start = self.flight.start
-        return (
-            None if start is None else sum_as_read(start, self.settings.margin or 0.0)
-        )
+        if start is None:
+            return None
+        return sum_as_read(start, self.settings.margin or 0.0)
 
     @property
     def latest_td(self) -> float:
@@ -211,7 +211,8 @@ class Situation:
         start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
-        window, deformed = (start, self.flight.end), self.vibration.unknown is None
+        window = (start, self.flight.end)
+        deformed = self.vibration.unknown is None
         return nothing_vibrates(self.history, window, self.td, deformed=deformed)
 
     @cached_property
@@ -221,11 +222,9 @@ class Situation:
 
     def position_errors(self, times: Samples) -> Samples:
         """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
-        return (
-            np.broadcast_to(np.nan, times.shape)
-            if self.bodies is None
-            else self.bodies.errors(times, self.td)
-        )
+        if self.bodies is None:
+            return np.broadcast_to(np.nan, times.shape)
+        return self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
@@ -275,11 +274,10 @@ def examine(
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
-        found = (
-            "1 state was"
-            if history.time.size == 1
-            else f"{history.time.size} states were"
-        )
+        if history.time.size == 1:
+            found = "1 state was"
+        else:
+            found = f"{history.time.size} states were"
         raise RangeError(
             f"{', '.join(history.source)}: {found} found, choosing needs at least 3"
         )
@@ -291,11 +289,10 @@ def examine(
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
-    at = (
-        (seen.flight.start + seen.flight.end) / 2
-        if seen.refusal and seen.flight
-        else td
-    )
+    if seen.refusal and seen.flight:
+        at = (seen.flight.start + seen.flight.end) / 2
+    else:
+        at = td
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
     described = _settled(history, fit, span) or _described_by_modes(
@@ -309,16 +306,18 @@ def examine(
     situation = Situation(history, td, settings, flight, evidence, fits)
     if not settings.replay:
         return situation
-    first, last = float(history.time[0]), float(history.time[-1])
+    first = float(history.time[0])
+    last = float(history.time[-1])
     # without a sign of the next contact nothing is known of what comes after td
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
     within = settled = None
     if flight.start is not None:
         within = Span(flight.start, flight.end or last)
-        settled = (
-            within if flight.settled is None else within._replace(start=flight.settled)
-        )
+        if flight.settled is None:
+            settled = within
+        else:
+            settled = within._replace(start=flight.settled)
     if within is not None and flight.source == "energy":
         from d2rpick.vibration.modal_span import (
             inner_window,
@@ -335,11 +334,9 @@ def examine(
         fits,
         situation.together,
     )
-    return (
-        replace(situation, evidence=evidence._replace(models=models))
-        if models
-        else situation
-    )
+    if models:
+        return replace(situation, evidence=evidence._replace(models=models))
+    return situation
 
 
 def looking(
@@ -410,11 +407,10 @@ def _oscillator(
     if not settings.replay:
         return None, None
     whole = bool(seen.flight or seen.refusal)
-    bounds = (
-        Span(*seen.flight[:2])
-        if seen.flight
-        else Span(float(history.time[0]), float(history.time[-1]))
-    )
+    if seen.flight:
+        bounds = Span(*seen.flight[:2])
+    else:
+        bounds = Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.landing is not None:
@@ -454,12 +450,12 @@ def _described_by_modes(
         find_described,
     )  # not above: most records need none
 
-    quiet, last = quiet_time(history, td), float(history.time[-1])
-    guess = (
-        None
-        if quiet is None
-        else Span(quiet.start, last if quiet.end is None else quiet.end)
-    )
+    quiet = quiet_time(history, td)
+    last = float(history.time[-1])
+    if quiet is None:
+        guess = None
+    else:
+        guess = Span(quiet.start, last if quiet.end is None else quiet.end)
     found = find_described(history, td, guess, fits)
     return Described(*found.span, found.vibration.vibration_energy) if found else None
 
@@ -470,7 +466,8 @@ def _with_hidden_share(
     """Add to an accepted fit, once, what a further mode may hold in what the oscillator leaves over."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    window, mode = history.between(fit.start, fit.end), fit.mode
+    window = history.between(fit.start, fit.end)
+    mode = fit.mode
 
     def widened() -> Identification:
         share = hidden_share(*window, mode)

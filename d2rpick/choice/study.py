@@ -190,7 +190,8 @@ def ask(question: Question, source: str) -> StudyRow:
         raise D2RPickError(
             f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same version everywhere"
         )
-    files, end = stamps(source), None
+    files = stamps(source)
+    end = None
     try:
         reference = read([source], question.selection, question.input_format)
         end = float(reference.history.time[-1])
@@ -199,20 +200,21 @@ def ask(question: Question, source: str) -> StudyRow:
         )
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
-        text = (
-            f"{source}: {error.strerror}"
-            if isinstance(error, OSError) and error.strerror
-            else str(error)
-        )
+        if isinstance(error, OSError) and error.strerror:
+            text = f"{source}: {error.strerror}"
+        else:
+            text = str(error)
         return StudyRow(source, status, text, files=files, record_end=end)
-    time, energy = reference.history.time, reference.history.energy
+    time = reference.history.time
+    energy = reference.history.energy
     curve = outline(time, energy, _STRETCHES) if question.curve else None
     return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
 
 
 def row_of(source: str, answer: Suggestion) -> StudyRow:
     """Keep of the answer for one run what a study needs."""
-    best, situation = answer.chosen, answer.situation
+    best = answer.chosen
+    situation = answer.situation
     acceptable = clear_of_td(
         situation,
         acceptable_windows(situation, answer.candidates, best.tr if best else None),
@@ -422,11 +424,10 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
     """Say which tr suits most runs, and which runs it does not suit."""
     stretches, counts = coverage([row.acceptable for row in judged])
     if not counts.size:
-        which = (
-            f"any of {runs_of(len(judged))}"
-            if len(judged) > 1
-            else "the run that was judged"
-        )
+        if len(judged) > 1:
+            which = f"any of {runs_of(len(judged))}"
+        else:
+            which = "the run that was judged"
         return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable, tr)]

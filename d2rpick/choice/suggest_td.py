@@ -46,16 +46,19 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     a model of the vibration decides at some td, or the level is round-off, the start of the flight is the bound.  Zero
     where that start is not known.
     """
-    start, history = situation.earliest_tr, situation.history
+    start = situation.earliest_tr
+    history = situation.history
     if start is None:
         return np.zeros(times.shape)
     start = max(start, float(history.time[0]))
     if situation.evidence.has_model or start >= history.time[-1]:
         return np.maximum(times - start, 0.0)
     time, energy = history.between(np.nextafter(start, np.inf), np.inf)
-    time, energy = np.append(start, time), np.append(history.energy_at(start), energy)
+    time = np.append(start, time)
+    energy = np.append(history.energy_at(start), energy)
     extremes = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
-    level, tolerance = history.energies_at(times), situation.settings.tolerance
+    level = history.energies_at(times)
+    tolerance = situation.settings.tolerance
     passed = time[
         np.minimum(
             _reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1
@@ -122,11 +125,9 @@ class Chosen(NamedTuple):
         """Give the longest pair where it is rigid for much longer than the one that is recommended."""
         much = _MUCH * (self.inside[1] - self.inside[0])
         found = self.longest
-        return (
-            found
-            if found and pair and found.rigid_time - pair.rigid_time > much
-            else None
-        )
+        if found and pair and found.rigid_time - pair.rigid_time > much:
+            return found
+        return None
 
 
 def choose_td(
@@ -163,11 +164,8 @@ def choose_td(
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
-        times = (
-            offered_times(situation, inside, STEPS)[0].tolist()
-            if times is None
-            else times
-        )
+        if times is None:
+            times = offered_times(situation, inside, STEPS)[0].tolist()
         earliest = float(history.time[0]) if since is None else since
         td = _unbeaten(
             td,
@@ -195,7 +193,8 @@ def offered_times(
         place = np.searchsorted(grid, peaks)
         order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
-        peaks, grid = peaks[highest], np.delete(grid, place[highest])
+        peaks = peaks[highest]
+        grid = np.delete(grid, place[highest])
     times = union(grid, peaks)
     return times[times < situation.history.time[-1]], set(
         peaks.tolist()
@@ -211,11 +210,10 @@ def error_of(situation: Situation, best: Pair | None) -> float | None:
     if best.residual is not None:
         return best.residual
     mean = mean_in_flight(situation)
-    error = (
-        np.inf
-        if mean is None
-        else float(shortfall(np.array(situation.energy_td), mean))
-    )
+    if mean is None:
+        error = np.inf
+    else:
+        error = float(shortfall(np.array(situation.energy_td), mean))
     return error if error < np.inf else None
 
 
@@ -255,7 +253,8 @@ def _may_beat(there: Situation, own: Choice, error: float) -> bool:
     """Whether a pair there may be no worse than one with that ``error``, of deformations or levels too, nor shorter."""
     if (there.basis == "energy") != (own[0].basis == "energy"):
         return False
-    share, mean = there.kinetic_share, mean_in_flight(there)
+    share = there.kinetic_share
+    mean = mean_in_flight(there)
     least = 0.0 if mean is None else float(shortfall(np.array(there.energy_td), mean))
     return bool(
         as_printed(least if share is None else sqrt(share)) <= error
@@ -265,7 +264,8 @@ def _may_beat(there: Situation, own: Choice, error: float) -> bool:
 
 def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
     """Give the choices there that are better than one in error or rigid time and worse in neither, as they are read."""
-    error, rigid = as_printed(error_of(*own)), own[1].rigid_time
+    error = as_printed(error_of(*own))
+    rigid = own[1].rigid_time
     found = (
         (there, best, as_printed(error_of(there, best)))
         for there, best in _acceptable(situations)
@@ -303,16 +303,15 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
-    history, flight = situation.history, situation.flight
+    history = situation.history
+    flight = situation.flight
     last = min(
         window[1], not_after(float(history.time[-2]))
     )  # a run that ends at td is no use
     spread = situation.expected_margin.spread
-    return (
-        last
-        if flight.end is None or not spread
-        else min(last, not_after(flight.end - _HIDDEN * spread))
-    )
+    if flight.end is None or not spread:
+        return last
+    return min(last, not_after(flight.end - _HIDDEN * spread))
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
@@ -357,10 +356,12 @@ def _by_modes(
 
     Where no long window is good, a shorter one that is good takes its place.
     """
-    compared, start = situation.vibration.compared, situation.earliest_tr
+    compared = situation.vibration.compared
+    start = situation.earliest_tr
     if start is None or compared is None:
         return _by_residual(situation, window, look)
-    first, last = max(start, compared.first), min(window[1], compared.last)
+    first = max(start, compared.first)
+    last = min(window[1], compared.last)
     every: list[list[Choice]] = []
     for share in _LEAST_RIGID:
         times = _offered_by_modes(situation, (window[0], first, last), share)
@@ -450,7 +451,8 @@ def _by_level(
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
     """Give acceptable choices, the td that may be longest first, as long as another one may be longer."""
-    tds, longest = np.fromiter(times, np.float64), 0.0
+    tds = np.fromiter(times, np.float64)
+    longest = 0.0
     most = longest_rigid_times(situation, tds)
     order = np.lexsort((-tds, -most))
     for td, possible in zip(tds[order].tolist(), most[order].tolist(), strict=True):

@@ -172,11 +172,9 @@ def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float
     """What the part takes up at the beginning of the landing after a flight; None where the record ends in it."""
     start, end = span
     after = energy[window(time, end, end + _LANDING * (end - start))]
-    return (
-        float(after[-1] - after[0])
-        if end < float(time[-1]) and after.size > 1
-        else None
-    )
+    if end < float(time[-1]) and after.size > 1:
+        return float(after[-1] - after[0])
+    return None
 
 
 def _masses(run: Run) -> dict[int, float]:
@@ -265,14 +263,16 @@ def _described(
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
     """Collect what is known of a part, of which the mass and step ``by_deck`` are used where nothing better is."""
-    fact, inventory = facts.parts.get(part), model.inventory if model else None
+    fact = facts.parts.get(part)
+    inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
         counts = None  # they may be in a file that was not read
-    step, source = (
-        printed.get(part, (None, None)) if by_deck[1] is None else (by_deck[1], "deck")
-    )
+    if by_deck[1] is None:
+        step, source = printed.get(part, (None, None))
+    else:
+        step, source = (by_deck[1], "deck")
     mass = fact.mass if fact and fact.mass is not None else by_deck[0]
     title = data.title if data and data.title else fact.part.title if fact else ""
     return PartRow(

@@ -71,11 +71,9 @@ class Done(NamedTuple):
             or self.flight.source not in _SHARP
         ):
             return None
-        return (
-            self.flight.start
-            if self.flight.start - self.tr > _SAME_STATES * self.step
-            else None
-        )
+        if self.flight.start - self.tr > _SAME_STATES * self.step:
+            return self.flight.start
+        return None
 
     @property
     def rigid_in_contact(self) -> bool:
@@ -85,11 +83,9 @@ class Done(NamedTuple):
     @property
     def moved(self) -> float | None:
         """How much later the run landed than planned [time]."""
-        return (
-            None
-            if self.landing is None or self.planned is None
-            else self.landing - self.planned
-        )
+        if self.landing is None or self.planned is None:
+            return None
+        return self.landing - self.planned
 
     @property
     def told(self) -> str:
@@ -135,7 +131,8 @@ def switched_history(
     RangeError
         If a window lies outside the record, or the parts were deformable in it.
     """
-    history, cautions = reference.history, list[Caution]()
+    history = reference.history
+    cautions = list[Caution]()
     for tr, td in done:
         for time in (tr, td):
             history.energy_at(time)
@@ -172,7 +169,8 @@ def rigid_times(reference: Reference) -> tuple[Times, ...]:
     In a record of a rigid leg alone the parts that have energy have no mass, or none moves although the model does.
     """
     found = tuple((one.start, one.end) for one in _absent_times(reference))
-    history, run = reference.history, reference.run
+    history = reference.history
+    run = reference.run
     of_parts = next((one for one in history.momenta if one.parts is not None), None)
     whole = next(
         (one for one in history.momenta if one.parts is None and not one.velocity), None
@@ -203,10 +201,8 @@ def done_windows(
     """Find when the flights of windows that are done have landed, and when they landed in the run before."""
     found = []
     for tr, td in windows:
-        flight, before = (
-            _around(history, flights, tr, td),
-            _around(history, planned or (), tr, td),
-        )
+        flight = _around(history, flights, tr, td)
+        before = _around(history, planned or (), tr, td)
         found.append(
             Done(
                 tr,
@@ -280,18 +276,20 @@ class _Absent(NamedTuple):
 
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
-    parts, balance = _deformable(reference), reference.history.balance
-    kinetic = (
-        if_written(lambda: reference.run.part_kinetic_energies(parts))
-        if parts
-        else None
-    )
+    parts = _deformable(reference)
+    balance = reference.history.balance
+    if parts:
+        kinetic = if_written(lambda: reference.run.part_kinetic_energies(parts))
+    else:
+        kinetic = None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
-    time, least = reference.history.time, round_off(reference.history)
+    time = reference.history.time
+    least = round_off(reference.history)
     moves = np.interp(time, balance.time, balance.kinetic) > least
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
-    energies, found = reference.run.part_energies(parts), []
+    energies = reference.run.part_energies(parts)
+    found = []
     for states in stretches(gone, FEWEST):
         start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
@@ -338,16 +336,13 @@ def rigid_parts(
     )  # switched at the first step after tr
     if not parts or len(time[inside]) < FEWEST:
         return None
-    energies, kinetic = (
-        run.part_energies(parts)[inside],
-        if_written(lambda: run.part_kinetic_energies(parts)),
-    )
+    energies = run.part_energies(parts)[inside]
+    kinetic = if_written(lambda: run.part_kinetic_energies(parts))
     still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
-    absent = (
-        (kinetic[inside] == 0).all(axis=0)
-        if kinetic is not None
-        else np.zeros(len(parts), dtype=bool)
-    )
+    if kinetic is not None:
+        absent = (kinetic[inside] == 0).all(axis=0)
+    else:
+        absent = np.zeros(len(parts), dtype=bool)
     return np.asarray(still | absent)
 
 
@@ -394,7 +389,8 @@ def _judged(
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     some = rigid is not None and bool(rigid.any()) and not rigid.all()
-    objections, notes = list[str](), list[str]()
+    objections = list[str]()
+    notes = list[str]()
     chosen = parts
     if some and rigid is not None:
         still = tuple(
@@ -432,7 +428,8 @@ def _reported_wrong(
     without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
     """Give the parts whose energy after td is further off that at tr than it can be, beyond round-off."""
-    time, energies = switched.part_time, switched.part_energies(parts)
+    time = switched.part_time
+    energies = switched.part_energies(parts)
     first = (
         int(np.searchsorted(time, pair[1])) + 1
     )  # the first state from td on may still be rigid

@@ -90,9 +90,10 @@ class Offer(OfTd):
     @cached_property
     def answer(self) -> Suggestion:
         """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
-        known = (
-            self.candidates if self.pair else None
-        )  # of a td without a pair all are looked at again
+        if self.pair:
+            known = self.candidates
+        else:
+            known = None
         if known and self.basis == "energy":
             known = next(candidates_at([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=known)
@@ -118,10 +119,8 @@ def offers_of(
             one.order[: 0 if one.recommended is None else one.recommended + 1]
             for one in found
         ]
-        few, ends = (
-            judged.at(np.concatenate(kept)),
-            accumulate(rows.size for rows in kept),
-        )  # noise makes many
+        few = judged.at(np.concatenate(kept))
+        ends = accumulate(rows.size for rows in kept)  # noise makes many
         for one, rows, end in zip(found, kept, ends, strict=True):
             best = replace(one, judged=few, order=np.arange(end - rows.size, end))
             yield Offer(one.situation, best, one.situation.td in peaks)
@@ -183,7 +182,8 @@ def explore_of(
     RangeError
         If td or the window lies outside the record, or no flight is seen and neither is given.
     """
-    history, fits = reference.history, Fits()
+    history = reference.history
+    fits = Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(
@@ -243,7 +243,8 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
         group = [
             one for one in offers if _found(one) and (one.basis != "energy") == known
         ]
-        least, longest = np.inf, np.inf
+        least = np.inf
+        longest = np.inf
         read = {
             one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error))
             for one in group

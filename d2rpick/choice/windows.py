@@ -163,7 +163,8 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
 
 def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     """Times in the flight before td between which the rule changes once at most."""
-    history, td = situation.history, situation.td
+    history = situation.history
+    td = situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
@@ -180,7 +181,8 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 def _residual_left(situation: Situation) -> float:
     """Lock-in error that --max-residual leaves beside the kinetic share, R^2 = L^2 + K [-]."""
-    limit, share = situation.settings.max_residual, situation.kinetic_share
+    limit = situation.settings.max_residual
+    share = situation.kinetic_share
     if limit is None:
         return np.inf
     if share is None or sqrt(share) > limit:
