@@ -1,12 +1,12 @@
-"""Weights of a site, fitted to what its own runs took.
+"""Fit the weights of a site to the CPU times of its own runs.
 
-With the elements that were computed in a leg, its cycles and its processor time,
+For each leg of a run, with its computed elements, cycles and CPU time,
 
     E = sum of w_k n_k,     T = E + b N + r R
 
-per cycle: E of the elements and T of all work [us], n_k deformable elements of a formulation, N nodes, R nodes of rigid
-bodies.  Fitted are the w_k, b and r, each relative to its measured value.  What the legs do not tell apart keeps its
-measured ratio to the others.
+per cycle: E is the time of the elements and T that of all work [us], n_k the number of deformable elements of a
+formulation, N that of nodes, R that of rigid-body nodes.  The w_k, b and r are fitted, each relative to its measured
+value.  Unknowns that the legs do not determine keep their measured ratio to the others.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Times of a leg are right within some 5 %, measured ratios of weights within a half: one over the other.
+# CPU times are right within 5 %, the measured ratios of weights within 50 %: the ratio of both [-].
 _DOUBT: Final = 0.1
-# A weight is told by the legs where, with this doubt, they decide more than half of it.
+# A weight is determined by the legs if they decide more than this share of it, at the given doubt [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
 
 class Observation(NamedTuple):
-    """What one leg took per cycle [us], and what it computed.
+    """CPU time of one leg of a run per cycle [us], and what the leg computed.
 
-    ``counts`` are deformable elements by class; ``elements`` is None where the solver gives the total alone.
+    ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
 
     name: str
@@ -65,7 +65,10 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """Weights with what they rest on: ``told`` are the classes that the legs decide, ``misfit`` is relative [-]."""
+    """Fitted weights and their origin.
+
+    ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
+    """
 
     weights: Weights
     told: tuple[str, ...]
@@ -113,7 +116,7 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
 
 
 def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples:
-    """Measured weights in the unit of these runs, then the rest per node, then what a node of a rigid body costs."""
+    """Return start values: the measured weights in the unit of these runs, the rest per node, the rigid-node cost."""
     measured = [
         sum(MEASURED[name] * one.counts.get(name, 0.0) for name in classes)
         for one in deformable
@@ -136,6 +139,7 @@ def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples
 def _rows(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
+    """Return the matrix and the right-hand side of the equations of all legs."""
     rows, right = [], []
     for one in observations:
         counts = [one.counts.get(name, 0.0) for name in classes]
@@ -148,7 +152,10 @@ def _rows(
 
 
 def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Least squares, none below 0, over the unknowns that the rows decide; the others stay 1.  Give both."""
+    """Solve non-negative least squares for the unknowns that the rows determine; return all unknowns and which are.
+
+    Undetermined unknowns stay 1.
+    """
     from scipy.optimize import lsq_linear
 
     normal = scaled.T @ scaled
@@ -162,7 +169,7 @@ def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
 
 
 def _share(one: Observation, values: Mapping[str, float]) -> float:
-    """Share of the elements in a step."""
+    """Return the share of the elements in the CPU time of a step [-]."""
     spent = sum(values.get(name, 0.0) * count for name, count in one.counts.items())
     elements = spent if one.elements is None else one.elements
     return min(1.0, elements / one.total)
@@ -182,7 +189,7 @@ class _Rigid(NamedTuple):
 def observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
-    """Read what the legs of several runs took; a file of the same content, in a folder named twice or a copy, once.
+    """Read the CPU times of the legs of several runs; files of equal content are used once.
 
     Raises
     ------
@@ -215,19 +222,19 @@ def observations_of_runs(
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:
-    """Read what the legs of the run in a folder took.
+    """Read the CPU times of the legs of the run in a folder.
 
     Parameters
     ----------
     folder : str
-        Holds the deck of one run, and its Radioss listings, d3hsp or glstat.
+        Contains the deck of one run, and its Radioss listings, d3hsp or glstat.
 
     Raises
     ------
     DeckError
-        If there is not one main deck.
+        If the folder does not contain exactly one main deck.
     FormatError
-        If no file says what the run took.
+        If no file contains CPU times of the run.
     """
     decks = main_decks(folder)
     if len(decks) != 1:
@@ -246,6 +253,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
 
 
 def _of_radioss(deck: str) -> Iterator[Observation]:
+    """Read the CPU times of a Radioss run from the listings of its engine runs."""
     run = read_run(deck)
     inventory = radioss_inventory.read(run)
     windows = find_run_windows(run).windows.windows
@@ -267,6 +275,7 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
 
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
+    """Read the CPU times of an LS-DYNA run from d3hsp and glstat."""
     read = read_deck(deck)
     inventory = ls_dyna_inventory.read(read)
     windows = find_windows(read_switching(read), read_parts(read)).windows
@@ -292,7 +301,7 @@ def _of_ls_dyna(deck: str) -> Iterator[Observation]:
 
 
 def _end(deck: Deck) -> float:
-    """End of an LS-DYNA run; 0 where it is not known."""
+    """Return the termination time of an LS-DYNA run [time]; 0 if it is unknown."""
     cards = deck.named("CONTROL_TERMINATION")
     rows = [row for row in cards[0].rows if not row.blank] if cards else []
     return float(cards[0].real(rows[0], 0).value) if rows else 0.0
@@ -301,7 +310,7 @@ def _end(deck: Deck) -> float:
 def _of_timing(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Take a leg in which parts were rigid for a fraction of it."""
+    """Return the observation of a leg in which each part was rigid for the fraction ``lasting`` of the time."""
     counts, nodes = _computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
@@ -317,7 +326,7 @@ def _of_timing(
 def _of_zones(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]
 ) -> Iterator[Observation]:
-    """Take the median over states in which the same parts are rigid."""
+    """Yield an observation for each set of rigid parts: the median over the states with this set."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(
@@ -336,7 +345,7 @@ def _of_zones(
 def _computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Deformable elements by class, with their further points, and nodes of rigid bodies, on the average of a leg."""
+    """Return the average number of deformable elements by class, with further points, and of rigid-body nodes."""
     always = {
         part
         for part, data in inventory.parts.items()
@@ -369,7 +378,7 @@ def _count(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add elements of known cost by their class, so many times."""
+    """Add the elements of known cost by class, multiplied by ``times``."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

@@ -1,6 +1,6 @@
-"""Candidates for tr at a given td: where they are, how far they can be trusted, what speaks against them.
+"""Find and judge the candidates for tr at a given td: their times, their accuracy, and the objections to them.
 
-They are judged as columns; a `Candidate` is made only where one is looked at.
+All candidates are judged at once, as columns; a `Candidate` is made only when it is looked up.
 """
 
 from __future__ import annotations
@@ -31,29 +31,30 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch
 
 
-# Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
+# Largest number of candidates judged at once: larger arrays are no faster, and noise makes tens of thousands per td.
 _MOST: Final = 20_000
-_MORE: Final = 8  # times as many td at once as before: the first may have few candidates, and the last many
-# A residual that may be so much higher is worth a note.
+_MORE: Final = 8  # growth of the number of td judged at once: the first may have few candidates, the last many
+# A residual that may be higher by this much gets a note [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
 class Candidate(Measured, Record):
-    """One tr for the td of a situation; fields are the keys of the JSON output, None where nothing can be said.
+    """One tr for the td of a situation; the fields are the keys of the JSON output, None for unknown values.
 
-    Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
-    without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
-    parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
-    ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
-    expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
-    that hardly anything is saved.  ``residual_high``: how large the residual may be if what the model leaves over
-    is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
-    ``position_error``: how far a body is out of place at td [length], because ``position_error_part`` is frozen
-    elsewhere; of several bodies the largest, ``position_error_body`` has the parts of that one.
-    ``position_error_assumes`` says what is taken for granted where no deck tells which parts become one body;
-    ``position_error_is_lower_bound``: it may be further off, by inner motion that passes for the rotation of the body.
+    Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
+    unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several parts
+    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``acceptable``: the
+    tr lies in the flight, with the sign of td and an error within the tolerance; otherwise ``notes`` give the reasons.
+    ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
+    than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
+    model does not explain is a further mode.  ``parts`` lists the mismatch of each part, empty if single parts are
+    unknown.  ``position_error`` is the distance of a body from its place at td [length], because
+    ``position_error_part`` is frozen elsewhere.  Of several bodies it is the largest; ``position_error_body`` lists the
+    parts of that body.  ``position_error_assumes`` names the assumption made if no deck defines which parts become one
+    body.  ``position_error_is_lower_bound``: the error may be larger, through internal motion that looks like rotation
+    of the body.
     """
 
     rank: int
@@ -81,13 +82,16 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """What the order goes by: the residual, on basis "energy" the level error; infinite when unknown."""
+        """Error that ranks candidates [-]: the residual, on basis "energy" the level error; infinite if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
 
 class Pair(NamedTuple):
-    """A recommended (tr, td) [time]; pairs of other td are compared by ``error``, the ``residual`` if it is known."""
+    """A recommended (tr, td) [time].
+
+    Pairs of different td are compared by ``error``, which is the ``residual`` if that is known.
+    """
 
     tr: float
     td: float
@@ -103,11 +107,11 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged:
-    """Times that may serve as tr for one td or many of a record, held against flight, sign and tolerance.
+    """Times that may serve as tr for one or many td of a record, judged by flight, sign and tolerance.
 
-    All is of shape (n,), that of each td together, in the order of the ``situations``: ``place`` in these, ``moments``,
-    and ``columns`` by the names of fields of a candidate: its measures, ``energy``, ``level_error``, ``same_swing`` and
-    ``position_error``, NaN where nothing can be said.
+    All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``place`` is the index
+    into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``, ``level_error``,
+    ``same_swing`` and ``position_error``, NaN for unknown values.
     """
 
     situations: Sequence[Situation]
@@ -118,12 +122,12 @@ class Judged:
 
     @classmethod
     def of(cls, situations: Sequence[Situation], each: Sequence[Moments]) -> Judged:
-        """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
+        """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure counts."""
         sizes = [len(one) for one in each]
         ends = [0, *accumulate(sizes)]
         moments = Moments.joined(each)
         place = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
-        if len(each) == 1:  # of a noisy record, which memory is to hold once
+        if len(each) == 1:  # a noisy record: keep its arrays in memory once
             moments = each[0]
             place = np.broadcast_to(np.int32(0), sizes[0])
         tr = moments.tr
@@ -132,7 +136,7 @@ class Judged:
         level_error = measures.level_error(
             energy, np.array([one.energy_td for one in situations])[place]
         )
-        if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
+        if still.any():  # the ratio of two round-off energies is no error
             level_error[still] = 0.0
             known = {
                 name: np.where(still, np.nan, column) for name, column in known.items()
@@ -164,7 +168,7 @@ class Judged:
 
     @property
     def ends(self) -> list[int]:
-        """Where the candidates of each situation begin, and where the last ones end."""
+        """Index of the first candidate of each situation, and the number of all candidates."""
         ends: list[int] = np.searchsorted(
             self.place, np.arange(len(self.situations) + 1)
         ).tolist()
@@ -172,17 +176,17 @@ class Judged:
 
     @property
     def td(self) -> Samples:
-        """That of each candidate [time]."""
+        """The td of each candidate, shape (n,) [time]."""
         return np.array([one.td for one in self.situations])[self.place]
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
-        """Which of them nothing speaks against."""
+        """True for each candidate without objections, shape (n,)."""
         return np.asarray(~np.logical_or.reduce([one.holds for one in self.objections]))
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
+        """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
         settings = self.situations[0].settings
         found = self.acceptable
         if settings.max_kinetic_share is not None:
@@ -194,14 +198,14 @@ class Judged:
         if settings.max_residual is not None:
             found = found & (
                 self.columns["residual"] <= settings.max_residual
-            )  # not where unknown, NaN
+            )  # False if the residual is unknown, NaN
         return found
 
     @property
     def error(self) -> Samples:
-        """What the order goes by, as ``Candidate.error`` [-]."""
+        """Error by which the candidates are ranked, as `Candidate.error`, shape (n,) [-]."""
         residual = self.columns["residual"]
-        # the least of many that are not known exactly is too good to be true: a wide band counts against it
+        # The smallest of many uncertain estimates is too optimistic: a wide band counts against a candidate.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -212,12 +216,12 @@ class Judged:
 
     @property
     def modal(self) -> NDArray[np.bool_]:
-        """Which of them are judged by many modes."""
+        """True for each candidate that is judged by many modes, shape (n,)."""
         return np.array([one.basis == "modal" for one in self.situations])[self.place]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """Which of them, judged by many modes, lie in the last part of the flight up to td, and so save little."""
+        """True for each candidate of many modes in the last part of the flight before td, which saves little."""
         first = [
             -np.inf if one.earliest_tr is None else one.earliest_tr
             for one in self.situations
@@ -227,7 +231,7 @@ class Judged:
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
-        """Which of them leave a body so far out of place that it is worth a warning."""
+        """True for each candidate whose position error deserves a warning, shape (n,)."""
         limits = [
             np.inf if one.bodies is None else one.bodies.limit
             for one in self.situations
@@ -235,7 +239,7 @@ class Judged:
         return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Keep some that nothing speaks against, in ascending order."""
+        """Select the rows of candidates without objections, ascending."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.place[rows], self.moments.at(rows), columns, ()
@@ -244,10 +248,10 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Candidates of one td in some order, made where they are looked at, of what was ``judged``.
+    """Candidates of one td in some order; each is made when it is looked up in ``judged``.
 
-    ``order`` has the places there of the candidates in their order, that of the ranks where it is ``ranked``;
-    ``recommended`` is the place in it of the one that is.
+    ``order`` has the rows of the candidates in ``judged``; they are ranked if ``ranked`` is True.  ``recommended`` is
+    the place of the recommended candidate in ``order``, None without one.
     """
 
     situation: Situation
@@ -258,22 +262,22 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def tr(self) -> Samples:
-        """Times of the switch to rigid, in their order [time]."""
+        """Times of the switch to rigid, in the order of the candidates [time]."""
         return self.judged.moments.tr[self.order]
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Which of them, in their order, are acceptable and keep the limits asked for."""
+        """True for each candidate, in order, that is acceptable and within the limits of the settings."""
         return self.judged.kept[self.order]
 
     @cached_property
     def chosen(self) -> Candidate | None:
-        """The one that is recommended."""
+        """The recommended candidate, None without one."""
         return None if self.recommended is None else self[self.recommended]
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The same as a pair, which takes less."""
+        """The recommended pair, which is quicker to compute than the candidate; None without one."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
@@ -293,7 +297,7 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def saving(self) -> Pair | None:
-        """The recommended pair, where it saves something."""
+        """The recommended pair if it saves run time, else None."""
         return None if self.pair is None or self.pair.same_swing else self.pair
 
     def __len__(self) -> int:
@@ -304,11 +308,11 @@ class Candidates(Sequence[Candidate]):
     @overload
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
-        """Make the candidate, or the candidates, at some place."""
+        """Make the candidate, or the candidates, at a place of the order."""
         if not isinstance(place, slice):
             i = range(len(self))[place]
             return self[i : i + 1][0]
-        # how far the true time may lie away is asked of these only: of all it takes longer than the choice
+        # The accuracy of the time is computed only for these, since it takes longer than the choice.
         reach = self.situation.vibration.reach(
             _as_found(self.situation, self.judged.moments.at(self.order[place]))
         )
@@ -327,7 +331,7 @@ class Candidates(Sequence[Candidate]):
         }
         known = (
             values["sign_match"] is not None
-        )  # whether its deformation was compared with that at td
+        )  # True if the deformation at tr was compared with that at td
         values["sign_match"] = values["sign_match"] > 0 if known else None
         history = situation.history
         td = situation.td
@@ -362,18 +366,18 @@ class Candidates(Sequence[Candidate]):
 
 
 def _known(value: Any) -> Any:
-    """Give what a column holds, None where it is no number."""
+    """Return the value of a column, None for NaN."""
     return None if value != value else value
 
 
 def judged_of(
     situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
 ) -> Iterator[Judged]:
-    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
+    """Judge all level crossings before td, extrema near the level and closest matches, in time order.
 
-    Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
-    acceptable, may be left out: noise in a long record makes tens of thousands.  The situations are of one record, by
-    one set of rules: at once so many td are judged as have ``most`` candidates.
+    If nothing vibrates in the flight, its start is the only candidate.  With ``in_flight``, candidates before the
+    flight may be left out, since none of them is acceptable: noise in a long record makes tens of thousands.  All
+    situations must have one record and one set of rules.  As many td are judged at once as have ``most`` candidates.
     """
     first, together = 0, 1
     while first < len(situations):
@@ -395,13 +399,13 @@ def judged_of(
 
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
-    """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
+    """Measure each of the ``times`` before td as tr, and judge it by flight, sign and tolerance."""
     judged = Judged.of([situation], [Moments.of("given", [*times])])
     return Candidates(situation, judged, np.arange(judged.place.size))
 
 
 def _at_start(situation: Situation) -> Moments | None:
-    """Where nothing vibrates in the flight, its start, not before it as it is read; else nothing."""
+    """Return the start of a flight in which nothing vibrates, rounded up to printed digits; None if it vibrates."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
@@ -411,7 +415,7 @@ def _at_start(situation: Situation) -> Moments | None:
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
-    """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
+    """Mark each given tr as a match if a match lies there, since its accuracy does not depend on who names it."""
     given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (given.any() and vibration.profile):
@@ -427,7 +431,7 @@ def _as_found(situation: Situation, moments: Moments) -> Moments:
 
 
 def _distinct(situation: Situation, found: Moments) -> Moments:
-    """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
+    """Return the moments in time order, without matches next to a crossing or an extremum."""
     matches = found.are("match")
     if matches.any():
         kept = ~matches
@@ -448,13 +452,13 @@ def _remarks(
     known: Mapping[str, Any],
     parts: Sequence[PartMatch],
 ) -> Iterator[str]:
-    """What to know of this tr beside its acceptance."""
+    """Yield notes on a tr that do not concern its acceptance."""
     if not (known or situation.vibration.unknown or situation.at_rest):
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
     if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         from d2rpick.vibration.part_signs import (
             main_contributors,
-        )  # not above: a table has no parts
+        )  # imported here: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
     if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
@@ -466,7 +470,7 @@ def _remarks(
 
 
 def _position(worst: Off | None) -> dict[str, Any]:
-    """How far the body is off that is off most; nothing where that is not known."""
+    """Return the fields of a candidate for the largest position error; empty if it is unknown."""
     if worst is None:
         return {}
     return {

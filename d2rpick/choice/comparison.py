@@ -1,6 +1,6 @@
-"""A finished switched run held against its reference: what was locked in, what came back, whether the motion is right.
+"""Compare a finished switched run with its reference run: the energy locked in, the energy at td, and the motion.
 
-Between the switches nothing is compared but energy: a rigid part reports neither kinetic energy nor momentum.
+Between tr and td only the energy is compared: a rigid part reports neither kinetic energy nor momentum.
 """
 
 from __future__ import annotations
@@ -25,33 +25,34 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
+# Largest deviation of the momentum after td; beyond this share of it the motion differs from the reference run [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Momentum below this share of the largest of the run is hardly any: a body that has come to rest cannot be off by much.
+# Smaller momenta than this share of the largest of the run count as this share: a resting body cannot deviate much [-].
 _AT_REST = 0.01
-# Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
-# from state to state anyway, that is worth a note.
+# Some solvers report a wrong energy for rigid solid elements. A difference beyond this share, and beyond the usual
+# change from state to state, gets a note [-].
 _REPORTED_OFF = 0.01
-# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.  Of an
-# energy that is mostly plastic the vibration is little: what stands still changes by less than that share of it, too.
+# Largest change of a constant energy, as a share of the energy and of the vibration [-]. A rigid body keeps the energy
+# to its digits; a vibrating one changes by more from state to state. If most of the energy is plastic work, the
+# vibration is a small part of it, hence the second share.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
-# about tr is left to that.
+# Tolerance for the energy about tr, as a share of it [-]: a solver switches at the first step from tr on, and output
+# may miss that by a state or two.
 _ABOUT = 0.05
-# Times between two states at which it is looked when a run was switched.
+# Number of times between two states at which the switch to rigid is searched.
 _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
+    """Measures of a switched run; the fields are the keys of the JSON output, None if the files lack the quantity.
 
-    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.
-    ``rigid_from`` and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which
-    its energy stands still [time], None where it does not.  Means and spreads
-    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
-    momentum behind the first state from td on, relative to the largest that the reference has there;
-    ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
-    ``notes``: what was left out or assumed in reading the switched run and not the reference, and what is odd in it.
+    ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
+    and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
+    switched run is constant [time], None if it is not.  Means and spreads (standard deviations) are taken from td to
+    ``end``.  ``momentum_error`` is the largest deviation of the momentum after the first state from td on, relative to
+    the largest momentum of the reference run there; ``displacement`` is the largest distance there between the centres
+    of the parts in both runs [length].  ``notes`` list what was left out or assumed when reading the switched run but
+    not the reference run, and anomalies of the switched run.
     """
 
     source: tuple[str, ...]
@@ -78,14 +79,15 @@ def compare(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Hold a finished switched run against the reference, by the parts that tell how right it is.
+    """Compare a finished switched run with its reference run, by the parts that show how right it is.
 
-    Both are read in the same way; ``situation`` is that of td in the reference, and ``min_mean`` as for `compare_runs`.
+    Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
+    `compare_runs`.
 
     Raises
     ------
     RangeError
-        If one of the two runs does not go on after td.
+        If one of the two runs does not continue after td.
     """
     flight = situation.flight
     parts = situation.history.parts
@@ -113,7 +115,7 @@ def compare(
 
 
 def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
-    """Momentum of some parts, None also where the run does not have them all."""
+    """Return the momentum of some parts; None if the run lacks one of them or their momenta."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 
@@ -130,7 +132,7 @@ def compare_runs(
     known: bool = True,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Hold a switched run against its reference: was it rigid from tr to td, and what came after td.
+    """Compare a switched run with its reference run: whether it was rigid from tr to td, and its energy after td.
 
     Parameters
     ----------
@@ -141,18 +143,18 @@ def compare_runs(
     end : float
         The next contact, or the end of the records [time].
     tolerance : float
-        On the error of the amplitude that was locked in [-].
+        Largest error of the locked-in amplitude [-].
     momenta, centres : pair of Track or None
-        Of the reference and of the switched run, None where it has none.
+        Of the reference run and of the switched run, None for a run without them.
     known : bool
-        Whether the switched run reports its energies right after td; else nothing is made of them.
+        True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
-        Mean energy after td as a share of the reference's, at least; it may be as far above 1 as below [-].
+        Smallest mean energy after td as a share of that of the reference run [-]; 2 - ``min_mean`` is the largest.
 
     Raises
     ------
     RangeError
-        If a run holds fewer than three states in that window.
+        If a run has fewer than three states from td to ``end``.
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
@@ -206,7 +208,7 @@ def compare_runs(
 def _refuse_few(
     reference: History, switched: History, states: int, td: float, end: float
 ) -> None:
-    """RangeError where a run holds too few states after td."""
+    """Raise RangeError if a run has too few states after td."""
     if states < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
         name = ", ".join(short.source)
@@ -220,7 +222,7 @@ def _refuse_few(
 
 
 def _still(reference: History, switched: History, tr: float, td: float) -> float:
-    """Give the change up to which an energy stands still: beside what vibrates it is nothing, or digits [energy]."""
+    """Return the largest change of a constant energy [energy]: small relative to the vibration, or digits."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _range(reference, tr, td)
@@ -234,7 +236,7 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
 
 
 def _range(history: History, start: float, end: float) -> float:
-    """Range of the energy between two times [energy]."""
+    """Return the range of the energy between two times [energy]."""
     return float(
         np.ptp(
             np.append(
@@ -248,7 +250,7 @@ def _range(history: History, start: float, end: float) -> float:
 def _rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
-    """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
+    """Return the first and last state of constant energy around the middle of (tr, td) [time]; None without one."""
     time = switched.time
     energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
@@ -268,9 +270,9 @@ def _not_rigid(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Object when the energy does not stand still from about tr to about td, as far as the states tell.
+    """Yield an objection if the energy is not constant from about tr to about td, as far as the states show.
 
-    That it does so before or after as well tells something only where that of the reference does not.
+    A constant energy before tr or after td matters only if that of the reference run is not constant there.
     """
     if rigid is None:
         yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
@@ -296,9 +298,9 @@ def _not_rigid(
 def _not_locked_in(
     reference: History, tr: float, frozen: float, wanted: float, tolerance: float
 ) -> Iterator[str]:
-    """Object when the energy that came back is not one that the reference has about tr, or not that of td."""
+    """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
     if max(frozen, wanted) <= round_off(reference):
-        return  # nothing vibrates: what nothing is off by means nothing
+        return  # nothing vibrates: the error of nothing means nothing
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -311,25 +313,25 @@ def _not_locked_in(
 
 
 def _another_mean(share: float, least: float) -> Iterator[str]:
-    """Object when the mean energy after td is another one than that of the reference."""
+    """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not least <= share <= 2 - least:
         found = f"the mean energy after td is {share:.2g} times that of the reference"
         yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
 
 
 def times_of(switched: History, reference: History) -> tuple[float, float]:
-    """Read off a switched run when its parts were rigid: its energy stands still, and that of the reference does not.
+    """Find tr and td of a switched run: its energy is constant between them, that of the reference run is not.
 
     Returns
     -------
     tr, td : float
-        tr between the last state that moves and the first that does not, where the reference has that energy; td is
-        the last state that does not [time].
+        tr lies between the last changing state and the first constant one, at the time at which the reference run has
+        that energy; td is the last constant state [time].
 
     Raises
     ------
     RangeError
-        If there is no such time, as where nothing vibrates in the flight.
+        If there is no such time, as in a flight in which nothing vibrates.
     """
     time = switched.time
     energy = switched.energy
@@ -354,7 +356,7 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:
-    """Whether the energy reported while rigid is not the one that comes back."""
+    """Return True if the energy reported while rigid differs from the energy at td."""
     usual = np.abs(np.diff(after)).max()
     return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
 
@@ -362,6 +364,7 @@ def _reported_wrong(rigid: float, after: Samples) -> bool:
 def _relative(
     reference: Track | None, other: Track | None, td: float, end: float
 ) -> float | None:
+    """Return the largest distance between two tracks over the largest size of the reference track [-]."""
     distance = _distance(reference, other, td, end)
     if reference is None or distance is None:
         return None
@@ -374,7 +377,7 @@ def _relative(
 def _distance(
     reference: Track | None, other: Track | None, td: float, end: float
 ) -> float | None:
-    """Largest distance of the second track from the first between two times; None where one is missing.
+    """Return the largest distance of the second track from the first between two times; None if one is missing.
 
     The first state from td on is left out, since it may still be rigid.
     """

@@ -1,6 +1,6 @@
-"""What the deck of a run tells about it, which rigid bodies its parts become, and what may be wrong with what it says.
+"""Apply the deck of a run: rigid bodies, supports, gravity and costs, and doubts about the deck.
 
-The deck of another model tells numbers of parts that have nothing to do with the run: nothing of it is used.
+The part ids of a deck of another model have nothing to do with the run, so nothing of it is used.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 
 def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:
-    """Give the rigid bodies that these parts become; none where elements, or ties between bodies, are not known.
+    """Return the rigid bodies that ``parts`` become; empty if elements, or ties between bodies, are unknown.
 
-    A part in pieces that nothing joins is one body all the same in LS-DYNA, which switches parts; in Radioss, where a
-    body is a set of nodes, each piece may have a body of its own.
+    In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
+    bodies are sets of nodes, each piece may have a body of its own.
     """
     if not inventory.complete or not inventory.counts.keys() >= set(parts):
         return ()
@@ -43,6 +43,7 @@ def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, 
 
 
 def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
+    """Return True if a rigid body is one connected piece, or Radioss can treat its pieces separately."""
     alone = len(body) == 1 and inventory.solver == "radioss"
     return (
         alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
@@ -50,18 +51,18 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 
 
 def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
-    """Give the rigid body that parts become which are merged, whatever ``bodies`` they would be."""
+    """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
     whole = len(parts) > 1 or any(
         body.whole for body in bodies
-    )  # a part alone may be of pieces
+    )  # a single part may consist of pieces
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
 def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
-    """Say why a deck is not that of a run; None where nothing shows it.
+    """Return a warning if a deck is not that of a run, else None.
 
-    It is not where more of the parts that both have differ in their titles than agree, or where all of the deck was
-    read and parts with energy are not in it.
+    It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
+    have energy.
     """
     titled = [
         one
@@ -79,12 +80,12 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
 
 
 def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
-    """Whether parts are seen to have energy."""
+    """Return True if the history contains energy of any of the parts."""
     return bool(parts) and bool(if_written(lambda: run.part_energies(parts).any()))
 
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where some parts of a history have other titles in the deck: what it says may be of another model."""
+    """Yield a warning if some parts have other titles in the deck than in the history."""
     other = [
         part
         for part in parts
@@ -98,7 +99,7 @@ def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
 
 
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where ties that are not followed may join the rigid bodies that parts become, or one has loose pieces."""
+    """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
             more = f" and {len(inventory.ties) - 1} more ties"
@@ -110,7 +111,7 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
             f"{found}; parts that are tied belong in one rigid body",
         )
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
-    if not (inventory.solver == "ls-dyna"):
+    if inventory.solver != "ls-dyna":
         cure = "each of them needs a rigid body of its own"
     for body in bodies_of(inventory, parts):
         if not (body.whole or inventory.ties):
@@ -124,7 +125,7 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
 
 
 def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say what ruins a run, what is not known of its supports, and which parts would spring back wrongly if turned."""
+    """Yield warnings about what ruins a run, unknown supports, and parts whose stresses do not rotate with them."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
@@ -146,7 +147,7 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
 
 
 def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
-    """Say which parts a deck keeps rigid, in a run that switches others, although they deform."""
+    """Yield a warning if a deck keeps parts rigid that deform in the history."""
     left = inventory.left_rigid
     if left and _has_energy(run, [part for part in run.parts if part.id in left.parts]):
         where = f"{left.place.file}:{left.place.line}"
@@ -157,7 +158,7 @@ def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
 
 
 def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
-    """Say what was not followed of a deck and, where its cost is ``used``, which weights were not measured."""
+    """Yield warnings about what was not followed in a deck and, if its cost is ``used``, about weights not measured."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
@@ -166,20 +167,21 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
 
 
 def _named(other: Sequence[Part], inventory: Inventory) -> str:
-    """Name the first of the parts whose titles differ."""
+    """Describe the first of the parts whose titles differ."""
     first = other[0]
     more = f", and {len(other) - 1} more" if len(other) > 1 else ""
     return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
 
 
 def _title(part: Part, inventory: Inventory) -> str:
+    """Return the title of a part in the deck."""
     return inventory.parts[part.id].title
 
 
 def _differ(one: str, other: str) -> bool:
-    """Whether two titles are there and differ, but for blanks, capitals, and where a format cuts them.
+    """Return True if two titles differ, except in spaces, case, and length if one is cut off.
 
-    Letters beyond ASCII are not compared: files of one run encode them in different ways.
+    Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
     plain = ("".join(filter(str.isascii, title)) for title in (one, other))
     first, second = (" ".join(title.split()).casefold() for title in plain)
@@ -190,9 +192,9 @@ def _differ(one: str, other: str) -> bool:
 def with_deck(
     settings: Settings, reference: Reference, model: CostModel
 ) -> tuple[Settings, tuple[Caution, ...]]:
-    """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
+    """Return settings with the cost share and the rigid bodies that the deck defines for the parts of a history.
 
-    What stays unknown is in the cautions; the deck of another model tells nothing.
+    A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
     """
     inventory = model.inventory
     if foreign := of_another_model(reference.run, inventory):
@@ -234,13 +236,14 @@ def with_deck(
 
 
 def in_deck(run: Run, inventory: Inventory | None) -> Run:
-    """Give a run with what its deck tells; as it is without one, or with that of another model."""
+    """Return a run with the surroundings that its deck defines; unchanged without a deck of the model."""
     if inventory is None or of_another_model(run, inventory):
         return run
     return run.within(_surroundings(inventory))
 
 
 def _surroundings(inventory: Inventory) -> Surroundings:
+    """Return gravity, supports and connected parts according to the deck."""
     by_part, whole = supports_of(inventory)
     supports: dict[int | None, tuple[Support, ...]] = {
         part: _supports(holds) for part, holds in by_part.items()
@@ -256,17 +259,18 @@ def _surroundings(inventory: Inventory) -> Surroundings:
 
 
 def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
-    """Parts that hang together; none where some may be missing, or ties that are not followed may join them."""
+    """Return the groups of connected parts; empty if parts may be missing, or ties may join the groups."""
     known = inventory.complete and not inventory.ties
     return inventory.bodies(inventory.nodes_by_part.keys()) if known else ()
 
 
 def _supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
+    """Return the supports with their names and times, each once."""
     return tuple(dict.fromkeys(Support(one.name, one.start, one.end) for one in holds))
 
 
 def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Accelerations that gravity may have for each part of which they are known."""
+    """Yield the possible accelerations of gravity for each part for which they are known."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
         acting = [(one, _acts(one, part, nodes)) for one in loads or ()]
@@ -277,7 +281,7 @@ def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 
 def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
-    """Whether gravity acts on a part with these nodes; None where on some of them."""
+    """Return True if gravity acts on a part with these nodes; None if it acts on some nodes only."""
     if load.nodes is None or part in load.parts:
         return True
     inside = np.isin(nodes, load.nodes)
@@ -285,7 +289,7 @@ def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Sizes of several loads together; None where their sum is not known."""
+    """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
         return tuple(
             sorted({abs(value) for one in loads for value in one.values} or {0.0})

@@ -1,4 +1,4 @@
-"""The flights of a record, in which td may lie."""
+"""Find the flights of a record, in which td may lie."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.span import Fits
 
-# Parts of the record at which a vibration that goes on by itself is looked for.
+# Places in the record at which a continuing vibration is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 
 
@@ -29,10 +29,15 @@ def longest_flight(
     *,
     otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
-    """Give the longest flight as a window for td within the record [time].
+    """Return the longest flight as a window for td within the record [time].
 
-    The energy alone may show no end of the flight to the td in it: then the margin is kept from the one that was found.
-    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
+    A td in a flight known by the energy alone may show another end of the flight; then the window keeps the margin.
+    ``otherwise`` is returned if there is no flight.
+
+    Raises
+    ------
+    RangeError
+        If there is no flight and no ``otherwise``.
     """
     flights = flights_of(history, settings, fits)
     if settings.landing is not None and (
@@ -59,28 +64,28 @@ def longest_flight(
 
 
 def last_td(end: float, margin: float) -> float:
-    """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
+    """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
     return not_after(sum_as_read(end, -margin)) if margin else end
 
 
 def flights_of(
     history: History, settings: Settings, fits: Fits | None = None
 ) -> tuple[Flight, ...]:
-    """Find every flight of a record, ascending in time, that of the landing that is given up to there.
+    """Find all flights of a record, ascending in time; the flight of a given landing ends there.
 
     Parameters
     ----------
     history : History
-        With its evidence, as a run gives it.
+        With its evidence, as a run provides it.
     settings : Settings
-        How an oscillator is looked for where no better evidence shows a flight.
+        Options for the search for an oscillator if no better evidence shows a flight.
     fits : Fits, optional
-        Those of an earlier look at the record; none of its windows is fitted twice.
+        Fits of an earlier call for the record; no window is fitted twice.
 
     Returns
     -------
     tuple of Flight
-        ``end`` is None where the record ends in flight.  A flight shorter than a twentieth of the record is not seen.
+        ``end`` is None if the record ends in flight.  Flights shorter than 1/20 of the record are not found.
 
     Raises
     ------
@@ -111,7 +116,7 @@ def flights_of(
 def _with_given_start(
     history: History, settings: Settings, found: tuple[Flight, ...], fits: Fits | None
 ) -> tuple[Flight, ...]:
-    """Add the flight that begins where the user says that the load ends, if none of those found holds that time."""
+    """Add the flight that starts at the end of the load given by the user, unless a flight contains that time."""
     after = settings.after
     last = float(history.time[-1])
     windows = [one.within(history.time) for one in found]
@@ -134,7 +139,7 @@ def _with_given_start(
 def _in_order(
     history: History, found: tuple[Flight, ...], given: Flight
 ) -> tuple[Flight, ...]:
-    """Give flights ascending in time, with the one that is given in place of those that it overlaps."""
+    """Return flights ascending in time, with the given flight replacing those that it overlaps."""
     first, last = given.within(history.time)
     windows = ((one, *one.within(history.time)) for one in found)
     others = [one for one, start, end in windows if end <= first or start >= last]
@@ -142,7 +147,7 @@ def _in_order(
 
 
 def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
-    """Give the last flight that begins before a landing [time]."""
+    """Return the last flight that starts before a landing [time]; None without one."""
     return max(
         (one for one in flights if (one.start or 0.0) < landing),
         key=lambda one: one.start or 0.0,
@@ -153,7 +158,7 @@ def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
 def _flights_of(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
-    """Find them without a landing: where the energy is all there is, by what describes it, or none."""
+    """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
     seen = all_seen(history)
     if seen:
         return tuple(
@@ -169,7 +174,7 @@ def _flights_of(
         )
     from d2rpick.choice.situation import (
         looking,
-    )  # not above: better evidence than the energy does without it
+    )  # imported here: evidence better than the energy does not need it
 
     look = looking(history, settings, fits)
     if settings.replay and not witnesses(history):
@@ -185,12 +190,12 @@ def _flights_of(
     found: list[Flight] = []
     for td in sorted(
         moments(history.time), reverse=True
-    ):  # the last quiet time before td tells most of the flight
+    ):  # the last quiet time before td shows most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
-        # one that lasts into the next misses the load before that one, so its end is not known
+        # a flight that lasts into the next one misses the load between them, so its end is unknown
         lasts = (
             found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
         )
@@ -200,17 +205,17 @@ def _flights_of(
 
 
 def momentum_of_flight(history: History) -> dict[str, Samples]:
-    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
+    """Return columns of the momentum that shows the flight, and of the mass.
 
-    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
-    energy.
+    They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
+    are columns of the velocity.  The result is empty if neither is written at the times of the energy.
     """
     import numpy as np
 
     from d2rpick.flight.momentum import (
         all_flights,
         to_be_asked,
-    )  # not above: most evidence is found without
+    )  # imported here: most evidence does not need it
 
     asked = [
         one

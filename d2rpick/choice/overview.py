@@ -1,4 +1,4 @@
-"""What the files of a run hold, before anything is chosen from them."""
+"""Describe the files of a run before anything is chosen from them."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# Cards that write the momenta of parts.
+# Output that contains the momenta of parts.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 class PartOverview(NamedTuple):
-    """A part and the highest internal energy it ever has; None where that is not written, or not in every state."""
+    """A part and its highest internal energy; None if that is not written, or not in every state."""
 
     part: Part
     energy_max: float | None
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall by its name, and the times (start, end) in which it ``acts`` [time]."""
+    """A contact or rigid wall by name, and the times (start, end) in which it ``acts`` [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
@@ -64,15 +64,14 @@ class Sampling(NamedTuple):
 
 
 class Overview(NamedTuple):
-    """What the files of a run hold.
+    """Contents of the files of a run.
 
-    Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
-    there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
-    has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
-    ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
-    that of the run, with the longest of them as its window; None without energies.
-    ``should_write`` names the output that would show the flights for sure; None where it is there, or no state is.
+    Times are in the unit of the run, which ``time_unit`` gives only if a file names it.  ``sampling`` is None for a
+    single state.  It and the times are None without states; they and ``states`` are None if the time has to be chosen
+    among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its source:
+    ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
+    is that of the run, with the longest flight as its window; None without energies.  ``should_write`` names the output
+    that would show the flights for certain; None if it is written, or there is no state.
     """
 
     source: tuple[str, ...]
@@ -96,13 +95,13 @@ class Overview(NamedTuple):
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What to know of the health of the run and of its engine, and why it cannot be judged."""
+        """Warnings about the health of the run and its engine, and reasons why it cannot be judged."""
         health = cautions_of_health(self.health) if self.health else ()
         return (*self.alarms, *health, *cautions_of_engine(self.source))
 
 
 def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
-    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights, and the ``deck``."""
+    """Describe all databases of a run; ``selection`` and ``deck`` matter for the flights."""
     told: tuple[Caution, ...] = ()
     if deck is not None:
         run, told = _in_deck(run, deck)
@@ -121,12 +120,12 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         states = int(time.size)
     except (
         FormatError
-    ) as error:  # several columns may be the time: there is still a list of them
+    ) as error:  # several columns may be the time; they can still be listed
         if (
             first.format == "csv"
             and if_written(lambda: first.energy_channel) is not None
         ):
-            raise  # by its one energy it is known which column is the time: the table cannot be read
+            raise  # one energy shows which column is the time, so the table itself cannot be read
         notes.append(str(error))
     steps = np.diff(time)
     history = _history(run, selection)
@@ -165,12 +164,12 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
 
 
 def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
-    """Let a deck tell what acts on a run; DeckError where it cannot be read."""
+    """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
     from d2rpick.choice.deck_of_run import (
         doubts_of_solver,
         in_deck,
         of_another_model,
-    )  # not above: few name a deck
+    )  # imported here: few runs are given with a deck
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
@@ -181,7 +180,7 @@ def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
 
 
 def _missing(run: Run) -> str:
-    """Say in the words of the solver how the momenta of parts are written, which these files do not have."""
+    """Name the output of the solver that contains the momenta of parts, which these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         what = _RADIOSS
@@ -199,6 +198,7 @@ def _missing(run: Run) -> str:
 
 
 def _notes(database: Legs) -> tuple[str, ...]:
+    """Return the notes of a database, or its error as a note."""
     try:
         return database.notes
     except FormatError as error:
@@ -206,11 +206,12 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
+    """Yield each part with its highest internal energy."""
     if run.parts:
         energies = if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
-    if energies is None:  # some parts come and go, so that their columns have holes
+    if energies is None:  # some parts come and go, so their columns have gaps
         return (PartOverview(part, _highest(run, part)) for part in run.parts)
     return (
         PartOverview(part, _most(column))
@@ -219,14 +220,17 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
 
 
 def _highest(run: Run, part: Part) -> float | None:
+    """Return the highest internal energy of a part [energy]; None if it is not written."""
     return if_written(lambda: _most(run.part_energies([part])))
 
 
 def _most(energies: Samples) -> float | None:
+    """Return the highest of some energies; None without any."""
     return float(energies.max()) if energies.size else None
 
 
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
+    """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
         told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
@@ -239,6 +243,7 @@ def _health(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
+    """Return the health of the run outside of rigid windows; None without energies."""
     balance = balance_of(
         run.databases, run.parts, known=history.balance if history else None
     )
@@ -267,7 +272,7 @@ def _health(
 
 
 def _history(run: Run, selection: Selection) -> History | None:
-    """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
+    """Return the history that would be judged; None if an energy has to be chosen first, or there is no state."""
     if selection.parts:
         selection = with_parts_by_number(run, selection)
     for wanted in (selection.parts, selection.flying):
@@ -277,7 +282,7 @@ def _history(run: Run, selection: Selection) -> History | None:
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Give those that ``plan`` and ``suggest`` choose from; none where they refuse the run."""
+    """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
     try:
         refuse_unsound(history, settings := Settings())
         found = flights_of(history, settings)

@@ -1,4 +1,4 @@
-"""Sets of parts worth comparing: what each saves, how far it puts the body out of place, and which one to take."""
+"""Compare sets of parts: what each saves, its position error, and which one to make rigid."""
 
 from __future__ import annotations
 
@@ -46,23 +46,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import Run
 
-# Savings that differ by less cannot be told apart: the cost model is right within some points.
+# Savings that differ by less are equal: the cost model is right to within a few percent of the run time [-].
 _LIKE: Final = 0.01
-# The heaviest parts that together have this share of the mass of all that may be switched.
+# The set "heavy" has at least this share of the mass of all switchable parts [-].
 _HEAVY: Final = 0.5
 _ALL, _STILL = "all that may", "all but what moves"
 _NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
 
 
 class PartSet(NamedTuple):
-    """A set of parts, what it saves and what it does; None with a word in ``reasons`` where unknown.
+    """A set of parts with its saving and its errors; unknown values are None, with the cause in ``reasons``.
 
-    ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
-    ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
-    take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
-    the record [-].  ``angle_error`` is by how much a body is turned at td from where it should be [degrees]; it and the
-    position error may be larger where ``position_is_lower_bound``.  ``moving`` are the parts that move against the
-    rest, ``apart``: some of them fly away from the body that they are to become one with.
+    ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the share of a step that they save [-].
+    ``step_growth`` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
+    it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
+    ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
+    and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to
+    the rest; ``apart``: some of them fly away from the body that they are to become part of.
     """
 
     name: str
@@ -90,12 +90,12 @@ class PartSet(NamedTuple):
 
     @property
     def saving(self) -> float | None:
-        """Share of the run time that is saved [-]."""
+        """Share of the run time that is saved [-]; None if it is unknown."""
         return None if self.run_time_share is None else 1 - self.run_time_share
 
     @property
     def out_of_place(self) -> bool:
-        """Whether the position error is beyond its limit, or a part flies away from the body it is to be one with."""
+        """True if the position error exceeds its limit, or a part flies away from the body that it joins."""
         error = self.position_error
         limit = self.position_limit
         return self.apart or (error is not None and limit is not None and error > limit)
@@ -103,7 +103,7 @@ class PartSet(NamedTuple):
 
 @dataclass(frozen=True)
 class Parts:
-    """Answer of ``parts``: every part, sets of them, and what to be aware of.
+    """Answer of ``parts``: all parts, sets of them, and warnings.
 
     ``inventory`` is None without a deck.
     """
@@ -119,7 +119,7 @@ class Parts:
 
     @property
     def recommended(self) -> PartSet | None:
-        """The set to take."""
+        """The recommended set; None without one."""
         return next((one for one in self.sets if one.recommended), None)
 
 
@@ -132,23 +132,23 @@ def parts_of(
     times: Times | float | None = None,
     beside: Sequence[str] = (),
 ) -> Parts:
-    """Judge every part of a run, and compare sets of them.
+    """Judge every part of a run, and compare sets of parts.
 
     Parameters
     ----------
     run : Run
-        Without switching.
+        The reference run.
     settings : Settings
         As for ``suggest``; its cost share is not used.
     model : CostModel or None
-        The deck with its cost; without it the cost and most verdicts stay open.
+        The deck with its costs; without it the costs and most verdicts stay unknown.
     given : sequence of int
-        A set to be compared too.
+        Part ids of a further set to compare.
     times : (float, float) or float, optional
-        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, for each set
-        with the tr of ``suggest``.
+        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, and for each set
+        the tr of ``suggest``.
     beside : sequence of str
-        The deck, in whose folder a d3hsp with the smallest steps of parts is looked for too.
+        The deck, in whose folder a d3hsp with the smallest time steps of parts is looked for too.
 
     Returns
     -------
@@ -164,13 +164,15 @@ def parts_of(
     for one in _sets(rows, given):
         td = next(
             (other.window[1] for other in sets if other.window), None
-        )  # the same for all, to be compared
+        )  # the same td for all sets, so that they can be compared
         sets.append(comparison.of(one, times or td))
         if one.name == _ALL:
             left = tuple(part for part in one.parts if part not in sets[-1].moving)
         else:
             left = ()
-        if left and sets[-1].moving:  # they may fly longer without what moves
+        if (
+            left and sets[-1].moving
+        ):  # the other parts may fly longer than the moving ones
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
     cautions = (
@@ -182,12 +184,12 @@ def parts_of(
 
 
 def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
-    """Give the numbers of the parts of a set that is to be compared too.
+    """Return the part ids of a further set to compare.
 
     Raises
     ------
     FormatError
-        If the run has no such parts, or the recommended set is asked for.
+        If the run has no such parts, or the recommended set is requested.
     """
     if not names:
         return ()
@@ -203,7 +205,13 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
 def recommended_parts(
     run: Run, settings: Settings, model: CostModel
 ) -> tuple[int, ...]:
-    """Give the parts of the recommended set; FormatError where none can be recommended."""
+    """Return the part ids of the recommended set.
+
+    Raises
+    ------
+    FormatError
+        If no set can be recommended.
+    """
     found = parts_of(run, settings, model)
     if found.recommended is None:
         if found.facts.reason:
@@ -223,7 +231,7 @@ def recommended_parts(
 
 
 def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
-    """Leave out what is there already under another name."""
+    """Leave out sets that repeat the parts of an earlier set under another name."""
     return [
         one
         for at, one in enumerate(sets)
@@ -232,7 +240,7 @@ def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
 
 
 def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
-    """Name the sets worth comparing."""
+    """Yield the sets worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
     named = {
@@ -249,7 +257,7 @@ def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
 
 
 def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
-    """The heaviest parts that have half of the mass together; none where a mass is not known."""
+    """Return the heaviest parts that together have half of the mass; empty if a mass is unknown."""
     masses = {row.id: row.mass for row in movable if row.mass is not None}
     if len(masses) < len(movable):
         return []
@@ -266,7 +274,7 @@ def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
 
 @dataclass(frozen=True)
 class _Comparison:
-    """What all sets are compared by."""
+    """The run, settings, costs and parts that all sets are compared with."""
 
     run: Run
     settings: Settings
@@ -275,11 +283,11 @@ class _Comparison:
 
     @cached_property
     def placement(self) -> Placement | None:
-        """Where the deck puts the parts."""
+        """Places of the parts according to the deck; None without a deck."""
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, one: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set, in a window, or in that for a td."""
+        """Complete a set with its costs and errors, for a given (tr, td) or td, or for a td of its own."""
         share = self.model.saved(one.parts) if self.model else Share(None)
         reasons = [share.reason]
         one = self._with_cost(one, self.model.inventory, share) if self.model else one
@@ -297,6 +305,7 @@ class _Comparison:
         )
 
     def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
+        """Add the rigid bodies, the costs, and the growth of the time step."""
         within = {
             part: counts.total()
             for part, counts in inventory.elements_within(one.parts).items()
@@ -316,7 +325,7 @@ class _Comparison:
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
-        """Share of the mass of all parts that fly; None where one is not known."""
+        """Return the share of the parts in the mass of all flying parts [-]; None if a mass is unknown."""
         masses = {
             row.id: row.mass for row in self.rows if row.flight and row.flight.flies
         }
@@ -330,7 +339,7 @@ class _Comparison:
         return sum(known[part] for part in parts) / sum(known.values())
 
     def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
-        """Parts of other rigid bodies than the heaviest; none where ties that are not followed may join these."""
+        """Return the parts outside of the heaviest rigid body; empty if ties may join the bodies."""
         masses = {row.id: row.mass or 0.0 for row in self.rows}
         main = max(
             inventory.bodies(parts),
@@ -340,7 +349,13 @@ class _Comparison:
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
-        """Find when the set may be rigid; RangeError with the reason where it may not."""
+        """Add the window in which the set may be rigid.
+
+        Raises
+        ------
+        RangeError
+            If no tr can be recommended, with the reason.
+        """
         reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
         told = bodies_of(self.model.inventory, one.parts) if self.model else None
         settings = replace(self.settings, bodies=told, placement=self.placement)
@@ -363,7 +378,7 @@ class _Comparison:
 
 
 def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
-    """Add how far the body that is off most is out of place at td since its parts moved against each other before."""
+    """Add the largest position error at td of a body whose parts moved relative to each other before tr."""
     told = ("several-bodies", "moves-apart")
     why = tuple(
         caution.message
@@ -391,9 +406,9 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Recommend the set that saves most, and of those that save alike the one of fewest parts.
+    """Mark the recommended set: it saves most; of sets that save equally much it has the fewest parts.
 
-    A set that puts the body out of place counts only where all do.
+    A set with too large a position error is considered only if all sets have one.
     """
     useful = [one for one in sets if one.saving is not None and one.saving > 0]
     in_place = [one for one in useful if not one.out_of_place] or useful
@@ -411,6 +426,7 @@ def _cautions(
     rows: Sequence[PartRow],
     sets: Sequence[PartSet],
 ) -> Iterator[Caution]:
+    """Yield the warnings about the deck, the parts and the sets."""
     if facts.reason:
         yield Caution("no-part-history", facts.reason)
     if model is None:

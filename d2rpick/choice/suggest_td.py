@@ -1,4 +1,4 @@
-"""Choosing both times: td in a window or in the longest flight, and tr for it."""
+"""Choose td, in a window or in the longest flight, together with the tr for it."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
 
 
 def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
-    """Upper bounds for the rigid time of the tr that is recommended at each of many td, of their shape (n,) [time].
+    """Return upper bounds for the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
-    Where the level is all that decides, that tr does not lie before the energy first comes near the level at td: by
-    the tolerance, or by what counts as like levels where it passes the level itself and turns twice before td.  Where
-    a model of the vibration decides at some td, or the level is round-off, the start of the flight is the bound.  Zero
-    where that start is not known.
+    If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
+    tolerance, or the margin of like levels if the energy passes the level itself and turns twice before td.  If a model
+    of the vibration decides at some td, or the level is round-off, the bound is the start of the flight.  The result is
+    0 if that start is unknown.
     """
     start = situation.earliest_tr
     history = situation.history
@@ -71,7 +71,7 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
     entered = time[
         np.maximum(_reached(*extremes, level, near) - 1, 0)
-    ]  # or since, but after the state before
+    ]  # or later, but after the state before
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
     )
@@ -80,10 +80,10 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _reached(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Index of the first state by which the energy has been in the band about each level; their number where none is.
+    """Return the index of the first state by which the energy has been near each level, else the number of states.
 
-    ``lowest`` and ``highest`` are its extremes up to each state.  The band holds the level errors up to ``near``; of a
-    negative one both sides of the level have been met.
+    ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
+    that counts as near; if it is negative, the energy must have been on both sides of the level.
     """
     low, high = (
         np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2
@@ -93,27 +93,27 @@ def _reached(
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
 
 
-# Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
-# and the last, since the later td the more is saved.
+# Number of peaks that are tried of each kind: the highest, since a high peak of several modes has little kinetic
+# energy, and the last, since a late td saves most.
 _MOST_PEAKS: Final = 12
-# Of many modes, the least residual is sought among windows of at least this share of the longest one, at so many td.
+# For many modes the smallest residual is searched among windows of at least this share of the longest one [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
-# td in an even grid: on paper and on a screen a curve of so many points is smooth.
+# Number of td in an even grid: a curve of so many points looks smooth on paper and on a screen.
 STEPS: Final = 200
-# Decimals of an error that people read.
+# Decimals of an error that are shown to the user.
 _READ: Final = 3
-# Rigid time that is given up for quality is told from this share of the window on.
+# A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
-# An energy that stays on its level may hide the vibration of many modes, which moves the landing by more than what the
-# energy shows: in twenty computed falls by up to 1.9 times as much.
+# The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
+# many modes. In 20 computed falls the factor was up to 1.9.
 _HIDDEN: Final = 2.0
 
 
 class Chosen(NamedTuple):
-    """The ``situation`` of the td that was chosen in a window, and the ``longest`` acceptable pair in it.
+    """The ``situation`` of the td chosen in a window, and the ``longest`` acceptable pair in that window.
 
-    ``window`` is the one that was asked for, ``inside`` what of it keeps the margin [time].
+    ``window`` is the requested window, ``inside`` the part of it that keeps the margin [time].
     """
 
     situation: Situation
@@ -122,7 +122,7 @@ class Chosen(NamedTuple):
     longest: Pair | None
 
     def given_up(self, pair: Pair | None) -> Pair | None:
-        """Give the longest pair where it is rigid for much longer than the one that is recommended."""
+        """Return the longest pair if it is rigid for much longer than the recommended ``pair``, else None."""
         much = _MUCH * (self.inside[1] - self.inside[0])
         found = self.longest
         if found and pair and found.rigid_time - pair.rigid_time > much:
@@ -138,14 +138,14 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, for None in the longest flight up to the margin, for a tr not before ``since``.
+    """Choose td in ``window``, or in the longest flight if it is None, for a tr not before ``since``.
 
-    Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
-    longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
-    energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
-    from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
-    A td of ``times``, by default an even grid, whose pair beats that in both error and rigid time takes its place.
-    Where nothing vibrates, any td is as good, and the last one saves the most.
+    Of the pairs at all energy peaks only those of like quality are considered; the one with the longest rigid window
+    wins.  If deformations are known, a residual within 0.02 of the smallest is of like quality.  On the energy alone, a
+    level within the tolerance of the best one is, and the best one is twice the mean energy. td keeps the margin before
+    the contact, unless the whole window lies in the margin.  Without an acceptable peak the ends of the window are
+    tried.  A td of ``times`` (default: an even grid) replaces the chosen one if its pair is better in both error and
+    rigid time.  If nothing vibrates, all td are equally good and the last one is chosen, since it saves most.
 
     Raises
     ------
@@ -186,8 +186,8 @@ def choose_td(
 def offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
-    """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
+    """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
+    grid = np.linspace(*window, steps + 1)[1:]  # no pair is rigid before the first time
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         place = np.searchsorted(grid, peaks)
@@ -198,11 +198,14 @@ def offered_times(
     times = union(grid, peaks)
     return times[times < situation.history.time[-1]], set(
         peaks.tolist()
-    )  # a run that ends at td is no use
+    )  # a run that ends at td is useless
 
 
 def error_of(situation: Situation, best: Pair | None) -> float | None:
-    """What pairs at different td are compared by [-]; None without one, or for a level above all vibration energy."""
+    """Return the error by which pairs at different td are compared [-]; None without a pair or with a level too high.
+
+    A level is too high if it exceeds the largest possible vibration energy.
+    """
     if best is None:
         return None
     if situation.at_rest:
@@ -218,17 +221,18 @@ def error_of(situation: Situation, best: Pair | None) -> float | None:
 
 
 def as_printed(error: float | None) -> float:
-    """Give an error to the digits that people read; infinite where it is unknown."""
+    """Round an error to the digits that are shown to the user; infinite if it is unknown."""
     return np.inf if error is None else round(error, _READ)
 
 
 def _unbeaten(
     td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
 ) -> float:
-    """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
+    """Return ``td``, or a td of ``times`` whose pair is no worse in error and rigid time and better in one.
 
-    Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
-    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.  None is rigid before
+    Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
+    flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
+    be compared with the pair at td, no oscillator is searched at a td that loses without one.  No pair is rigid before
     ``earliest`` [time].
     """
     own = next(iter(_acceptable([look(td)])), None)
@@ -250,7 +254,10 @@ def _unbeaten(
 
 
 def _may_beat(there: Situation, own: Choice, error: float) -> bool:
-    """Whether a pair there may be no worse than one with that ``error``, of deformations or levels too, nor shorter."""
+    """Return True if a pair at the td of a situation may be as good as a pair with ``error``, and as long.
+
+    Pairs by deformations are not compared with pairs by levels.
+    """
     if (there.basis == "energy") != (own[0].basis == "energy"):
         return False
     share = there.kinetic_share
@@ -263,7 +270,10 @@ def _may_beat(there: Situation, own: Choice, error: float) -> bool:
 
 
 def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
-    """Give the choices there that are better than one in error or rigid time and worse in neither, as they are read."""
+    """Return the choices that are better than a given one in error or rigid time and worse in neither.
+
+    Errors are compared as printed.
+    """
     error = as_printed(error_of(*own))
     rigid = own[1].rigid_time
     found = (
@@ -282,9 +292,12 @@ def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
 def within_flight(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Give the situation that is known best in ``window``, and the part of it that keeps the margin [time].
+    """Return the situation with the best-known flight in ``window``, and the part of it that keeps the margin [time].
 
-    RangeError when the window lies outside the record.
+    Raises
+    ------
+    RangeError
+        If the window lies outside the record.
     """
     history.check(*window, argument="td_window")
     situation = _flying(look, window)
@@ -292,7 +305,10 @@ def within_flight(
 
 
 def _latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Last td in the window that keeps the margin, also as it is read; where none does, the last one in the flight."""
+    """Return the last td in the window that keeps the margin also after rounding to the printed digits.
+
+    If no td of the window keeps it, return the last td in the flight.
+    """
     low, high = window
     margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
@@ -302,12 +318,15 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
-    """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
+    """Return the last td in a window in which nothing vibrates.
+
+    It lies before the last state, and before the contact by the time that the contact may move.
+    """
     history = situation.history
     flight = situation.flight
     last = min(
         window[1], not_after(float(history.time[-2]))
-    )  # a run that ends at td is no use
+    )  # a run that ends at td is useless
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
         return last
@@ -315,25 +334,25 @@ def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
-    """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
+    """Return the first situation with the best-known flight, at the start, middle or end of the window."""
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
         if _certainty(situations[-1]) == (False, 0):
-            break  # none can be known better
+            break  # no situation can be more certain
     return min(situations, key=_certainty)
 
 
 def _certainty(situation: Situation) -> tuple[bool, int]:
-    """How well it is known that td lies in a flight, the smallest first."""
+    """Return a sort key for how certainly td lies in a flight: the smallest is the most certain."""
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
 def _by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
+    """Return the td with the longest rigid window of like residual, and the one of all acceptable pairs."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -352,9 +371,9 @@ def _by_residual(
 def _by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there.
+    """Return the td with the smallest residuals of long windows, for many modes, and the longest acceptable one.
 
-    Where no long window is good, a shorter one that is good takes its place.
+    The energy at td does not matter.  If no long window is good, a shorter good one is used.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -382,9 +401,9 @@ def _by_modes(
 def _offered_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Give the td of the least residuals, rigid for a ``share`` of the longest time; none of few times.
+    """Return the td with the smallest residuals, rigid for ``share`` of the longest time; empty for few td.
 
-    ``bounds``: the first td, the first tr and the last td [time].
+    ``bounds`` are the first td, the first tr and the last td [time].
     """
     (earliest, first, last), modes = bounds, situation.vibration.modal
     if modes is None:
@@ -400,7 +419,7 @@ def _offered_by_modes(
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
-    # the least of many is too good to be true: half of what its band adds counts too
+    # The smallest of many estimates is too optimistic: add half of the half width.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
     inner = (
         np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:]))
@@ -416,7 +435,7 @@ def _offered_by_modes(
 
 
 def _least_error(profile: Profile, first: float, last: float) -> tuple[float, float]:
-    """Least lock-in error of a tr between two times [-], and that tr [time]; infinite without one."""
+    """Return the smallest lock-in error of a tr between two times [-], and that tr [time]; infinite for none."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
@@ -428,7 +447,7 @@ def _least_error(profile: Profile, first: float, last: float) -> tuple[float, fl
 def _by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the same where only the level is known: the closer to all vibration energy, 2 <E>, the better."""
+    """Return the td by the level alone: the closer to the largest vibration energy, 2 <E>, the better."""
     mean = mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
@@ -438,7 +457,7 @@ def _by_level(
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
     best = next(
         (td for td in below if _acceptable([situation.at(td)])), None
-    )  # no oscillator is sought again
+    )  # without a search for an oscillator at each td
     if best is None:
         return None, None
     limit = falls[best] + situation.settings.tolerance
@@ -450,7 +469,7 @@ def _by_level(
 
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
-    """Give acceptable choices, the td that may be longest first, as long as another one may be longer."""
+    """Yield acceptable choices by descending bound of the rigid time, while a longer one is possible."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     most = longest_rigid_times(situation, tds)
@@ -464,7 +483,7 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """What is recommended in each situation, where that saves something."""
+    """Return the situations with their recommended pairs, without pairs that save nothing."""
     return [
         (one.situation, one.saving)
         for one in candidates_at([*situations], in_flight=True)
@@ -473,8 +492,10 @@ def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:
+    """Return the choice with the longest rigid time, of equal ones the last; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 
 def _td(pair: Choice | None) -> float | None:
+    """Return the td of a choice; None without a choice."""
     return pair[0].td if pair else None

@@ -1,8 +1,8 @@
-"""A switched run: when its parts were rigid, by which of them it is judged, and how its landings moved.
+"""Analyse a switched run: when its parts were rigid, which parts can be compared, and how its landings moved.
 
-Some solvers report a sum of densities for solids while these are rigid, and some go on with it.  When a part is
-deformable again its energy is what it was at tr, since a frozen deformation does not change: one that is further off
-than the part's largest energy without switching is reported wrongly, and the part is left out.
+While solids are rigid, some solvers report a sum of energy densities for them, and some continue with it.  A frozen
+deformation does not change, so a part that is deformable again has its energy of tr.  If the energy is off by more than
+the part's largest energy in the reference run, it is reported wrongly, and the part is left out.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 Times = tuple[float, float]
-# Evidence that tells the start of a flight to some states; the energy alone gives time away there.
+# Evidence that shows the start of a flight to within some states; the energy alone is less exact.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Parts that have no more of the momentum of a model than this share are not what moves in it.
+# A model moves although its parts do not, if the parts have less than this share of its momentum [-].
 _HARDLY: Final = 0.1
-# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
+# Number of states without kinetic energy, or with constant internal energy, that a deformable part never has in a row.
 FEWEST: Final = 12
-# An internal energy that changes by less is one value: solvers write single precision.
+# Relative change below which an internal energy is constant: solvers write single precision [-].
 SAME: Final = 1e-6
-# A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
+# A flight that begins within so many output intervals after tr began before tr, as far as the output shows.
 _SAME_STATES: Final = 3
 
 
 class Done(NamedTuple):
-    """A window in which a run was switched: the flight that it lies in, when that landed, and when it should have.
+    """A window in which a run was switched, with the flight around it, its landing and the planned landing.
 
-    ``landing`` and ``planned`` are None where no contact is seen, or no earlier run is at hand; ``step`` is the output
-    interval, below which they are the same [time].
+    ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
+    interval, below which both are equal [time].
     """
 
     tr: float
@@ -59,12 +59,12 @@ class Done(NamedTuple):
 
     @property
     def landed_rigid(self) -> bool:
-        """Whether the contact that ends the flight came while the parts were rigid."""
+        """True if the contact that ends the flight came while the parts were rigid."""
         return self.landing is not None and self.landing < self.td
 
     @property
     def took_off(self) -> float | None:
-        """When a contact ended in which the parts were rigid from tr on; None where the flight had begun [time]."""
+        """End of a contact in which the parts were rigid from tr on [time]; None if the flight had begun before tr."""
         if (
             self.flight is None
             or self.flight.start is None
@@ -77,19 +77,19 @@ class Done(NamedTuple):
 
     @property
     def rigid_in_contact(self) -> bool:
-        """Whether a contact began or ended while the parts were rigid: nothing after it is what was planned."""
+        """True if a contact began or ended while the parts were rigid: nothing after it is as planned."""
         return self.landed_rigid or self.took_off is not None
 
     @property
     def moved(self) -> float | None:
-        """How much later the run landed than planned [time]."""
+        """Delay of the landing relative to the plan [time]; None if one of both is unknown."""
         if self.landing is None or self.planned is None:
             return None
         return self.landing - self.planned
 
     @property
     def told(self) -> str:
-        """What became of it, for people."""
+        """Sentence for the user on what became of the window."""
         if self.flight is None:
             return "no flight is seen there"
         if self.took_off is not None:
@@ -109,22 +109,22 @@ class Done(NamedTuple):
 def switched_history(
     reference: Reference, done: Sequence[Times]
 ) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
-    """Take a run for a reference although its parts were rigid for some time.
+    """Prepare the history of a run whose parts were rigid for some time, so that it can serve as a reference run.
 
     Parameters
     ----------
     reference : Reference
     done : sequence of (float, float)
-        Windows (tr, td) in which it was switched, as far as they are known [time].
+        Windows (tr, td) in which the run was switched, as far as they are known [time].
 
     Returns
     -------
     history : History
-        Without the momenta of parts where a rigid body had taken these over.
+        Without the momenta of parts if a rigid body had replaced these.
     windows : tuple of (float, float)
-        Those that are done: ``done``, and others in which the parts asked for were rigid, all of them.
+        Windows that are done: ``done``, and others in which all requested parts were rigid [time].
     cautions : tuple of Caution
-        What was recognised beside ``done``, and parts that were not rigid in it.
+        Windows recognised beyond ``done``, and parts that were not rigid in ``done``.
 
     Raises
     ------
@@ -153,9 +153,9 @@ def switched_history(
 
 
 def by_the_model(history: History) -> History:
-    """Give a history without momenta of parts, of which rigid bodies have taken some.
+    """Return a history without the momenta of parts, some of which were replaced by rigid bodies.
 
-    Energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies.
+    Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
     """
     whole = tuple(
         replace(one, flying=one.chosen) for one in history.momenta if one.parts is None
@@ -164,9 +164,9 @@ def by_the_model(history: History) -> History:
 
 
 def rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Give the times in which parts are rigid, as far as their own quantities show it [time].
+    """Return the windows in which parts are rigid, as far as quantities of parts show them [time].
 
-    In a record of a rigid leg alone the parts that have energy have no mass, or none moves although the model does.
+    If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
     found = tuple((one.start, one.end) for one in _absent_times(reference))
     history = reference.history
@@ -198,7 +198,7 @@ def done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[Done, ...]:
-    """Find when the flights of windows that are done have landed, and when they landed in the run before."""
+    """Find when the flights of done windows landed, and when they were planned to land."""
     found = []
     for tr, td in windows:
         flight = _around(history, flights, tr, td)
@@ -219,7 +219,7 @@ def done_windows(
 def _around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
-    """Give the flight that shares most time with a window, None where none does."""
+    """Return the flight that shares most time with a window; None if no flight overlaps it."""
 
     def shared(flight: Flight) -> float:
         start = float(history.time[0]) if flight.start is None else flight.start
@@ -230,7 +230,13 @@ def _around(
 
 
 def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Caution]:
-    """Name the parts asked for that deform in a window; RangeError where no part was rigid, as far as parts tell."""
+    """Yield a warning with the requested parts that deform in a window.
+
+    Raises
+    ------
+    RangeError
+        If no part was rigid, as far as the files show.
+    """
     run, history, parts = *reference, _deformable(reference)
     rigid = rigid_parts(run, parts, history.time, tr, td)
     if rigid is None:
@@ -256,7 +262,7 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
 
 
 class _Absent(NamedTuple):
-    """A time in which some of the parts were ``rigid``; ``whole``: none of the others deforms."""
+    """A window in which some of the parts were ``rigid`` [time]; ``whole`` if no other part deforms."""
 
     start: float
     end: float
@@ -265,7 +271,7 @@ class _Absent(NamedTuple):
 
     @property
     def caution(self) -> Caution:
-        """What was recognised."""
+        """Warning about the rigid parts of the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
             found = f"the parts were rigid {when}, give or take an output interval: taken as done"
@@ -275,7 +281,7 @@ class _Absent(NamedTuple):
 
 
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
-    """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
+    """Return the windows in which parts have no kinetic energy while the model moves: a rigid body has it."""
     parts = _deformable(reference)
     balance = reference.history.balance
     if parts:
@@ -307,7 +313,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
 def _deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Give the chosen parts, or all, that have internal energy at the times of the history, also ``among`` others."""
+    """Return the chosen parts, or all, ``among`` others that have internal energy at the times of the history."""
     run, history = reference
     there = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
@@ -326,14 +332,14 @@ def _deformable(
 def rigid_parts(
     run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float
 ) -> NDArray[np.bool_] | None:
-    """Tell which of the parts were rigid from tr to td, shape (parts,); None where their states do not tell.
+    """Return True for each part that was rigid from tr to td, shape (parts,); None if there are too few states.
 
-    ``time`` are the times of the parts' states (n,).
+    ``time`` has the times of the parts' states, shape (n,).
     """
     inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
     inside = slice(
         inside.start + 1, max(inside.start + 1, inside.stop - 1)
-    )  # switched at the first step after tr
+    )  # the switch comes at the first step after tr
     if not parts or len(time[inside]) < FEWEST:
         return None
     energies = run.part_energies(parts)[inside]
@@ -347,9 +353,9 @@ def rigid_parts(
 
 
 class SameParts(NamedTuple):
-    """Energies of the same parts in both runs, and what to say of other parts.
+    """Energies of the same parts in both runs, with objections and notes about other parts.
 
-    ``known`` is False where the energies of all parts are reported wrongly.
+    ``known`` is False if the energies of all parts are reported wrongly.
     """
 
     reference: History
@@ -360,32 +366,32 @@ class SameParts(NamedTuple):
 
 
 def same_parts(without: Reference, switched: Reference, pair: Times) -> SameParts:
-    """Choose the parts by which a finished switched run is judged.
+    """Choose the parts by which a finished switched run is compared with its reference run.
 
     Parameters
     ----------
     without, switched : Reference
-        Runs without switching, and switched, with what was read of them: of the parts to be switched, or of the whole
-        model.
+        The reference run and the switched run, with the energies of the parts to be switched or of the whole model.
     pair : (float, float)
         tr and td [time].
 
     Returns
     -------
     SameParts
-        Of a model of which only some parts were rigid these; in any case without parts that are reported wrongly.
+        The rigid parts if only some parts of the model were rigid; never parts whose energies are reported wrongly.
     """
     as_read = SameParts(without.history, switched.history)
     try:
         parts = _deformable(without, switched.run.parts)
         return _judged(without, switched, pair, parts) if parts else as_read
-    except FormatError:  # a quantity of the parts is not in every state
+    except FormatError:  # a quantity of the parts is missing in some states
         return as_read
 
 
 def _judged(
     without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
 ) -> SameParts:
+    """Choose the parts to compare among ``parts``, with objections and notes."""
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     some = rigid is not None and bool(rigid.any()) and not rigid.all()
@@ -427,7 +433,7 @@ def _judged(
 def _reported_wrong(
     without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Give the parts whose energy after td is further off that at tr than it can be, beyond round-off."""
+    """Return the parts whose energy after td differs from that at tr by more than it can, beyond round-off."""
     time = switched.part_time
     energies = switched.part_energies(parts)
     first = (
@@ -444,4 +450,5 @@ def _reported_wrong(
 
 
 def _names(parts: Iterable[Part]) -> str:
+    """Return a list of part names for a sentence."""
     return listing([part.name for part in parts])

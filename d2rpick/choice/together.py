@@ -1,4 +1,4 @@
-"""What vibrates together with the chosen parts in a flight."""
+"""Find what vibrates together with the chosen parts in a flight."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ if TYPE_CHECKING:
 
 
 class Together:
-    """What vibrates together in a flight: whether its energy is all of what was chosen, and its kinetic energy."""
+    """Parts that vibrate together in a flight: whether all of them were chosen, and their kinetic energy."""
 
     def __init__(self, history: History, flight: Flight) -> None:
         self._history, self._flight = history, flight
 
     @cached_property
     def beside(self) -> Beside:
-        """Parts that vibrate with the chosen ones and were not chosen."""
+        """Parts that vibrate with the chosen ones but were not chosen."""
         from d2rpick.flight.vibrating import (
             vibrating_beside,
-        )  # not above: an oscillator does without it
+        )  # imported here: an oscillator does not need it
 
         return vibrating_beside(self._history, self._flight)
 
     @property
     def complete(self) -> bool:
-        """Whether all that vibrates together was chosen."""
+        """True if all parts that vibrate together were chosen."""
         return not self.beside.parts
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
+        """Kinetic energy of the parts that vibrate together, at times in the flight; None if it is not written."""
         from d2rpick.flight.vibrating import (
             kinetic_energy_of,
-        )  # not above: an oscillator does without it
+        )  # imported here: an oscillator does not need it
 
         return kinetic_energy_of(self._history, self._flight)

@@ -1,4 +1,4 @@
-"""Windows of time in which a tr is acceptable, of one run and of many."""
+"""Find the windows of time in which a tr is acceptable, for one run and for many."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Halvings of the sampling interval at an end of a window: to a millionth of it.
+# Number of halvings of the sampling interval at an end of a window: the end is exact to a millionth of it.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
@@ -31,17 +31,17 @@ def acceptable_windows(
 ) -> Samples:
     """Find the windows in which a tr is acceptable.
 
-    Every end and middle was judged by the rule of ``verify``; ends lie inside.  In between the rule cannot change:
-    between neighbouring points of the grid the energy is linear, or the deformation monotone.
+    The rule of ``verify`` is applied to both ends and the middle of each window; the ends lie inside.  Between them the
+    rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them.
+        All candidates.
     recommended : float or None
-        The tr that is recommended [time].  From some time on the error stays within the tolerance up to td: the same
-        swing, where hardly anything is saved.  That window counts only where the recommended tr lies in it.
+        The recommended tr [time].  From some time on the error stays within the tolerance up to td: on the same swing,
+        where hardly anything is saved.  That window is kept only if the recommended tr lies in it.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def acceptable_windows(
 
 
 def clear_of_td(situation: Situation, windows: Samples) -> Samples:
-    """Give the windows without what lies within one output interval of td: nothing is saved there."""
+    """Cut the windows one output interval before td: after that nothing is saved."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -83,19 +83,19 @@ def clear_of_td(situation: Situation, windows: Samples) -> Samples:
 def alike_windows(
     situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
 ) -> Samples:
-    """Find where in the acceptable windows a tr keeps the timing tolerance: its error is at most 0.05 above the chosen.
+    """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
 
-    The timing tolerance of a candidate is how far it may be off before its lock-in error grows by 0.05; on the energy
-    alone the level error counts as that does.
+    The timing tolerance of a candidate is the time by which it may be off before its lock-in error grows by 0.05.  On
+    the energy alone the level error replaces the lock-in error.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them.
+        All candidates.
     chosen : Candidate
     acceptable : array of shape (n, 2)
-        As `acceptable_windows` gave them.
+        The result of `acceptable_windows`.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def alike_windows(
 def coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count in how many runs times lie in a window.
+    """Count the runs that have a time in one of their windows.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def coverage(
     Returns
     -------
     stretches : array of shape (k, 2)
-        Stretches on which the count is the same and above zero, ascending; a single time where windows only touch.
+        Intervals of constant count above 0, ascending; a single time if windows only touch [time].
     counts : array of shape (k,)
 
     Examples
@@ -138,10 +138,10 @@ def coverage(
     steps = np.repeat([1, -1], len(ends))
     order = np.lexsort(
         (-steps, times)
-    )  # at one time windows begin before others end: ends are included
+    )  # at one time let windows start before others end, since the ends are included
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # between two windows that begin, or end, at the same time lies nothing that one would miss
+    # the gap between two windows that start, or end, at the same time is empty
     lasting = (stretches[:, 0] < stretches[:, 1]) | (
         (steps[order][:-1] > 0) & (steps[order][1:] < 0)
     )
@@ -150,7 +150,7 @@ def coverage(
 
 
 def common_windows(runs: Sequence[Samples]) -> Samples:
-    """Give the windows that all runs share, shape (k, 2) [time].
+    """Return the windows that all runs share, shape (k, 2) [time].
 
     Examples
     --------
@@ -162,14 +162,14 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Times in the flight before td between which the rule changes once at most."""
+    """Return times in the flight before td between which the rule changes at most once [time]."""
     history = situation.history
     td = situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # what may be locked in at most is passed between the samples, and is just kept there in doubles too
+    # the largest acceptable energy is passed between samples; stay just below it in floating point
     most = find_crossings(
         history.time, history.energy, (1 - _BELOW) * most_energy(situation)
     )[0]
@@ -180,7 +180,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _residual_left(situation: Situation) -> float:
-    """Lock-in error that --max-residual leaves beside the kinetic share, R^2 = L^2 + K [-]."""
+    """Return the lock-in error that --max-residual allows in addition to the kinetic fraction: R^2 = L^2 + K [-]."""
     limit = situation.settings.max_residual
     share = situation.kinetic_share
     if limit is None:
@@ -189,11 +189,11 @@ def _residual_left(situation: Situation) -> float:
         return -1.0
     return sqrt(limit - sqrt(share)) * sqrt(
         limit + sqrt(share)
-    )  # the square of a large limit is no number
+    )  # the square of a large limit overflows
 
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
-    """Windows in which the error stays at or below a level, shape (n, 2)."""
+    """Return the windows in which the error does not exceed ``level``, shape (n, 2) [time]."""
     most = most_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
@@ -213,31 +213,31 @@ def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples
     ).within
 
 
-# What a straight line between two points may be off by [-]: half of the last digit that is shown.
+# Largest error of the polyline [-]: half of the last printed digit.
 _EXACT: Final = 5e-4
-# Halvings of an interval in which the error is no straight line: the root of an energy that falls to zero is one to a
-# four-thousandth then, a parabola much sooner.
+# Number of halvings of an interval in which the error is curved: a square root at zero energy is exact to 1/4000 then,
+# a parabola much sooner.
 _HALVINGS: Final = 20
 
 
 def error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Give the error of a tr in windows as points between which it is a straight line, to within 0.0005.
+    """Return the error of a tr in windows as points of a polyline, exact to 0.0005.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them: at a crossing the level error has a kink.
+        All candidates, since the level error has a kink at a crossing.
     windows : array of shape (n, 2)
-        Of acceptable tr, ascending [time].
+        Windows of acceptable tr, ascending [time].
 
     Returns
     -------
     array of shape (2, m)
-        Times, ascending, and errors: the residual R, on the energy alone the level error, as `Candidate.error` [-].
-        Between two windows they say nothing.
+        Times, ascending, and errors: the residual R, or on the energy alone the level error, as `Candidate.error` [-].
+        The polyline means nothing between two windows.
     """
     if not windows.size:
         return np.zeros((2, 0))
@@ -260,25 +260,25 @@ def error_profile(
 
 
 def error_at(profile: Samples, time: float) -> float:
-    """Error at a time in one of the windows of a profile [-]."""
+    """Return the error at a time in one of the windows of a profile [-]."""
     return float(np.interp(time, *profile))
 
 
 def _errors(situation: Situation, times: Samples) -> Samples:
-    """Residuals, or level errors on the energy alone, of the shape of ``times`` [-]."""
+    """Return the residuals, or the level errors on the energy alone, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
 def _inside(times: Samples, windows: Samples) -> Samples:
-    """Whether each time lies in a window."""
+    """Return True for each time that lies in a window."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 
 
 def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Leave out what lies on a line: the ends of the windows stay, then the worst point between any two that stay."""
+    """Leave out points on a straight line: keep the ends of the windows, then add the worst point of each gap."""
     kept = np.flatnonzero(np.isin(times, windows))
     while True:
         off = np.abs(errors - np.interp(times, times[kept], errors[kept]))
