@@ -48,22 +48,22 @@ def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
     if situation.at_rest:
         return Kept(1.0, 1.0)
     ratios = [
-        _ratio(candidate.energy, situation.energy_td, *one)
-        for one in _vibration_energies(situation)
+        _ratio(candidate.energy, situation.energy_td, *energies)
+        for energies in _vibration_energies(situation)
     ]
-    known = [ratio for ratio in ratios if np.isfinite(ratio)]
-    if not known:
+    finite = [ratio for ratio in ratios if np.isfinite(ratio)]
+    if not finite:
         return None
-    low = min(known)
-    high = max(known)
+    low = min(finite)
+    high = max(finite)
     if situation.basis != "oscillator":
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
     # parts that were not chosen may pass on their energy
-    beside = situation.together.beside.energy
+    other_energy = situation.together.beside.energy
     return Kept(
         max(low, 0.0),
-        high + (beside / situation.energy_td if situation.energy_td > 0 else 0.0),
+        high + (other_energy / situation.energy_td if situation.energy_td > 0 else 0.0),
     )
 
 
@@ -98,7 +98,7 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     time, energy = _energies_in_flight(situation)
     mean = float(np.mean(energy))
     # share of the mean vibration energy of the flight that damping leaves at td
-    left = 1 / float(
+    damping_left = 1 / float(
         np.mean(
             np.exp(
                 np.minimum(
@@ -109,7 +109,7 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     )
     # half of the vibration energy is the mean above the static energy
     return [
-        (max(situation.energy_td - (mean - whole / 2), 0.0), left * whole)
+        (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
     ]
 
@@ -125,9 +125,9 @@ def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
     since = time - time[0]
     swing = energy - np.polyval(np.polyfit(since, energy, 2), since)
     largest = max(2 * float(energy.mean()), 0.0)
-    least = min(float(np.ptp(swing)), largest)
-    return least, max(
-        least, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
+    smallest = min(float(np.ptp(swing)), largest)
+    return smallest, max(
+        smallest, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
     )
 
 
@@ -183,6 +183,6 @@ def energy_of_next_contact(situation: Situation) -> float | None:
     end = situation.flight.end
     if end is None:
         return None
-    _, after = history.between(end, np.inf)
-    rise = float(after.max(initial=-np.inf)) - history.energy_at(end)
+    _, energies = history.between(end, np.inf)
+    rise = float(energies.max(initial=-np.inf)) - history.energy_at(end)
     return rise if rise > 0 else energy_of_approach(history, situation.flight)

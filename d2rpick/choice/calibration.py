@@ -85,12 +85,14 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
     ConfigurationError
         If there is no leg without rigid parts, or none of its elements has a class with a measured weight.
     """
-    deformable = [one for one in observations if not one.rigid_nodes]
+    deformable = [
+        observation for observation in observations if not observation.rigid_nodes
+    ]
     classes = sorted(
         {
             name
-            for one in observations
-            for name, count in one.counts.items()
+            for observation in observations
+            for name, count in observation.counts.items()
             if count and name in MEASURED
         }
     )
@@ -99,38 +101,47 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
             "no leg without rigid parts has elements of a known formulation; give such a run too"
         )
     start = _start(deformable, classes)
-    matrix, right = _rows(observations, classes)
-    scaled = matrix * start / right[:, np.newaxis]
-    found, told = _solved(scaled)
-    values = dict(zip((*classes, _REST, _RIGID), (found * start).tolist(), strict=True))
-    share = [_share(one, values) for one in deformable]
+    matrix, right_side = _rows(observations, classes)
+    scaled = matrix * start / right_side[:, np.newaxis]
+    solution, is_determined = _solved(scaled)
+    values = dict(
+        zip((*classes, _REST, _RIGID), (solution * start).tolist(), strict=True)
+    )
+    share = [_share(observation, values) for observation in deformable]
     weights = Weights(
         {name: values[name] for name in classes}, float(np.mean(share)), values[_RIGID],
         f"calibrated by {len(observations)} legs",
     )  # fmt: skip
-    misfit = float(np.sqrt(np.mean((scaled @ found - 1) ** 2)))
+    misfit = float(np.sqrt(np.mean((scaled @ solution - 1) ** 2)))
     names = (*classes, _REST, _RIGID)
     return Calibration(
-        weights, tuple(np.array(names)[told].tolist()), misfit, tuple(observations)
+        weights,
+        tuple(np.array(names)[is_determined].tolist()),
+        misfit,
+        tuple(observations),
     )
 
 
 def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples:
     """Return start values: the measured weights in the unit of these runs, the rest per node, the rigid-node cost."""
     measured = [
-        sum(MEASURED[name] * one.counts.get(name, 0.0) for name in classes)
-        for one in deformable
+        sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
+        for observation in deformable
     ]
     elements = [
-        ELEMENT_SHARE * one.total if one.elements is None else one.elements
-        for one in deformable
+        ELEMENT_SHARE * observation.total
+        if observation.elements is None
+        else observation.elements
+        for observation in deformable
     ]
     scale = float(np.median(np.array(elements) / np.array(measured)))
-    rest = [
-        max(one.total - spent, 1e-6 * one.total)
-        for one, spent in zip(deformable, elements, strict=True)
+    rests = [
+        max(observation.total - spent, 1e-6 * observation.total)
+        for observation, spent in zip(deformable, elements, strict=True)
     ]
-    per_node = float(np.median(np.array(rest) / [one.nodes for one in deformable]))
+    per_node = float(
+        np.median(np.array(rests) / [observation.nodes for observation in deformable])
+    )
     return np.array(
         [*(scale * MEASURED[name] for name in classes), per_node, scale * RIGID_NODE]
     )
@@ -140,15 +151,15 @@ def _rows(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
     """Return the matrix and the right-hand side of the equations of all legs."""
-    rows, right = [], []
-    for one in observations:
-        counts = [one.counts.get(name, 0.0) for name in classes]
-        if one.elements is not None and any(counts):
+    rows, right_side = [], []
+    for observation in observations:
+        counts = [observation.counts.get(name, 0.0) for name in classes]
+        if observation.elements is not None and any(counts):
             rows.append([*counts, 0.0, 0.0])
-            right.append(one.elements)
-        rows.append([*counts, float(one.nodes), float(one.rigid_nodes)])
-        right.append(one.total)
-    return np.array(rows), np.array(right)
+            right_side.append(observation.elements)
+        rows.append([*counts, float(observation.nodes), float(observation.rigid_nodes)])
+        right_side.append(observation.total)
+    return np.array(rows), np.array(right_side)
 
 
 def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
@@ -160,19 +171,23 @@ def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
 
     normal = scaled.T @ scaled
     resolution = np.linalg.solve(normal + _DOUBT**2 * np.eye(len(normal)), normal)
-    told = np.diag(resolution) > _TOLD
-    found = np.ones(len(normal))
-    if told.any():
-        left = 1 - scaled[:, ~told].sum(axis=1)
-        found[told] = lsq_linear(scaled[:, told], left, bounds=(0.0, np.inf)).x
-    return found, told
+    is_determined = np.diag(resolution) > _TOLD
+    solution = np.ones(len(normal))
+    if is_determined.any():
+        right_side = 1 - scaled[:, ~is_determined].sum(axis=1)
+        solution[is_determined] = lsq_linear(
+            scaled[:, is_determined], right_side, bounds=(0.0, np.inf)
+        ).x
+    return solution, is_determined
 
 
-def _share(one: Observation, values: Mapping[str, float]) -> float:
+def _share(observation: Observation, values: Mapping[str, float]) -> float:
     """Return the share of the elements in the CPU time of a step [-]."""
-    spent = sum(values.get(name, 0.0) * count for name, count in one.counts.items())
-    elements = spent if one.elements is None else one.elements
-    return min(1.0, elements / one.total)
+    spent = sum(
+        values.get(name, 0.0) * count for name, count in observation.counts.items()
+    )
+    elements = spent if observation.elements is None else observation.elements
+    return min(1.0, elements / observation.total)
 
 
 _US: Final = 1e6
@@ -196,29 +211,29 @@ def observations_of_runs(
     DeckError, FormatError
         As `observations_of`.
     """
-    found: dict[str, tuple[Observation, ...]] = {}
+    legs_by_content: dict[str, tuple[Observation, ...]] = {}
     cautions = []
     for folder in folders:
         by_file: dict[str, list[Observation]] = {}
-        for one in observations_of(folder):
-            by_file.setdefault(one.name, []).append(one)
+        for observation in observations_of(folder):
+            by_file.setdefault(observation.name, []).append(observation)
         for name, legs in by_file.items():
             with Path(name).open("rb") as stream:
                 content = hashlib.file_digest(stream, "sha256").hexdigest()
-            if content in found:
-                same = found[content][0].name
+            if content in legs_by_content:
+                same = legs_by_content[content][0].name
                 if Path(same).samefile(name):
-                    what = "is given twice"
+                    reason = "is given twice"
                 else:
-                    what = f"has the content of {same}"
+                    reason = f"has the content of {same}"
                 cautions.append(
-                    Caution("same-leg-twice", f"{name} {what}; it counts once")
+                    Caution("same-leg-twice", f"{name} {reason}; it counts once")
                 )
             else:
-                found[content] = tuple(legs)
-    return tuple(one for legs in found.values() for one in legs), tuple(
-        dict.fromkeys(cautions)
-    )
+                legs_by_content[content] = tuple(legs)
+    return tuple(
+        observation for legs in legs_by_content.values() for observation in legs
+    ), tuple(dict.fromkeys(cautions))
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:
@@ -243,13 +258,13 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
         else:
             count = "no main deck was found"
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
-    found = tuple(
+    observations = tuple(
         _of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0])
     )
-    if not found:
+    if not observations:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
         raise FormatError(f"{folder}: nothing says what the run took; {wanted}")
-    return found
+    return observations
 
 
 def _of_radioss(deck: str) -> Iterator[Observation]:
@@ -258,9 +273,9 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
     inventory = radioss_inventory.read(run)
     windows = find_run_windows(run).windows.windows
     rigid = [
-        _Rigid(one.unit.id, one.tr, one.td or np.inf)
-        for one in windows
-        if not one.unit.is_body
+        _Rigid(switched.unit.id, switched.tr, switched.td or np.inf)
+        for switched in windows
+        if not switched.unit.is_body
     ]
     start = 0.0
     for leg in run.legs:
@@ -268,7 +283,11 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
         middle = (start + leg.stop.value) / 2
         start = leg.stop.value
         if listing.is_file():
-            parts = {one.part for one in rigid if one.tr <= middle < one.td}
+            parts = {
+                switched.part
+                for switched in rigid
+                if switched.tr <= middle < switched.td
+            }
             yield _of_timing(
                 read_timing(str(listing)), inventory, dict.fromkeys(parts, 1.0)
             )
@@ -276,22 +295,24 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     """Read the CPU times of an LS-DYNA run from d3hsp and glstat."""
-    read = read_deck(deck)
-    inventory = ls_dyna_inventory.read(read)
-    windows = find_windows(read_switching(read), read_parts(read)).windows
+    content = read_deck(deck)
+    inventory = ls_dyna_inventory.read(content)
+    windows = find_windows(read_switching(content), read_parts(content)).windows
     rigid = [
-        _Rigid(one.part, one.tr, one.td or np.inf)
-        for one in windows
-        if one.part is not None
+        _Rigid(switched.part, switched.tr, switched.td or np.inf)
+        for switched in windows
+        if switched.part is not None
     ]
-    for name in sorted(
-        one.name for one in Path(deck).parent.iterdir() if one.is_file()
-    ):
-        path = str(Path(deck).parent / name)
+    folder = Path(deck).parent
+    for name in sorted(file.name for file in folder.iterdir() if file.is_file()):
+        path = str(folder / name)
         if name == "d3hsp":
-            end = _end(read)
+            end = _end(content)
             if end:
-                lasting = {one.part: (min(one.td, end) - one.tr) / end for one in rigid}
+                lasting = {
+                    window.part: (min(window.td, end) - window.tr) / end
+                    for window in rigid
+                }
             else:
                 lasting = {}
             if not rigid or end:
@@ -332,10 +353,12 @@ def _of_zones(
     for time, per_zone in zip(
         zones.time.tolist(), zones.per_zone.tolist(), strict=True
     ):
-        now = frozenset(one.part for one in rigid if one.tr < time <= one.td)
-        states.setdefault(now, []).append(per_zone)
-    for now, times in states.items():
-        counts, nodes = _computed(inventory, dict.fromkeys(now, 1.0))
+        rigid_parts = frozenset(
+            part.part for part in rigid if part.tr < time <= part.td
+        )
+        states.setdefault(rigid_parts, []).append(per_zone)
+    for rigid_parts, times in states.items():
+        counts, nodes = _computed(inventory, dict.fromkeys(rigid_parts, 1.0))
         total = float(np.median(times)) * number * _US
         yield Observation(
             zones.name, counts, len(inventory.coordinates), nodes, total, None
@@ -355,18 +378,22 @@ def _computed(
     _count(
         computed,
         inventory,
-        {part: one for part, one in inventory.counts.items() if part not in always},
+        {
+            part: counts
+            for part, counts in inventory.counts.items()
+            if part not in always
+        },
         1.0,
     )
     nodes = 0.0
     for fraction in sorted(set(lasting.values())):
         parts = [part for part, value in lasting.items() if value == fraction]
         nodes += fraction * inventory.rigid_nodes(parts)
-        within = inventory.elements_within(parts)
+        elements = inventory.elements_within(parts)
         _count(
             computed,
             inventory,
-            {part: one for part, one in within.items() if part not in always},
+            {part: counts for part, counts in elements.items() if part not in always},
             -fraction,
         )
     return computed, nodes

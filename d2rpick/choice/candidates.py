@@ -121,50 +121,53 @@ class Judged:
     objections: tuple[Objection, ...]
 
     @classmethod
-    def of(cls, situations: Sequence[Situation], each: Sequence[Moments]) -> Judged:
+    def of(
+        cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
+    ) -> Judged:
         """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure counts."""
-        sizes = [len(one) for one in each]
+        sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
-        moments = Moments.joined(each)
-        place = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
-        if len(each) == 1:  # a noisy record: keep its arrays in memory once
-            moments = each[0]
+        if len(moments_of_each) == 1:
+            # a noisy record: keep its arrays in memory once
+            moments = moments_of_each[0]
             place = np.broadcast_to(np.int32(0), sizes[0])
+        else:
+            moments = Moments.joined(moments_of_each)
+            place = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
         tr = moments.tr
-        energy, known = measured_of([one.vibration for one in situations], tr, ends)
-        still = np.array([one.at_rest for one in situations])[place]
-        level_error = measures.level_error(
-            energy, np.array([one.energy_td for one in situations])[place]
-        )
-        if still.any():  # the ratio of two round-off energies is no error
-            level_error[still] = 0.0
-            known = {
-                name: np.where(still, np.nan, column) for name, column in known.items()
+        td = np.array([situation.td for situation in situations])
+        at_rest = np.array([situation.at_rest for situation in situations])[place]
+        energy_td = np.array([situation.energy_td for situation in situations])[place]
+        vibrations = [situation.vibration for situation in situations]
+        energy, measured = measured_of(vibrations, tr, ends)
+        level_error = measures.level_error(energy, energy_td)
+        if at_rest.any():
+            # the ratio of two round-off energies is no error
+            level_error[at_rest] = 0.0
+            measured = {
+                name: np.where(at_rest, np.nan, column)
+                for name, column in measured.items()
             }
         turns = situations[0].history.turns
-        few = (
-            np.searchsorted(turns, [one.td for one in situations])[place]
-            - np.searchsorted(turns, tr, "right")
-            < 2
-        )
-        off = [
-            one.position_errors(tr[slice(*rows)])
-            for one, rows in zip(situations, pairwise(ends), strict=True)
+        turns_to_td = np.searchsorted(turns, td)[place]
+        turns_to_tr = np.searchsorted(turns, tr, "right")
+        position_errors = [
+            situation.position_errors(tr[slice(*rows)])
+            for situation, rows in zip(situations, pairwise(ends), strict=True)
         ]
+        if len(position_errors) == 1:
+            position_error = position_errors[0]
+        else:
+            position_error = np.concatenate(position_errors)
         columns = {
-            **known,
+            **measured,
             "energy": energy,
             "level_error": level_error,
-            "same_swing": few & ~still,
-            "position_error": off[0] if len(off) == 1 else np.concatenate(off),
+            "same_swing": (turns_to_td - turns_to_tr < 2) & ~at_rest,
+            "position_error": position_error,
         }
-        return cls(
-            situations,
-            place,
-            moments,
-            columns,
-            tuple(objections(situations, place, tr, columns)),
-        )
+        problems = tuple(objections(situations, place, tr, columns))
+        return cls(situations, place, moments, columns, problems)
 
     @property
     def ends(self) -> list[int]:
@@ -177,29 +180,30 @@ class Judged:
     @property
     def td(self) -> Samples:
         """The td of each candidate, shape (n,) [time]."""
-        return np.array([one.td for one in self.situations])[self.place]
+        return np.array([situation.td for situation in self.situations])[self.place]
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
         """True for each candidate without objections, shape (n,)."""
-        return np.asarray(~np.logical_or.reduce([one.holds for one in self.objections]))
+        return np.asarray(
+            ~np.logical_or.reduce([objection.holds for objection in self.objections])
+        )
 
     @property
     def kept(self) -> NDArray[np.bool_]:
         """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
         settings = self.situations[0].settings
-        found = self.acceptable
+        keeps = self.acceptable
         if settings.max_kinetic_share is not None:
             shares = [
-                np.inf if one.kinetic_share is None else one.kinetic_share
-                for one in self.situations
+                np.inf if situation.kinetic_share is None else situation.kinetic_share
+                for situation in self.situations
             ]
-            found = found & (np.array(shares) <= settings.max_kinetic_share)[self.place]
+            keeps = keeps & (np.array(shares) <= settings.max_kinetic_share)[self.place]
         if settings.max_residual is not None:
-            found = found & (
-                self.columns["residual"] <= settings.max_residual
-            )  # False if the residual is unknown, NaN
-        return found
+            # False if the residual is unknown, NaN
+            keeps = keeps & (self.columns["residual"] <= settings.max_residual)
+        return keeps
 
     @property
     def error(self) -> Samples:
@@ -217,24 +221,26 @@ class Judged:
     @property
     def modal(self) -> NDArray[np.bool_]:
         """True for each candidate that is judged by many modes, shape (n,)."""
-        return np.array([one.basis == "modal" for one in self.situations])[self.place]
+        return np.array([situation.basis == "modal" for situation in self.situations])[
+            self.place
+        ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
         """True for each candidate of many modes in the last part of the flight before td, which saves little."""
-        first = [
-            -np.inf if one.earliest_tr is None else one.earliest_tr
-            for one in self.situations
+        starts = [
+            -np.inf if situation.earliest_tr is None else situation.earliest_tr
+            for situation in self.situations
         ]
-        flown = self.td - np.array(first)[self.place]
+        flown = self.td - np.array(starts)[self.place]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
         """True for each candidate whose position error deserves a warning, shape (n,)."""
         limits = [
-            np.inf if one.bodies is None else one.bodies.limit
-            for one in self.situations
+            np.inf if situation.bodies is None else situation.bodies.limit
+            for situation in self.situations
         ]
         return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
 
@@ -281,18 +287,18 @@ class Candidates(Sequence[Candidate]):
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
-        found = {
+        values = {
             name: self.judged.columns[name][i].item()
             for name in ("residual", "level_error", "same_swing")
         }
-        residual = _known(found["residual"])
-        error = found["level_error"] if residual is None else residual
+        residual = _known(values["residual"])
+        error = values["level_error"] if residual is None else residual
         return Pair(
             self.judged.moments.tr[i].item(),
             self.situation.td,
             residual,
             error,
-            found["same_swing"],
+            values["same_swing"],
         )
 
     @property
@@ -324,26 +330,29 @@ class Candidates(Sequence[Candidate]):
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i = int(self.order[rank])
         situation = self.situation
-        found = self.judged
-        tr, kind, rising = found.moments[i]
+        judged = self.judged
+        tr, kind, rising = judged.moments[i]
         values: dict[str, Any] = {
-            name: _known(column[i].item()) for name, column in found.columns.items()
+            name: _known(column[i].item()) for name, column in judged.columns.items()
         }
-        known = (
-            values["sign_match"] is not None
-        )  # True if the deformation at tr was compared with that at td
-        values["sign_match"] = values["sign_match"] > 0 if known else None
+        # True if the deformation at tr was compared with that at td
+        is_compared = values["sign_match"] is not None
+        values["sign_match"] = values["sign_match"] > 0 if is_compared else None
         history = situation.history
         td = situation.td
         energy = values["energy"]
         if values["position_error"] is not None and situation.bodies:
             values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
-        parts = situation.vibration.part_matches(tr) if known else ()
-        against = tuple(
-            chain.from_iterable(one.told(i) for one in found.objections if one.holds[i])
+        parts = situation.vibration.part_matches(tr) if is_compared else ()
+        objections = tuple(
+            chain.from_iterable(
+                objection.told(i)
+                for objection in judged.objections
+                if objection.holds[i]
+            )
         )
-        remarks = _remarks(situation, reach, values if known else {}, parts)
+        remarks = _remarks(situation, reach, values if is_compared else {}, parts)
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
@@ -356,9 +365,9 @@ class Candidates(Sequence[Candidate]):
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            acceptable=not against,
+            acceptable=not objections,
             recommended=rank == self.recommended,
-            notes=(*against, *_SAME_SWING * values["same_swing"], *remarks),
+            notes=(*objections, *_SAME_SWING * values["same_swing"], *remarks),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
             parts=parts,
             **values,
@@ -381,21 +390,25 @@ def judged_of(
     """
     first, together = 0, 1
     while first < len(situations):
-        asked = situations[first : first + together]
+        batch = situations[first : first + together]
         starts = [
-            one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf
-            for one in asked
+            situation.earliest_tr
+            if in_flight and situation.earliest_tr is not None
+            else -np.inf
+            for situation in batch
         ]
-        found = moments_of(
-            [one.vibration for one in asked], asked[0].settings.tolerance, starts
+        moments_of_each = moments_of(
+            [situation.vibration for situation in batch],
+            batch[0].settings.tolerance,
+            starts,
         )
-        kept = [
-            _at_start(one) or _distinct(one, moments)
-            for one, moments in zip(asked, found, strict=True)
+        distinct = [
+            _at_start(situation) or _distinct(situation, moments)
+            for situation, moments in zip(batch, moments_of_each, strict=True)
         ]
-        yield Judged.of(asked, kept)
+        yield Judged.of(batch, distinct)
         first += together
-        together = max(1, min(_MORE * together, most // max(1, *map(len, kept))))
+        together = max(1, min(_MORE * together, most // max(1, *map(len, distinct))))
 
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
@@ -410,62 +423,65 @@ def _at_start(situation: Situation) -> Moments | None:
     if start is None or not situation.at_rest:
         return None
     first = max(start, float(situation.history.time[0]))
-    read = not_before(first)
-    return Moments.of("start", [read if read < situation.td else first])
+    printed = not_before(first)
+    return Moments.of("start", [printed if printed < situation.td else first])
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
     """Mark each given tr as a match if a match lies there, since its accuracy does not depend on who names it."""
-    given = moments.are("given")
+    is_given = moments.are("given")
     vibration = situation.vibration
-    if situation.at_rest or not (given.any() and vibration.profile):
+    if situation.at_rest or not (is_given.any() and vibration.profile):
         return moments
-    found = _distinct(situation, vibration.moments(situation.settings.tolerance))
-    if not found.are("match").any():
+    matches = _distinct(situation, vibration.moments(situation.settings.tolerance))
+    if not matches.are("match").any():
         return moments
-    nearest = found.at(np.array([np.abs(found.tr - tr).argmin() for tr in moments.tr]))
-    same = given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
+    nearest = matches.at(
+        np.array([np.abs(matches.tr - tr).argmin() for tr in moments.tr])
+    )
+    same = is_given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
     return Moments(
         moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising
     )
 
 
-def _distinct(situation: Situation, found: Moments) -> Moments:
+def _distinct(situation: Situation, moments: Moments) -> Moments:
     """Return the moments in time order, without matches next to a crossing or an extremum."""
-    matches = found.are("match")
+    matches = moments.are("match")
     if matches.any():
-        kept = ~matches
-        of_level = found.tr[~matches]
-        for place in np.flatnonzero(matches).tolist():
-            kept[place] = np.all(
-                np.abs(of_level - found.tr[place]) > situation.history.step
+        is_distinct = ~matches
+        of_level = moments.tr[~matches]
+        for row in np.flatnonzero(matches).tolist():
+            is_distinct[row] = np.all(
+                np.abs(of_level - moments.tr[row]) > situation.history.step
             )
-        found = found.at(kept)
-    if np.all(found.tr[1:] >= found.tr[:-1]):
-        return found
-    return found.at(np.argsort(found.tr, kind="stable"))
+        moments = moments.at(is_distinct)
+    if np.all(moments.tr[1:] >= moments.tr[:-1]):
+        return moments
+    return moments.at(np.argsort(moments.tr, kind="stable"))
 
 
 def _remarks(
     situation: Situation,
     reach: float,
-    known: Mapping[str, Any],
+    measured: Mapping[str, Any],
     parts: Sequence[PartMatch],
 ) -> Iterator[str]:
     """Yield notes on a tr that do not concern its acceptance."""
-    if not (known or situation.vibration.unknown or situation.at_rest):
+    if not (measured or situation.vibration.unknown or situation.at_rest):
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
-    if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
+    if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
+        # imported here: a table has no parts
         from d2rpick.vibration.part_signs import (
             main_contributors,
-        )  # imported here: a table has no parts
+        )
 
         yield f"mismatch of {main_contributors(parts)}"
-    if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
-        yield f"residual up to {known['residual_high']:.2g} if the record hides a further mode"
-    if known and reach > known["timing_tolerance"]:
-        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known['timing_tolerance']:.2g}"
-    if not known and reach >= situation.history.step:
+    if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
+        yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
+    if measured and reach > measured["timing_tolerance"]:
+        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {measured['timing_tolerance']:.2g}"
+    if not measured and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
 
 

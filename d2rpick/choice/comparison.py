@@ -95,7 +95,7 @@ def compare(
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
     judged = same_parts(reference, switched, pair)
-    found = compare_runs(
+    comparison = compare_runs(
         judged.reference,
         judged.switched,
         pair,
@@ -108,9 +108,9 @@ def compare(
         known=judged.known,
         min_mean=min_mean,
     )
-    return found._replace(
-        objections=(*judged.objections, *found.objections),
-        notes=(*judged.notes, *found.notes),
+    return comparison._replace(
+        objections=(*judged.objections, *comparison.objections),
+        notes=(*judged.notes, *comparison.notes),
     )
 
 
@@ -158,29 +158,34 @@ def compare_runs(
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    after = switched.between(td, end)[1]
+    energies_after = switched.between(td, end)[1]
     reference_after = reference.between(td, end)[1]
-    _refuse_few(reference, switched, min(after.size, reference_after.size), td, end)
-    before = switched.energy[switched.time < td]
-    rest = switched.between(td, np.inf)[1]
-    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
-        after = after[1:]
-        rest = rest[
-            1:
-        ]  # the switch comes at the first step from td on: this state was still rigid
-    frozen = float(after[0])
-    wanted = reference.energy_at(td)
+    _refuse_few(
+        reference, switched, min(energies_after.size, reference_after.size), td, end
+    )
+    energies_before = switched.energy[switched.time < td]
+    energies_to_end = switched.between(td, np.inf)[1]
+    if (
+        energies_before.size
+        and energies_after[0] == energies_before[-1]
+        and _reported_wrong(energies_before[-1], energies_to_end[1:])
+    ):
+        energies_after = energies_after[1:]
+        # the switch comes at the first step from td on: this state was still rigid
+        energies_to_end = energies_to_end[1:]
+    frozen = float(energies_after[0])
+    energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
-    if before.size and _reported_wrong(before[-1], rest):
-        found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
-        notes.append(f"{found}; some solvers report rigid solid elements wrongly")
+    if energies_before.size and _reported_wrong(energies_before[-1], energies_to_end):
+        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, at td {frozen:.6g} came back"
+        notes.append(f"{reported}; some solvers report rigid solid elements wrongly")
     still = _still(reference, switched, tr, td)
     error = _relative(*momenta, td, end)
     rigid = _rigid_window(switched, tr, td, still)
-    mean, mean_reference = float(after.mean()), float(reference_after.mean())
+    mean, mean_reference = float(energies_after.mean()), float(reference_after.mean())
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
-        objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
+        objections += _not_locked_in(reference, tr, frozen, energy_td, tolerance)
         if mean_reference > round_off(reference):
             objections += _another_mean(mean / mean_reference, min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
@@ -189,12 +194,12 @@ def compare_runs(
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
-        energy_td=wanted,
-        energy_ratio=frozen / wanted if wanted > 0 else None,
+        energy_td=energy_td,
+        energy_ratio=frozen / energy_td if energy_td > 0 else None,
         end=end,
         mean_after=mean,
         mean_after_reference=mean_reference,
-        spread_after=float(after.std()),
+        spread_after=float(energies_after.std()),
         spread_after_reference=float(reference_after.std()),
         momentum_error=error,
         displacement=_distance(*centres, td, end),
@@ -217,8 +222,8 @@ def _refuse_few(
             raise RangeError(
                 f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
             )
-        found = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{name}: {found}; too few to compare the runs")
+        states_text = f"fewer than 3 states from td {td:g} to {end:g}"
+        raise RangeError(f"{name}: {states_text}; too few to compare the runs")
 
 
 def _still(reference: History, switched: History, tr: float, td: float) -> float:
@@ -226,11 +231,11 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _range(reference, tr, td)
-    least = round_off(reference)
+    rounding = round_off(reference)
     return max(
         digits,
-        least
-        if level + vibrates <= least
+        rounding
+        if level + vibrates <= rounding
         else min(_STILL * level, _STILL_OF_VIBRATION * vibrates),
     )
 
@@ -282,24 +287,24 @@ def _not_rigid(
         yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
         return
 
-    def longer(start: float, end: float) -> bool:
+    def lasts_longer(start: float, end: float) -> bool:
         return end - start > room and _range(reference, start, end) > limit
 
     if (
         rigid[0] > tr + room
         or rigid[1] < td - room
-        or longer(rigid[0], tr)
-        or longer(td, rigid[1])
+        or lasts_longer(rigid[0], tr)
+        or lasts_longer(td, rigid[1])
     ):
-        found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
-        yield f"{found}, not from tr {tr:g} to td {td:g}"
+        rigid_text = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
 def _not_locked_in(
-    reference: History, tr: float, frozen: float, wanted: float, tolerance: float
+    reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
     """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
-    if max(frozen, wanted) <= round_off(reference):
+    if max(frozen, energy_td) <= round_off(reference):
         return  # nothing vibrates: the error of nothing means nothing
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
@@ -308,15 +313,17 @@ def _not_locked_in(
             f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
-    if measures.level_error(frozen, wanted) > tolerance:
-        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+    if measures.level_error(frozen, energy_td) > tolerance:
+        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {energy_td:.6g}"
 
 
-def _another_mean(share: float, least: float) -> Iterator[str]:
+def _another_mean(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
-    if not least <= share <= 2 - least:
-        found = f"the mean energy after td is {share:.2g} times that of the reference"
-        yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
+    if not min_mean <= share <= 2 - min_mean:
+        mean_text = (
+            f"the mean energy after td is {share:.2g} times that of the reference"
+        )
+        yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
 
 
 def times_of(switched: History, reference: History) -> tuple[float, float]:
@@ -337,59 +344,66 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST)
-    spans = [(max(one.start - 1, 0), one.stop - 1) for one in still]
-    least = round_off(reference)
+    spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
+    rounding = round_off(reference)
     moving = [
         (first, last)
         for first, last in spans
         if _range(reference, float(time[first]), float(time[last]))
-        > max(least, 2 * limit[first : last + 1].max())
+        > max(rounding, 2 * limit[first : last + 1].max())
     ]
     if not moving:
-        found = "its energy stands still nowhere, or that of the reference does so too"
+        reason = "its energy stands still nowhere, or that of the reference does so too"
         cure = switched.left_beside or "; give `tr` and `td`"
-        raise RangeError(f"{', '.join(switched.source)}: {found}{cure}")
-    first, last = max(moving, key=lambda one: time[one[1]] - time[one[0]])
-    before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
-    tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]
+        raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
+    first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
+    times_before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
+    tr = times_before[
+        np.abs(reference.energies_at(times_before) - energy[first]).argmin()
+    ]
     return float(tr), float(time[last])
 
 
-def _reported_wrong(rigid: float, after: Samples) -> bool:
+def _reported_wrong(rigid: float, energies_after: Samples) -> bool:
     """Return True if the energy reported while rigid differs from the energy at td."""
-    usual = np.abs(np.diff(after)).max()
-    return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
+    usual = np.abs(np.diff(energies_after)).max()
+    return bool(
+        abs(rigid - energies_after[0])
+        > max(usual, _REPORTED_OFF * abs(energies_after[0]))
+    )
 
 
 def _relative(
-    reference: Track | None, other: Track | None, td: float, end: float
+    reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
     """Return the largest distance between two tracks over the largest size of the reference track [-]."""
-    distance = _distance(reference, other, td, end)
+    distance = _distance(reference, switched, td, end)
     if reference is None or distance is None:
         return None
     sizes = np.linalg.norm(reference.values, axis=1)
-    there = sizes[(reference.time >= td) & (reference.time <= end)]
-    largest = max(float(there.max(initial=0.0)), _AT_REST * float(sizes.max()))
+    sizes_after = sizes[(reference.time >= td) & (reference.time <= end)]
+    largest = max(float(sizes_after.max(initial=0.0)), _AT_REST * float(sizes.max()))
     return distance / largest if largest > 0 else None
 
 
 def _distance(
-    reference: Track | None, other: Track | None, td: float, end: float
+    reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
     """Return the largest distance of the second track from the first between two times; None if one is missing.
 
     The first state from td on is left out, since it may still be rigid.
     """
-    if reference is None or other is None:
+    if reference is None or switched is None:
         return None
-    inside = np.flatnonzero((other.time >= td) & (other.time <= end))[1:]
+    inside = np.flatnonzero((switched.time >= td) & (switched.time <= end))[1:]
     if not inside.size:
         return None
-    there = [
-        np.interp(other.time[inside], reference.time, column)
+    reference_values = [
+        np.interp(switched.time[inside], reference.time, column)
         for column in reference.values.T
     ]
     return float(
-        np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max()
+        np.linalg.norm(
+            switched.values[inside] - np.stack(reference_values, axis=1), axis=1
+        ).max()
     )

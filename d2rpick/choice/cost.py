@@ -147,16 +147,18 @@ class CostModel:
 
     def share_of(self, part: int) -> Share:
         """Return the share of a part's elements in the cost of all elements [-]."""
-        own = self.of_part(part)
+        cost_of_part = self.of_part(part)
         total = self.total
-        return self._share(own, own.cost / total.cost if total.cost else 0.0)
+        return self._share(
+            cost_of_part, cost_of_part.cost / total.cost if total.cost else 0.0
+        )
 
     def saved(self, parts: Collection[int]) -> Share:
         """Return the share c of a step saved while ``parts`` are rigid [-]; unknown for parts not in the deck."""
         if absent := sorted(set(parts) - self.inventory.parts.keys()):
             return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
-        within = self.inventory.elements_within(parts)
-        rigid = _sum(self._of(part, counts) for part, counts in within.items())
+        elements = self.inventory.elements_within(parts)
+        rigid = _sum(self._of(part, counts) for part, counts in elements.items())
         total = self.total
         nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
         return self._share(
@@ -166,16 +168,17 @@ class CostModel:
     @property
     def assumed(self) -> tuple[str, ...]:
         """Formulations of the deck that have the weight of a similar formulation."""
-        found = dict.fromkeys(
-            one.name
-            for part, counts in self.inventory.counts.items()
-            if part not in self._rigid
-            for one in (self.inventory.formulation(part, kind) for kind in counts)
-            if one.cost is not None
-            and not one.measured
-            and one.name not in self.weights.per_element
-        )
-        return tuple(found)
+        names: dict[str, None] = {}
+        for part, counts in self.inventory.counts.items():
+            if part in self._rigid:
+                continue
+            for kind in counts:
+                formulation = self.inventory.formulation(part, kind)
+                if formulation.cost is None or formulation.measured:
+                    continue
+                if formulation.name not in self.weights.per_element:
+                    names[formulation.name] = None
+        return tuple(names)
 
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
         """Return the cost of elements of a part, by class and number."""
@@ -197,7 +200,7 @@ class CostModel:
                 ) * count
         return Amount(cost, tuple(unknown))
 
-    def _share(self, own: Amount, value: float) -> Share:
+    def _share(self, amount: Amount, value: float) -> Share:
         """Return a share if the weights of all elements are known, else None with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
@@ -208,7 +211,7 @@ class CostModel:
                 if self.inventory.notes
                 else None,
             )
-        if unknown := sorted({*own.unknown, *self.total.unknown}):
+        if unknown := sorted({*amount.unknown, *self.total.unknown}):
             return Share(
                 None,
                 f"no weight is known for {', '.join(unknown)}; give one with `weights`",
@@ -220,9 +223,9 @@ def _sum(amounts: Iterable[Amount]) -> Amount:
     """Return the sum of costs, with all formulations without a weight."""
     cost = 0.0
     unknown = list[str]()
-    for one in amounts:
-        cost += one.cost
-        unknown += one.unknown
+    for amount in amounts:
+        cost += amount.cost
+        unknown += amount.unknown
     return Amount(cost, tuple(dict.fromkeys(unknown)))
 
 
@@ -244,31 +247,31 @@ def read_weights(path: str) -> Weights:
 
     try:
         content = Path(path).read_bytes()
-        found = tomllib.loads(content.decode("utf-8"))
+        values = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ConfigurationError(
             f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
         ) from None
-    if unknown := [key for key in found if key not in _KEYS]:
+    if unknown := [key for key in values if key not in _KEYS]:
         raise ConfigurationError(
             f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}"
         )
-    per_element = found.get("per_element")
+    per_element = values.get("per_element")
     if not isinstance(per_element, dict) or not per_element:
         raise ConfigurationError(
             f"{path}: no table [per_element], the cost of each formulation was expected there"
         )
-    given: dict[str, Any] = {
-        key: _number(path, key, found[key]) for key in _NUMBERS if key in found
+    numbers: dict[str, Any] = {
+        key: _number(path, key, values[key]) for key in _NUMBERS if key in values
     }
     weights = {name: _number(path, name, value) for name, value in per_element.items()}
     try:
         return Weights(
             weights,
-            source=str(found.get("source", path)),
+            source=str(values.get("source", path)),
             file=Source(path, content),
-            **given,
+            **numbers,
         )
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None

@@ -52,9 +52,8 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 
 def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
     """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
-    whole = len(parts) > 1 or any(
-        body.whole for body in bodies
-    )  # a single part may consist of pieces
+    # a single part may consist of pieces
+    whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
@@ -65,18 +64,22 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     have energy.
     """
     titled = [
-        one
-        for one in run.parts
-        if one.id in inventory.parts and one.title and _title(one, inventory)
+        part
+        for part in run.parts
+        if part.id in inventory.parts and part.title and _title(part, inventory)
     ]
-    other = [one for one in titled if _differ(one.title, _title(one, inventory))]
-    found = _named(other, inventory) if 2 * len(other) > len(titled) else ""
-    known = inventory.parts.keys() | inventory.history_groups
-    absent = [one for one in run.parts if one.id not in known]
-    if not found and inventory.complete and _has_energy(run, absent):
-        found = f"{name_units(one.id for one in absent)} of the history {are(absent)} not in the deck"
-    told = f"{found}: nothing of the deck is used; name that of the run"
-    return Caution("deck-of-another-model", told) if found else None
+    differing = [
+        part for part in titled if _differ(part.title, _title(part, inventory))
+    ]
+    difference = (
+        _named(differing, inventory) if 2 * len(differing) > len(titled) else ""
+    )
+    ids_in_deck = inventory.parts.keys() | inventory.history_groups
+    absent = [part for part in run.parts if part.id not in ids_in_deck]
+    if not difference and inventory.complete and _has_energy(run, absent):
+        difference = f"{name_units(part.id for part in absent)} of the history {are(absent)} not in the deck"
+    text = f"{difference}: nothing of the deck is used; name that of the run"
+    return Caution("deck-of-another-model", text) if difference else None
 
 
 def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
@@ -86,15 +89,15 @@ def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if some parts have other titles in the deck than in the history."""
-    other = [
+    differing = [
         part
         for part in parts
         if part.id in inventory.parts and _differ(part.title, _title(part, inventory))
     ]
-    if other:
+    if differing:
         yield Caution(
             "deck-of-another-model",
-            f"{_named(other, inventory)}: is this the deck of the run?",
+            f"{_named(differing, inventory)}: is this the deck of the run?",
         )
 
 
@@ -102,13 +105,13 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
     """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
-            more = f" and {len(inventory.ties) - 1} more ties"
+            more_ties = f" and {len(inventory.ties) - 1} more ties"
         else:
-            more = ""
-        found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
+            more_ties = ""
+        ties_text = f"{inventory.ties[0]}{more_ties} may join parts that share no nodes, which is not followed"
         yield Caution(
             "ties-not-followed",
-            f"{found}; parts that are tied belong in one rigid body",
+            f"{ties_text}; parts that are tied belong in one rigid body",
         )
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
     if inventory.solver != "ls-dyna":
@@ -140,20 +143,22 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
         if part in inventory.parts and not inventory.parts[part].section.turns
     ]
     if unturned and inventory.solver == "radioss":
-        found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
+        parts_text = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
         yield Caution(
-            "stresses-unturned", f"{found}; expect an error after a large rotation"
+            "stresses-unturned", f"{parts_text}; expect an error after a large rotation"
         )
 
 
 def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if a deck keeps parts rigid that deform in the history."""
-    left = inventory.left_rigid
-    if left and _has_energy(run, [part for part in run.parts if part.id in left.parts]):
-        where = f"{left.place.file}:{left.place.line}"
+    left_rigid = inventory.left_rigid
+    if left_rigid and _has_energy(
+        run, [part for part in run.parts if part.id in left_rigid.parts]
+    ):
+        where = f"{left_rigid.place.file}:{left_rigid.place.line}"
         yield Caution(
             LEFT_RIGID,
-            f"{where}: {left.found}, which deform in the history; {left.way_out}",
+            f"{where}: {left_rigid.found}, which deform in the history; {left_rigid.way_out}",
         )
 
 
@@ -166,11 +171,11 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
         yield Caution("weights-by-analogy", taken)
 
 
-def _named(other: Sequence[Part], inventory: Inventory) -> str:
+def _named(differing: Sequence[Part], inventory: Inventory) -> str:
     """Describe the first of the parts whose titles differ."""
-    first = other[0]
-    more = f", and {len(other) - 1} more" if len(other) > 1 else ""
-    return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
+    first = differing[0]
+    more_parts = f", and {len(differing) - 1} more" if len(differing) > 1 else ""
+    return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more_parts}"
 
 
 def _title(part: Part, inventory: Inventory) -> str:
@@ -178,12 +183,14 @@ def _title(part: Part, inventory: Inventory) -> str:
     return inventory.parts[part.id].title
 
 
-def _differ(one: str, other: str) -> bool:
+def _differ(first_title: str, second_title: str) -> bool:
     """Return True if two titles differ, except in spaces, case, and length if one is cut off.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
-    plain = ("".join(filter(str.isascii, title)) for title in (one, other))
+    plain = (
+        "".join(filter(str.isascii, title)) for title in (first_title, second_title)
+    )
     first, second = (" ".join(title.split()).casefold() for title in plain)
     shorter = min(len(first), len(second))
     return first[:shorter] != second[:shorter]
@@ -200,9 +207,14 @@ def with_deck(
     if foreign := of_another_model(reference.run, inventory):
         return replace(settings, bodies=()), (foreign,)
     ids = [part.id for part in reference.history.parts or ()]
-    told = (*doubts_of_solver(ids, inventory), *left_rigid_in(reference.run, inventory))
+    doubts_of_parts = (
+        *doubts_of_solver(ids, inventory),
+        *left_rigid_in(reference.run, inventory),
+    )
     ruined = tuple(
-        RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS
+        RUINS[code]
+        for code in dict.fromkeys(caution.code for caution in doubts_of_parts)
+        if code in RUINS
     )
     history = reference.history
     settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
@@ -212,27 +224,27 @@ def with_deck(
             open_ = [Caution("cost-unknown", f"the run time stays open: {why}")]
         else:
             open_ = []
-        return replace(settings, bodies=()), (*told, *open_)
-    asked = settings.cost_share is None
-    share = model.saved(ids) if asked else Share(settings.cost_share)
-    found = replace(
+        return replace(settings, bodies=()), (*doubts_of_parts, *open_)
+    is_computed = settings.cost_share is None
+    share = model.saved(ids) if is_computed else Share(settings.cost_share)
+    with_cost = replace(
         settings,
         cost_share=share.value,
         bodies=bodies_of(inventory, ids),
         placement=Placement(inventory),
-        by_deck=ByDeck(inventory.files, model.weights if asked else None),
+        by_deck=ByDeck(inventory.files, model.weights if is_computed else None),
     )
     doubts = [
         *doubts_of(history.parts, inventory),
-        *doubts_of_cost(model, used=asked and share.value is not None),
+        *doubts_of_cost(model, used=is_computed and share.value is not None),
         *doubts_of_bodies(ids, inventory),
-        *told,
+        *doubts_of_parts,
     ]
     if share.reason:
         doubts.append(
             Caution("cost-unknown", f"the run time stays open: {share.reason}")
         )
-    return found, tuple(doubts)
+    return with_cost, tuple(doubts)
 
 
 def in_deck(run: Run, inventory: Inventory | None) -> Run:
@@ -260,22 +272,24 @@ def _surroundings(inventory: Inventory) -> Surroundings:
 
 def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
     """Return the groups of connected parts; empty if parts may be missing, or ties may join the groups."""
-    known = inventory.complete and not inventory.ties
-    return inventory.bodies(inventory.nodes_by_part.keys()) if known else ()
+    is_complete = inventory.complete and not inventory.ties
+    return inventory.bodies(inventory.nodes_by_part.keys()) if is_complete else ()
 
 
 def _supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
     """Return the supports with their names and times, each once."""
-    return tuple(dict.fromkeys(Support(one.name, one.start, one.end) for one in holds))
+    return tuple(
+        dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
+    )
 
 
 def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Yield the possible accelerations of gravity for each part for which they are known."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
-        acting = [(one, _acts(one, part, nodes)) for one in loads or ()]
+        acting = [(load, _acts(load, part, nodes)) for load in loads or ()]
         if all(acts is not None for _, acts in acting):
-            together = _together([one for one, acts in acting if acts])
+            together = _together([load for load, acts in acting if acts])
             if together is not None:
                 yield part, together
 
@@ -292,11 +306,11 @@ def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
     """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
         return tuple(
-            sorted({abs(value) for one in loads for value in one.values} or {0.0})
+            sorted({abs(value) for load in loads for value in load.values} or {0.0})
         )
-    if any(one.axis is None or len(one.values) > 1 for one in loads):
+    if any(load.axis is None or len(load.values) > 1 for load in loads):
         return None
     along = [
-        sum(one.values[0] for one in loads if one.axis == axis) for axis in range(3)
+        sum(load.values[0] for load in loads if load.axis == axis) for axis in range(3)
     ]
     return (float(np.linalg.norm(along)),)

@@ -39,8 +39,8 @@ def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
     ):
         return
     oftener = listing([name for name in _OFTENER if name != history.energy_format])
-    found = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
+    text = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
     yield Caution(
         "few-states",
-        f"{found}, so its level at td is unsure; name what was written more often: {oftener}",
+        f"{text}, so its level at td is unsure; name what was written more often: {oftener}",
     )

@@ -48,7 +48,7 @@ def longest_flight(
         return otherwise
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
-        found = (
+        reason = (
             held or "nothing in the record shows a flight, in which td could be chosen"
         )
         if settings.after is not None:
@@ -56,9 +56,12 @@ def longest_flight(
         else:
             cure = "give the end of the load as `after` where it is known"
         cure = "only what nothing holds can be switched" if held else cure
-        raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
+        raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
-    (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
+    (start, end), longest = max(
+        windows,
+        key=lambda window_and_flight: window_and_flight[0][1] - window_and_flight[0][0],
+    )
     latest = last_td(end, margin_of(history, longest, settings, fits).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
@@ -98,59 +101,73 @@ def flights_of(
             history, settings, _flights_of(history, settings, fits), fits
         )
     history.check(landing, argument="landing")
-    found = _flights_of(history, replace(settings, landing=None), fits)
-    last = _last_before(landing, found)
+    flights = _flights_of(history, replace(settings, landing=None), fits)
+    last = _last_before(landing, flights)
     if last and landing <= last.within(history.time)[1]:
-        found = tuple(
-            one._replace(end=landing) if one is last else one for one in found
+        flights = tuple(
+            flight._replace(end=landing) if flight is last else flight
+            for flight in flights
         )
-        return _with_given_start(history, settings, found, fits)
+        return _with_given_start(history, settings, flights, fits)
     from d2rpick.choice.situation import examine
 
-    before = examine(history, landing, settings, fits).flight
-    if before.end == landing and not before.refusal:
-        return _in_order(history, found, before)
-    return found
+    landing_flight = examine(history, landing, settings, fits).flight
+    if landing_flight.end == landing and not landing_flight.refusal:
+        return _in_order(history, flights, landing_flight)
+    return flights
 
 
 def _with_given_start(
-    history: History, settings: Settings, found: tuple[Flight, ...], fits: Fits | None
+    history: History, settings: Settings, flights: tuple[Flight, ...], fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Add the flight that starts at the end of the load given by the user, unless a flight contains that time."""
-    after = settings.after
+    load_end = settings.after
     last = float(history.time[-1])
-    windows = [one.within(history.time) for one in found]
-    if after is None or any(start <= after < end for start, end in windows):
-        return found
+    windows = [flight.within(history.time) for flight in flights]
+    if load_end is None or any(start <= load_end < end for start, end in windows):
+        return flights
     from d2rpick.choice.situation import examine
 
-    end = min((start for start, _ in windows if start > after), default=last)
+    end = min((start for start, _ in windows if start > load_end), default=last)
     end = end if settings.landing is None else min(end, settings.landing)
-    given = examine(history, (after + end) / 2, settings, fits).flight
-    if given.source != "given" or given.refusal or given.start != after:
-        return found
+    given_flight = examine(history, (load_end + end) / 2, settings, fits).flight
+    if (
+        given_flight.source != "given"
+        or given_flight.refusal
+        or given_flight.start != load_end
+    ):
+        return flights
     return _in_order(
         history,
-        found,
-        given if given.end is not None or end == last else given._replace(end=end),
+        flights,
+        given_flight
+        if given_flight.end is not None or end == last
+        else given_flight._replace(end=end),
     )
 
 
 def _in_order(
-    history: History, found: tuple[Flight, ...], given: Flight
+    history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
     """Return flights ascending in time, with the given flight replacing those that it overlaps."""
-    first, last = given.within(history.time)
-    windows = ((one, *one.within(history.time)) for one in found)
-    others = [one for one, start, end in windows if end <= first or start >= last]
-    return tuple(sorted((*others, given), key=lambda one: one.within(history.time)))
+    first, last = given_flight.within(history.time)
+    windows = ((flight, *flight.within(history.time)) for flight in flights)
+    kept_flights = [
+        flight for flight, start, end in windows if end <= first or start >= last
+    ]
+    return tuple(
+        sorted(
+            (*kept_flights, given_flight),
+            key=lambda flight: flight.within(history.time),
+        )
+    )
 
 
 def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
     """Return the last flight that starts before a landing [time]; None without one."""
     return max(
-        (one for one in flights if (one.start or 0.0) < landing),
-        key=lambda one: one.start or 0.0,
+        (flight for flight in flights if (flight.start or 0.0) < landing),
+        key=lambda flight: flight.start or 0.0,
         default=None,
     )
 
@@ -159,22 +176,23 @@ def _flights_of(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
-    seen = all_seen(history)
-    if seen:
+    witnessed = all_seen(history)
+    if witnessed:
         return tuple(
             Flight(
-                one.start,
-                one.end if one.end_seen else None,
+                window.start,
+                window.end if window.end_seen else None,
                 source,
-                one.parts,
-                one.damping,
-                gravity=one.gravity,
+                window.parts,
+                window.damping,
+                gravity=window.gravity,
             )
-            for source, one in seen
+            for source, window in witnessed
         )
+    # imported here: evidence better than the energy does not need it
     from d2rpick.choice.situation import (
         looking,
-    )  # imported here: evidence better than the energy does not need it
+    )
 
     look = looking(history, settings, fits)
     if settings.replay and not witnesses(history):
@@ -183,25 +201,24 @@ def _flights_of(
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                return (
-                    flight,
-                )  # it ends with the vibration, also if its start is given
+                # it ends with the vibration, also if its start is given
+                return (flight,)
         look = looking(history, replace(settings, replay=False))
-    found: list[Flight] = []
-    for td in sorted(
-        moments(history.time), reverse=True
-    ):  # the last quiet time before td shows most of the flight
-        if found and found[-1].start is not None and td > found[-1].start:
+    flights: list[Flight] = []
+    # the last quiet time before td shows most of the flight
+    for td in sorted(moments(history.time), reverse=True):
+        if flights and flights[-1].start is not None and td > flights[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
         # a flight that lasts into the next one misses the load between them, so its end is unknown
         lasts = (
-            found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
+            flights
+            and flight.within(history.time)[1] > flights[-1].within(history.time)[0]
         )
         if situation.in_flight and not flight.refusal and not lasts:
-            found.append(flight)
-    return tuple(reversed(found))
+            flights.append(flight)
+    return tuple(reversed(flights))
 
 
 def momentum_of_flight(history: History) -> dict[str, Samples]:
@@ -212,20 +229,26 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
     """
     import numpy as np
 
+    # imported here: most evidence does not need it
     from d2rpick.flight.momentum import (
         all_flights,
         to_be_asked,
-    )  # imported here: most evidence does not need it
+    )
 
-    asked = [
-        one
-        for one in to_be_asked(history.momenta)
-        if np.array_equal(one.time, history.time)
+    momenta_at_states = [
+        momenta
+        for momenta in to_be_asked(history.momenta)
+        if np.array_equal(momenta.time, history.time)
     ]
-    if not asked:
+    if not momenta_at_states:
         return {}
     momenta = next(
-        (one for one in asked if all_flights(one, history.balance)), asked[0]
+        (
+            momenta
+            for momenta in momenta_at_states
+            if all_flights(momenta, history.balance)
+        ),
+        momenta_at_states[0],
     )
     flights = all_flights(momenta, history.balance)
     members = momenta.chosen

@@ -145,14 +145,15 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
     if not any("T0" in name for name in sources):  # not an engine run of Radioss
         return
+    # imported here: other histories do not need it
     from d2rpick.histories.listings import (
         wrong_energies,
-    )  # imported here: other histories do not need it
+    )
 
-    if found := list(wrong_energies(sources)):
+    if listings := list(wrong_energies(sources)):
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
-        told = f"{found[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
-        yield Caution(WRONG_ENERGY, told)
+        text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        yield Caution(WRONG_ENERGY, text)
 
 
 def _above(value: float | None, limit: float) -> bool:
@@ -205,11 +206,11 @@ def _peak(balance: Balance) -> float | None:
     """Return the peak of the internal energy [energy]; None if it is unknown or tiny."""
     if balance.internal is None:
         return None
-    most = largest(
+    highest = largest(
         balance.internal, balance.kinetic, balance.total, balance.external_work
     )
     peak = float(balance.internal.max())
-    return peak if peak > max(_FLOOR, _TINY_SHARE * most) else None
+    return peak if peak > max(_FLOOR, _TINY_SHARE * highest) else None
 
 
 def _share(energy: Samples | None, peak: float | None) -> float | None:
@@ -228,14 +229,16 @@ def _without_friction(balance: Balance) -> Samples | None:
 
 def _worst_part(balance: Balance) -> dict[str, Any]:
     """Return the largest hourglass share of a part, and the part, as fields of `Health`."""
-    least = max(
+    smallest_peak = max(
         _FLOOR,
         _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0),
     )
-    shares = [(h / e, part) for part, h, e in balance.hourglass_of_parts if e > least]
+    shares = [
+        (h / e, part) for part, h, e in balance.hourglass_of_parts if e > smallest_peak
+    ]
     if not shares:
         return {}
-    share, part = max(shares, key=lambda one: one[0])
+    share, part = max(shares, key=lambda share_and_part: share_and_part[0])
     return {"part_hourglass_share": share, "part": part}
 
 
@@ -274,11 +277,11 @@ def _total(balance: Balance) -> Samples | None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
         return None
-    others = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
+    further_terms = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
     return np.asarray(
         balance.internal
         + balance.kinetic
-        + sum(term for term in others if term is not None)
+        + sum(term for term in further_terms if term is not None)
     )
 
 
@@ -294,20 +297,19 @@ def _in_window(
             locked = None
     if locked is None or locked <= _FLOOR:
         return {}
-    found = {}
+    fields = {}
     for name, energy in (
         ("window_sliding", balance.sliding),
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            open_ = balance.precision.quantum(
-                float(np.abs(energy[inside]).max())
-            )  # printed digits
-            found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
+            # printed digits
+            quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
+            fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = work_beyond_gravity(balance, start, end)
     if work is not None:
-        found["window_work"] = work / locked
-    return found
+        fields["window_work"] = work / locked
+    return fields
 
 
 # Criteria of a run that blew up: within 5 % of the record its kinetic energy exceeds all earlier energy by 9 orders of
@@ -333,9 +335,9 @@ def refuse_unsound(
     With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
     and end of the flight in the settings.
     """
-    for one in unsound(history):
-        if choosing or one.code != "nothing-to-judge":
-            raise RangeError(f"{', '.join(history.source)}: {one.message}")
+    for caution in unsound(history):
+        if choosing or caution.code != "nothing-to-judge":
+            raise RangeError(f"{', '.join(history.source)}: {caution.message}")
     times = {"after": settings.after, "landing": settings.landing}
     for name, time in {
         **times,
@@ -349,17 +351,17 @@ def refuse_unsound(
 
 def unsound(history: History) -> Iterator[Caution]:
     """Yield the reasons why a run cannot be judged, with stable codes."""
-    most = largest(history.energy)
-    if most > LARGEST_ENERGY:
+    highest = largest(history.energy)
+    if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {most:g}, at most {LARGEST_ENERGY:g} was expected",
+            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
         )
-    elif found := _blew_up(history):
-        yield Caution("blew-up", found)
+    elif reason := _blew_up(history):
+        yield Caution("blew-up", reason)
     elif _has_nothing(history):
-        found = f"nothing to judge: no internal energy exceeds {most:.3g}, so nothing deforms"
-        yield Caution("nothing-to-judge", found)
+        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"
+        yield Caution("nothing-to-judge", reason)
 
 
 def _blew_up(history: History) -> str | None:
@@ -375,27 +377,27 @@ def _blew_up(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    earlier = np.searchsorted(
-        time, time - _WITHIN * (time[-1] - time[0])
-    )  # states more than 5 % of the record before each state
+    # states more than 5 % of the record before each state
+    earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
     )
-    before, deformed = (
-        np.concatenate([[0.0], np.maximum.accumulate(one)])[earlier]
-        for one in (kinetic + internal, internal)
+    earlier_energy, deformed = (
+        np.concatenate([[0.0], np.maximum.accumulate(energies)])[earlier]
+        for energies in (kinetic + internal, internal)
     )
-    gained = counted & (deformed > 0) & (kinetic > _GAIN * before)
-    gained &= (kinetic / _SPEED > internal) & (
-        internal / _TORN > deformed
-    )  # divide, since products might overflow
+    gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
+    # divide, since products might overflow
+    gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)
-    at = int(np.argmax(gained))
-    if not gained[at]:
+    state = int(np.argmax(gained))
+    if not gained[state]:
         return None
-    found = f"the run blew up: from {before[at]:.3g} before, its energy reaches {kinetic[at]:.3g} at {time[at]:.6g}"
-    return f"{found}; nothing in it can be trusted"
+    return (
+        f"the run blew up: from {earlier_energy[state]:.3g} before, its energy reaches {kinetic[state]:.3g} "
+        f"at {time[state]:.6g}; nothing in it can be trusted"
+    )
 
 
 def _has_nothing(history: History) -> bool:
@@ -404,5 +406,5 @@ def _has_nothing(history: History) -> bool:
     if balance is None:
         return False
     highest = largest(history.energy, balance.internal)
-    beside = largest(balance.kinetic, balance.external_work, balance.total)
-    return highest == 0 or max(highest, beside) <= _NOTHING
+    other_energies = largest(balance.kinetic, balance.external_work, balance.total)
+    return highest == 0 or max(highest, other_energies) <= _NOTHING

@@ -25,16 +25,17 @@ def bodies_of(
     """Return the drift of the rigid bodies of the parts in a flight, computed once; None without data of parts."""
     if flight.parts is None:
         return None
+    # imported here: a table has no parts
     from d2rpick.flight.position_error import (
         bodies_in_flight,
-    )  # imported here: a table has no parts
+    )
 
-    known = history.known if fits is None else fits
-    told = settings.bodies
+    memory = history.known if fits is None else fits
+    rigid_bodies = settings.bodies
     placement = settings.placement
-    return known.once(
-        ("drift", flight, told),
-        lambda: bodies_in_flight(history, flight, told, placement),
+    return memory.once(
+        ("drift", flight, rigid_bodies),
+        lambda: bodies_in_flight(history, flight, rigid_bodies, placement),
     )
 
 
@@ -45,12 +46,14 @@ def margin_of(
     if settings.margin is not None or flight.end is None or flight.start is None:
         return margin_before_contact(history, flight, settings.margin)
     bodies = bodies_of(history, flight, settings, fits)
-    place = None if bodies is None else _largest_error(bodies, flight.start, flight.end)
-    return margin_before_contact(history, flight, place=place)
+    position_error = (
+        None if bodies is None else _largest_error(bodies, flight.start, flight.end)
+    )
+    return margin_before_contact(history, flight, place=position_error)
 
 
 def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:
     """Return the largest position error of a body at the end of a flight [length]; None if it is unknown."""
     errors = bodies.errors(np.linspace(start, end, _TIMES)[:-1], end)
-    known = errors[np.isfinite(errors)]
-    return float(known.max()) if known.size else None
+    known_errors = errors[np.isfinite(errors)]
+    return float(known_errors.max()) if known_errors.size else None

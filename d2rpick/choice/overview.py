@@ -102,9 +102,9 @@ class Overview(NamedTuple):
 
 def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     """Describe all databases of a run; ``selection`` and ``deck`` matter for the flights."""
-    told: tuple[Caution, ...] = ()
+    deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
-        run, told = _in_deck(run, deck)
+        run, deck_warnings = _in_deck(run, deck)
     first = run.databases[0]
     notes = [
         *run.left_out,
@@ -114,13 +114,12 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     notes += run.unused_energies(selection)
     states = None
     time = np.empty(0)
+    # several columns may be the time; they can still be listed
     try:
         if first.span is not None:
             time = first.time if first.channels else first.part_time
         states = int(time.size)
-    except (
-        FormatError
-    ) as error:  # several columns may be the time; they can still be listed
+    except FormatError as error:
         if (
             first.format == "csv"
             and if_written(lambda: first.energy_channel) is not None
@@ -152,11 +151,15 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         parts=tuple(_overviews(run)),
         flights=flights,
         should_write=None
-        if states == 0 or any(one.parts for one in run.momenta(None, None))
+        if states == 0 or any(momenta.parts for momenta in run.momenta(None, None))
         else _missing(run),
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
+        alarms=(
+            *(unsound(history) if history else ()),
+            *_of_rigid_legs(rigid),
+            *deck_warnings,
+        ),
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
@@ -165,11 +168,12 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
 
 def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
     """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
+    # imported here: few runs are given with a deck
     from d2rpick.choice.deck_of_run import (
         doubts_of_solver,
         in_deck,
         of_another_model,
-    )  # imported here: few runs are given with a deck
+    )
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
@@ -183,9 +187,9 @@ def _missing(run: Run) -> str:
     """Name the output of the solver that contains the momenta of parts, which these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
-        what = _RADIOSS
+        output = _RADIOSS
     elif written & {"glstat", "matsum", "binout", "d3plot", "d3thdt"}:
-        what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
+        output = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
     else:
         if run.momenta(None, None):
             momentum = ""
@@ -193,8 +197,8 @@ def _missing(run: Run) -> str:
             momentum = (
                 ", at least columns x_momentum, y_momentum, z_momentum of the model"
             )
-        what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
-    return f"{what}: only momenta of the parts show for sure when they fly"
+        output = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
+    return f"{output}: only momenta of the parts show for sure when they fly"
 
 
 def _notes(database: Legs) -> tuple[str, ...]:
@@ -233,8 +237,8 @@ def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
-        told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
-        yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
+        effect = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
+        yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
 
 def _health(
@@ -285,7 +289,7 @@ def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
     try:
         refuse_unsound(history, settings := Settings())
-        found = flights_of(history, settings)
+        flights = flights_of(history, settings)
     except RangeError:
         return ()
     return tuple(
@@ -298,6 +302,6 @@ def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
                 flight.damping,
             ),
         )
-        for flight in found
+        for flight in flights
         if flight.source
     )

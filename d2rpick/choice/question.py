@@ -33,9 +33,10 @@ class Reference(NamedTuple):
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read the selected energy of an open run; FormatError if it is missing."""
         if selection.parts:
+            # imported here: a table has no parts
             from d2rpick.flight.momentum import (
                 with_parts_by_number,
-            )  # imported here: a table has no parts
+            )
 
             selection = with_parts_by_number(run, selection)
         return cls(run, run.history(selection))

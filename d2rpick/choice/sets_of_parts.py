@@ -120,7 +120,7 @@ class Parts:
     @property
     def recommended(self) -> PartSet | None:
         """The recommended set; None without one."""
-        return next((one for one in self.sets if one.recommended), None)
+        return next((part_set for part_set in self.sets if part_set.recommended), None)
 
 
 def parts_of(
@@ -161,26 +161,28 @@ def parts_of(
     rows = rows_of(facts, model, printed_steps(run, *(beside if model else ())))
     comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
-    for one in _sets(rows, given):
-        td = next(
-            (other.window[1] for other in sets if other.window), None
-        )  # the same td for all sets, so that they can be compared
-        sets.append(comparison.of(one, times or td))
-        if one.name == _ALL:
-            left = tuple(part for part in one.parts if part not in sets[-1].moving)
+    for part_set in _sets(rows, given):
+        # the same td for all sets, so that they can be compared
+        td = next((earlier.window[1] for earlier in sets if earlier.window), None)
+        sets.append(comparison.of(part_set, times or td))
+        if part_set.name == _ALL:
+            still_parts = tuple(
+                part for part in part_set.parts if part not in sets[-1].moving
+            )
         else:
-            left = ()
-        if (
-            left and sets[-1].moving
-        ):  # the other parts may fly longer than the moving ones
-            sets.append(comparison.of(PartSet(_STILL, left), times))
-    found = tuple(_with_recommendation(_distinct(sets)))
+            still_parts = ()
+        # the other parts may fly longer than the moving ones
+        if still_parts and sets[-1].moving:
+            sets.append(comparison.of(PartSet(_STILL, still_parts), times))
+    recommended_sets = tuple(_with_recommendation(_distinct(sets)))
     cautions = (
         *((foreign,) if foreign else ()),
-        *_cautions(run, facts, model, rows, found),
+        *_cautions(run, facts, model, rows, recommended_sets),
     )
     inventory, weights = (model.inventory, model.weights) if model else (None, None)
-    return Parts(run, inventory, weights, settings, facts, rows, found, cautions)
+    return Parts(
+        run, inventory, weights, settings, facts, rows, recommended_sets, cautions
+    )
 
 
 def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
@@ -194,9 +196,9 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
     if not names:
         return ()
     if asks_for_recommended(names, run.parts):
-        what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        cure = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(
-            f"{run.name}: the recommended set is what is looked for here; {what}"
+            f"{run.name}: the recommended set is what is looked for here; {cure}"
         )
     numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
@@ -212,46 +214,55 @@ def recommended_parts(
     FormatError
         If no set can be recommended.
     """
-    found = parts_of(run, settings, model)
-    if found.recommended is None:
-        if found.facts.reason:
-            raise FormatError(found.facts.reason)
+    answer = parts_of(run, settings, model)
+    if answer.recommended is None:
+        if answer.facts.reason:
+            raise FormatError(answer.facts.reason)
         absent = [
-            one.message for one in found.cautions if one.code == "parts-not-in-deck"
+            part_set.message
+            for part_set in answer.cautions
+            if part_set.code == "parts-not-in-deck"
         ]
         why = "; ".join(
             dict.fromkeys(
-                [*absent, *(reason for one in found.sets for reason in one.reasons)]
+                [
+                    *absent,
+                    *(
+                        reason
+                        for part_set in answer.sets
+                        for reason in part_set.reasons
+                    ),
+                ]
             )
         )
         raise FormatError(
             f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
         )
-    return found.recommended.parts
+    return answer.recommended.parts
 
 
 def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
     """Leave out sets that repeat the parts of an earlier set under another name."""
     return [
-        one
-        for at, one in enumerate(sets)
-        if one.parts not in [other.parts for other in sets[:at]]
+        part_set
+        for at, part_set in enumerate(sets)
+        if part_set.parts not in [earlier.parts for earlier in sets[:at]]
     ]
 
 
-def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
+def _sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
     """Yield the sets worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
-    named = {
+    rows_by_name = {
         _ALL: movable,
         "stopped deforming": stopped,
         "heavy": _heavy(movable),
-        "given": [row for row in rows if row.id in given],
+        "given": [row for row in rows if row.id in given_ids],
     }
     yield from (
         PartSet(name, tuple(row.id for row in members))
-        for name, members in named.items()
+        for name, members in rows_by_name.items()
         if members
     )
 
@@ -263,13 +274,13 @@ def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
         return []
     total = sum(masses.values())
     taken = 0.0
-    found = set[int]()
+    heaviest = set[int]()
     for part in sorted(masses, key=lambda part: -masses[part]):
         if taken >= _HEAVY * total:
             break
-        found.add(part)
+        heaviest.add(part)
         taken += masses[part]
-    return [row for row in movable if row.id in found]
+    return [row for row in movable if row.id in heaviest]
 
 
 @dataclass(frozen=True)
@@ -286,42 +297,48 @@ class _Comparison:
         """Places of the parts according to the deck; None without a deck."""
         return Placement(self.model.inventory) if self.model else None
 
-    def of(self, one: PartSet, times: Times | float | None) -> PartSet:
+    def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
         """Complete a set with its costs and errors, for a given (tr, td) or td, or for a td of its own."""
-        share = self.model.saved(one.parts) if self.model else Share(None)
+        share = self.model.saved(part_set.parts) if self.model else Share(None)
         reasons = [share.reason]
-        one = self._with_cost(one, self.model.inventory, share) if self.model else one
+        part_set = (
+            self._with_cost(part_set, self.model.inventory, share)
+            if self.model
+            else part_set
+        )
         try:
-            one = self._with_window(one, times)
+            part_set = self._with_window(part_set, times)
         except (FormatError, RangeError) as error:
             reasons.append(str(error))
-        if one.rigid_fraction is not None and one.cost_share is not None:
+        if part_set.rigid_fraction is not None and part_set.cost_share is not None:
             run_time = run_time_share(
-                one.rigid_fraction, one.cost_share, self.settings.step_ratio
+                part_set.rigid_fraction, part_set.cost_share, self.settings.step_ratio
             )
-            one = one._replace(run_time_share=run_time)
-        return one._replace(
-            reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason)
+            part_set = part_set._replace(run_time_share=run_time)
+        return part_set._replace(
+            reasons=tuple(reason for reason in (*reasons, *part_set.reasons) if reason)
         )
 
-    def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
+    def _with_cost(
+        self, part_set: PartSet, inventory: Inventory, share: Share
+    ) -> PartSet:
         """Add the rigid bodies, the costs, and the growth of the time step."""
-        within = {
+        rigid_elements = {
             part: counts.total()
-            for part, counts in inventory.elements_within(one.parts).items()
+            for part, counts in inventory.elements_within(part_set.parts).items()
         }
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
-        rigid = {part for part, count in within.items() if count == whole[part]}
-        return one._replace(
-            bodies=inventory.bodies(one.parts),
-            moving=self._loose(inventory, one.parts),
-            elements=sum(within.values()),
-            element_fraction=sum(within.values()) / sum(whole.values())
+        rigid = {part for part, count in rigid_elements.items() if count == whole[part]}
+        return part_set._replace(
+            bodies=inventory.bodies(part_set.parts),
+            moving=self._loose(inventory, part_set.parts),
+            elements=sum(rigid_elements.values()),
+            element_fraction=sum(rigid_elements.values()) / sum(whole.values())
             if whole
             else None,
-            mass_fraction=self._mass_fraction(one.parts),
+            mass_fraction=self._mass_fraction(part_set.parts),
             cost_share=share.value,
-            step_growth=step_growth(self.rows, {*one.parts, *rigid}),
+            step_growth=step_growth(self.rows, {*part_set.parts, *rigid}),
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
@@ -329,14 +346,14 @@ class _Comparison:
         masses = {
             row.id: row.mass for row in self.rows if row.flight and row.flight.flies
         }
-        known = {part: mass for part, mass in masses.items() if mass is not None}
+        known_masses = {part: mass for part, mass in masses.items() if mass is not None}
         if (
-            len(known) < len(masses)
-            or not set(parts) <= known.keys()
-            or not sum(known.values())
+            len(known_masses) < len(masses)
+            or not set(parts) <= known_masses.keys()
+            or not sum(known_masses.values())
         ):
             return None
-        return sum(known[part] for part in parts) / sum(known.values())
+        return sum(known_masses[part] for part in parts) / sum(known_masses.values())
 
     def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
         """Return the parts outside of the heaviest rigid body; empty if ties may join the bodies."""
@@ -348,7 +365,7 @@ class _Comparison:
         )
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
-    def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
+    def _with_window(self, part_set: PartSet, times: Times | float | None) -> PartSet:
         """Add the window in which the set may be rigid.
 
         Raises
@@ -356,9 +373,11 @@ class _Comparison:
         RangeError
             If no tr can be recommended, with the reason.
         """
-        reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
-        told = bodies_of(self.model.inventory, one.parts) if self.model else None
-        settings = replace(self.settings, bodies=told, placement=self.placement)
+        reference = Reference.of(
+            self.run, Selection(parts=tuple(map(str, part_set.parts)))
+        )
+        bodies = bodies_of(self.model.inventory, part_set.parts) if self.model else None
+        settings = replace(self.settings, bodies=bodies, placement=self.placement)
         if isinstance(times, tuple):
             situation = verify_of(reference, *times, settings).situation
             tr, td = times
@@ -371,27 +390,29 @@ class _Comparison:
                 (answer.recommended.tr, answer.recommended.td),
             )
         time = reference.history.time
-        one = one._replace(
+        part_set = part_set._replace(
             window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0])
         )
-        return _with_position(one, situation, tr)
+        return _with_position(part_set, situation, tr)
 
 
-def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
+def _with_position(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
     """Add the largest position error at td of a body whose parts moved relative to each other before tr."""
-    told = ("several-bodies", "moves-apart")
-    why = tuple(
+    codes = ("several-bodies", "moves-apart")
+    reasons = tuple(
         caution.message
         for caution in out_of_place(situation, tr)
-        if caution.code in told
+        if caution.code in codes
     )
     bodies = situation.bodies
     worst = bodies.worst(tr, situation.td) if bodies else None
     if bodies is None or worst is None:
         apart = {part.id for part in bodies.apart} if bodies else set()
-        return one._replace(reasons=why, moving=one.moving | apart, apart=bool(apart))
+        return part_set._replace(
+            reasons=reasons, moving=part_set.moving | apart, apart=bool(apart)
+        )
     angle = float(worst.drift.angles(np.array([tr]), situation.td)[0])
-    placed = one._replace(
+    placed = part_set._replace(
         position_error=worst.error,
         position_limit=bodies.limit if worst.part else None,
         position_part=worst.drift.part if worst.part else None,
@@ -401,7 +422,7 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         position_is_lower_bound=worst.at_least,
     )
     if placed.out_of_place:
-        return placed._replace(moving=one.moving | {*worst.drift.moving})
+        return placed._replace(moving=part_set.moving | {*worst.drift.moving})
     return placed
 
 
@@ -410,13 +431,19 @@ def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
 
     A set with too large a position error is considered only if all sets have one.
     """
-    useful = [one for one in sets if one.saving is not None and one.saving > 0]
-    in_place = [one for one in useful if not one.out_of_place] or useful
-    most = max((one.saving or 0.0 for one in in_place), default=0.0)
-    alike = [one for one in in_place if (one.saving or 0.0) >= most - _LIKE]
-    best = min(alike, key=lambda one: len(one.parts), default=None)
-    for one in sets:
-        yield one._replace(recommended=one is best)
+    useful = [
+        part_set
+        for part_set in sets
+        if part_set.saving is not None and part_set.saving > 0
+    ]
+    in_place = [part_set for part_set in useful if not part_set.out_of_place] or useful
+    largest = max((part_set.saving or 0.0 for part_set in in_place), default=0.0)
+    alike = [
+        part_set for part_set in in_place if (part_set.saving or 0.0) >= largest - _LIKE
+    ]
+    best = min(alike, key=lambda part_set: len(part_set.parts), default=None)
+    for part_set in sets:
+        yield part_set._replace(recommended=part_set is best)
 
 
 def _cautions(
@@ -454,10 +481,10 @@ def _cautions(
             "nothing-to-switch",
             "no part may be switched; the reasons are listed in the rows",
         )
-    elif not any(one.recommended for one in sets):
+    elif not any(part_set.recommended for part_set in sets):
         yield Caution(
             "no-set",
             "no set of parts can be recommended; the reasons are listed with the sets",
         )
-    if sets and all(one.angle_error is None for one in sets):
+    if sets and all(part_set.angle_error is None for part_set in sets):
         yield Caution("no-angle", _NO_ANGLE)

@@ -77,8 +77,9 @@ def nothing_vibrates(
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
-    least = round_off(history)  # 0 if no energy is written at all, which shows nothing
-    if least > 0 and float(np.abs(inside).max()) <= least:
+    # 0 if no energy is written at all, which shows nothing
+    rounding = round_off(history)
+    if rounding > 0 and float(np.abs(inside).max()) <= rounding:
         return True
     if deformed or float(inside.min()) < 0 or history.energy_at(td) <= 0:
         return False
@@ -91,10 +92,10 @@ def _faint(history: History, start: float) -> float:
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
     ``start`` of the flight [time].  What falls was elastic, at least; plastic work stays.
     """
-    after = history.between(start, float(history.time[-1]))[1]
-    fall = float((np.maximum.accumulate(after) - after).max(initial=0.0))
+    energies = history.between(start, float(history.time[-1]))[1]
+    fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
     highest = history.known.once("highest", lambda: largest(history.energy))
-    quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
+    quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
 
@@ -230,8 +231,8 @@ class Situation:
     @property
     def most_error(self) -> float:
         """Largest error of an acceptable tr [-]: the tolerance, for many modes less than removing the vibration."""
-        most = self.vibration.most_lock_in
-        return self.settings.tolerance if most is None else most
+        limit = self.vibration.most_lock_in
+        return self.settings.tolerance if limit is None else limit
 
     @property
     def in_flight(self) -> bool:
@@ -245,9 +246,12 @@ class Situation:
         """Return the times in (start, end] of the energy peaks, ascending: of the oscillator, else of the samples."""
         return describing(self.history, self.td, self.evidence).peaks(start, end)
 
-    def sees_as(self, other: Situation) -> bool:
+    def sees_as(self, situation: Situation) -> bool:
         """Return True if both situations, of one record, share the flight and the evidence, and differ in td only."""
-        return self.evidence.is_that_of(other.evidence) and self.flight == other.flight
+        return (
+            self.evidence.is_that_of(situation.evidence)
+            and self.flight == situation.flight
+        )
 
     def at(self, td: float) -> Situation:
         """Return the situation of the same record, flight and evidence at another ``td``."""
@@ -275,33 +279,33 @@ def examine(
     """
     if history.time.size < 3:
         if history.time.size == 1:
-            found = "1 state was"
+            count = "1 state was"
         else:
-            found = f"{history.time.size} states were"
+            count = f"{history.time.size} states were"
         raise RangeError(
-            f"{', '.join(history.source)}: {found} found, choosing needs at least 3"
+            f"{', '.join(history.source)}: {count} found, choosing needs at least 3"
         )
     history.energy_at(td, "td")
     if settings.after is not None:
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen = seen_flight(history, td)
-    flying = None if seen.refusal else seen.flight
+    seen_evidence = seen_flight(history, td)
+    flying = None if seen_evidence.refusal else seen_evidence.flight
     # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
-    if seen.refusal and seen.flight:
-        at = (seen.flight.start + seen.flight.end) / 2
+    if seen_evidence.refusal and seen_evidence.flight:
+        at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
     else:
         at = td
     fits = Fits() if fits is None else fits
-    fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
+    fit, span = _oscillator(history, at, settings, seen_evidence, fits, quick=quick)
     described = _settled(history, fit, span) or _described_by_modes(
-        history, td, settings, seen, fits
+        history, td, settings, seen_evidence, fits
     )
-    flight = _flight_at(history, td, settings, seen, described)
-    given = settings.oscillator is not None
+    flight = _flight_at(history, td, settings, seen_evidence, described)
+    is_given = settings.oscillator is not None
     evidence = Evidence(
-        fit, span, given, prescribed=given or settings.fit_window is not None
+        fit, span, is_given, prescribed=is_given or settings.fit_window is not None
     )
     situation = Situation(history, td, settings, flight, evidence, fits)
     if not settings.replay:
@@ -311,24 +315,25 @@ def examine(
     # without evidence of the next contact nothing is known about the time after td
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
-    within = settled = None
+    fitted = settled = None
     if flight.start is not None:
-        within = Span(flight.start, flight.end or last)
+        fitted = Span(flight.start, flight.end or last)
         if flight.settled is None:
-            settled = within
+            settled = fitted
         else:
-            settled = within._replace(start=flight.settled)
-    if within is not None and flight.source == "energy":
+            settled = fitted._replace(start=flight.settled)
+    if fitted is not None and flight.source == "energy":
+        # imported here: better evidence does not need it
         from d2rpick.vibration.modal_span import (
             inner_window,
-        )  # imported here: better evidence does not need it
+        )
 
-        inner = inner_window(history, within)
-        within = inner if inner.start < td <= inner.end else within
+        inner = inner_window(history, fitted)
+        fitted = inner if inner.start < td <= inner.end else fitted
     models = find_models(
         history,
         around,
-        within,
+        fitted,
         settled,
         lambda: doubtful(situation.whole),
         fits,
@@ -370,12 +375,12 @@ def _flight_at(
     history: History,
     td: float,
     settings: Settings,
-    seen: Seen,
+    evidence: Seen,
     described: Described | None,
 ) -> Flight:
     """Return the flight around td, from the evidence or as the user gives it; supported parts never fly."""
-    flight = find_flight(history, td, seen, described)
-    if seen.held:
+    flight = find_flight(history, td, evidence, described)
+    if evidence.held:
         return flight
     if settings.after is not None:
         flight = begun_at(history, flight, td, settings.after, described)
@@ -402,7 +407,7 @@ def _oscillator(
     history: History,
     td: float,
     settings: Settings,
-    seen: Seen,
+    evidence: Seen,
     fits: Fits,
     *,
     quick: bool,
@@ -410,9 +415,9 @@ def _oscillator(
     """Return the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    whole = bool(seen.flight or seen.refusal)
-    if seen.flight:
-        bounds = Span(*seen.flight[:2])
+    whole = bool(evidence.flight or evidence.refusal)
+    if evidence.flight:
+        bounds = Span(*evidence.flight[:2])
     else:
         bounds = Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
@@ -425,19 +430,19 @@ def _oscillator(
         span = span_of(history, td, fit, bounds) if fit.describes_record else None
         return _with_hidden_share(history, fit, fits), span
     if settings.oscillator:
-        given = fits.remembered("given", partial(judge_given, settings.oscillator))
-        span, fit = described_span(history, td, bounds, given, whole=whole, memory=fits)
+        judge = fits.remembered("given", partial(judge_given, settings.oscillator))
+        span, fit = described_span(history, td, bounds, judge, whole=whole, memory=fits)
         return fit, span
-    every = fits.remembered("one", partial(identify, memory=fits))
-    quickly = partial(every, quick=True)
-    most = fits.once(
+    identify_mode = fits.remembered("one", partial(identify, memory=fits))
+    quickly = partial(identify_mode, quick=True)
+    longest_fit = fits.once(
         ("most", bounds, whole),
         lambda: most_described(history, bounds, quickly, whole=whole, memory=fits),
     )
-    if most is not None and most[0].start <= td <= most[0].end:
-        span, fit = most
+    if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
+        span, fit = longest_fit
     else:
-        fitter = quickly if quick else every
+        fitter = quickly if quick else identify_mode
         span, fit = described_span(
             history, td, bounds, fitter, whole=whole, memory=fits
         )
@@ -445,14 +450,15 @@ def _oscillator(
 
 
 def _described_by_modes(
-    history: History, td: float, settings: Settings, seen: Seen, fits: Fits
+    history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
 ) -> Described | None:
     """Return a window that modes describe, if only the energy can show a flight; else None."""
-    if seen.flight or seen.refusal or not settings.replay:
+    if evidence.flight or evidence.refusal or not settings.replay:
         return None
+    # imported here: most records do not need it
     from d2rpick.vibration.modal_span import (
         find_described,
-    )  # imported here: most records do not need it
+    )
 
     quiet = quiet_time(history, td)
     last = float(history.time[-1])
@@ -460,8 +466,12 @@ def _described_by_modes(
         guess = None
     else:
         guess = Span(quiet.start, last if quiet.end is None else quiet.end)
-    found = find_described(history, td, guess, fits)
-    return Described(*found.span, found.vibration.vibration_energy) if found else None
+    described = find_described(history, td, guess, fits)
+    return (
+        Described(*described.span, described.vibration.vibration_energy)
+        if described
+        else None
+    )
 
 
 def _with_hidden_share(
@@ -473,11 +483,11 @@ def _with_hidden_share(
     window = history.between(fit.start, fit.end)
     mode = fit.mode
 
-    def widened() -> Identification:
+    def add_share() -> Identification:
         share = hidden_share(*window, mode)
         return fit._replace(hidden_share=max(fit.hidden_share, share))
 
-    return fits.once(("hidden", fit.start, fit.end, fit.rms), widened)
+    return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)
 
 
 def _settled(

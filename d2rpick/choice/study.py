@@ -219,14 +219,14 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         situation,
         acceptable_windows(situation, answer.candidates, best.tr if best else None),
     )
-    said = {caution.code: caution.message for caution in answer.cautions}
+    messages = {caution.code: caution.message for caution in answer.cautions}
     row = StudyRow(
         source=source,
         status=NONE,
-        message=said.get("no-candidate"),
+        message=messages.get("no-candidate"),
         energy_td=situation.energy_td,
         basis=situation.basis,
-        warnings=tuple(code for code in said if code not in _NOT_REPEATED),
+        warnings=tuple(code for code in messages if code not in _NOT_REPEATED),
         time_unit=situation.history.time_unit,
         td=situation.td,
         acceptable=acceptable,
@@ -256,12 +256,14 @@ def failed(source: str, error: BaseException) -> StudyRow:
 def stamps(source: str) -> tuple[Stamp, ...]:
     """Return the present size and modification time of the files of a run, by absolute name; empty without files."""
     try:
-        found = [
+        states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
         ]
     except (D2RPickError, OSError):  # reported by whoever reads the run
         return ()
-    return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
+    return tuple(
+        Stamp(path, state.st_size, state.st_mtime_ns) for path, state in states
+    )
 
 
 def summarise(
@@ -272,18 +274,24 @@ def summarise(
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None
     common = common_tr(rows)
-    one, window = (None, td) if isinstance(td, tuple) else (td, None)
+    td_of_all, td_window = (None, td) if isinstance(td, tuple) else (td, None)
     return Study(
-        one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common))
+        td_of_all,
+        td_window,
+        tuple(rows),
+        spread,
+        agree,
+        common,
+        tuple(_cautions(rows, common)),
     )
 
 
 def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
     """Return the tr of all runs and the bounds of the interval within the accuracy of each (low > high: none)."""
-    found = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
-    low = max((one for _, one, _ in found if one is not None), default=np.inf)
-    high = min((one for _, _, one in found if one is not None), default=-np.inf)
-    return [tr for tr, _, _ in found], low, high
+    chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
+    low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
+    high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
+    return [tr for tr, _, _ in chosen], low, high
 
 
 def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
@@ -300,11 +308,11 @@ def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """Yield warnings about runs left out, runs that differ in kind, and warnings of single runs."""
     judged = [row for row in rows if row.judged]
-    left = [row.source for row in rows if not row.judged]
-    if left and judged:
-        found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
+    left_out = [row.source for row in rows if not row.judged]
+    if left_out and judged:
+        text = f"{len(left_out)} of {runs_of(len(rows))} could not be judged"
         yield Caution(
-            "runs-left-out", f"{found} and are left out: {listing(left, most=NAMED)}"
+            "runs-left-out", f"{text} and are left out: {listing(left_out, most=NAMED)}"
         )
     if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
         yield Caution(
@@ -312,11 +320,11 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
             f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
-        found = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
+        text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
         yield Caution(
-            "timing-tolerance", f"{found}: the error of a run grows by more than 0.05"
+            "timing-tolerance", f"{text}: the error of a run grows by more than 0.05"
         )
-    for code, what, kinds in (
+    for code, sentence, kinds in (
         (
             "mixed-units",
             "the times of the runs have different units, td has only one",
@@ -332,13 +340,13 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
         if len(counted) > 1:
             yield Caution(
                 code,
-                f"{what}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}",
+                f"{sentence}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}",
             )
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
-        named = [row.source for row in judged if code in row.warnings]
+        sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
-            f"in {len(named)} of {runs_of(len(judged))}: {listing(named, most=NAMED)}",
+            f"in {len(sources)} of {runs_of(len(judged))}: {listing(sources, most=NAMED)}",
         )
 
 
@@ -370,10 +378,10 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
 
 def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
     """Return the median tr of runs that agree, limited to their accuracy; None if they do not agree."""
-    known, low, high = _known(judged)
-    if len(known) < len(judged) or low > high:
+    tr_of_runs, low, high = _known(judged)
+    if len(tr_of_runs) < len(judged) or low > high:
         return None
-    tr = float(np.clip(median(known), low, high))
+    tr = float(np.clip(median(tr_of_runs), low, high))
     return tr if _holds(keeping, tr) else None
 
 
@@ -392,8 +400,8 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     ]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
-        own = 0.0 if row.tr is None else error_at(profile, row.tr)
-        worst = np.maximum(worst, np.interp(times, *profile) - own)
+        own_error = 0.0 if row.tr is None else error_at(profile, row.tr)
+        worst = np.maximum(worst, np.interp(times, *profile) - own_error)
     first = int(np.argmax(worst <= worst.min() + EQUALLY_GOOD))
     holder = shared[np.searchsorted(shared[:, 0], times[first], "right") - 1]
     following = times[min(first + 1, times.size - 1)]
@@ -430,10 +438,10 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
             which = "the run that was judged"
         return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
-    left = [row.source for row in judged if not _holds(row.acceptable, tr)]
+    unsuited = [row.source for row in judged if not _holds(row.acceptable, tr)]
     return (
-        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "
-        f"not in {listing(left, most=NAMED)}"
+        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(unsuited)}, "
+        f"not in {listing(unsuited, most=NAMED)}"
     )
 
 
@@ -460,4 +468,10 @@ def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
         for row, tr in chosen
         if not low - reach <= tr <= high + reach
     ]
-    return (*without, *(row for row, _ in sorted(far, key=lambda one: -one[1])))
+    return (
+        *without,
+        *(
+            row
+            for row, _ in sorted(far, key=lambda run_and_distance: -run_and_distance[1])
+        ),
+    )

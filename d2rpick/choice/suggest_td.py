@@ -69,9 +69,8 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    entered = time[
-        np.maximum(_reached(*extremes, level, near) - 1, 0)
-    ]  # or later, but after the state before
+    # or later, but after the state before
+    entered = time[np.maximum(_reached(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
     )
@@ -123,10 +122,10 @@ class Chosen(NamedTuple):
 
     def given_up(self, pair: Pair | None) -> Pair | None:
         """Return the longest pair if it is rigid for much longer than the recommended ``pair``, else None."""
-        much = _MUCH * (self.inside[1] - self.inside[0])
-        found = self.longest
-        if found and pair and found.rigid_time - pair.rigid_time > much:
-            return found
+        limit = _MUCH * (self.inside[1] - self.inside[0])
+        longest = self.longest
+        if longest and pair and longest.rigid_time - pair.rigid_time > limit:
+            return longest
         return None
 
 
@@ -190,15 +189,14 @@ def offered_times(
     grid = np.linspace(*window, steps + 1)[1:]  # no pair is rigid before the first time
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
-        place = np.searchsorted(grid, peaks)
-        order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
-        highest = order[np.diff(place[order], prepend=-1) > 0]
+        intervals = np.searchsorted(grid, peaks)
+        order = np.lexsort((-situation.vibration.whole.energies(peaks), intervals))
+        highest = order[np.diff(intervals[order], prepend=-1) > 0]
         peaks = peaks[highest]
-        grid = np.delete(grid, place[highest])
+        grid = np.delete(grid, intervals[highest])
     times = union(grid, peaks)
-    return times[times < situation.history.time[-1]], set(
-        peaks.tolist()
-    )  # a run that ends at td is useless
+    # a run that ends at td is useless
+    return times[times < situation.history.time[-1]], set(peaks.tolist())
 
 
 def error_of(situation: Situation, best: Pair | None) -> float | None:
@@ -235,57 +233,71 @@ def _unbeaten(
     be compared with the pair at td, no oscillator is searched at a td that loses without one.  No pair is rigid before
     ``earliest`` [time].
     """
-    own = next(iter(_acceptable([look(td)])), None)
-    if own is None:
+    choice = next(iter(_acceptable([look(td)])), None)
+    if choice is None:
         return td
-    seen = look if own[0].flight.source == "energy" else own[0].at
-    first = at_level if seen is look and own[0].basis == "energy" else seen
-    error = as_printed(error_of(*own))
-    late = (time for time in times if time - earliest >= own[1].rigid_time)
-    better = _beating(
-        own, [seen(time) for time in late if _may_beat(first(time), own, error)]
+    look_at = look if choice[0].flight.source == "energy" else choice[0].at
+    look_first = (
+        at_level if look_at is look and choice[0].basis == "energy" else look_at
     )
-    for there, _ in sorted(
-        better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))
+    error = as_printed(error_of(*choice))
+    late_enough = (time for time in times if time - earliest >= choice[1].rigid_time)
+    better = _beating(
+        choice,
+        [
+            look_at(time)
+            for time in late_enough
+            if _may_beat(look_first(time), choice, error)
+        ],
+    )
+    for situation, _ in sorted(
+        better,
+        key=lambda candidate: (
+            -candidate[1].rigid_time,
+            as_printed(error_of(*candidate)),
+        ),
     ):
-        if _beating(own, [look(there.td)]):
-            return there.td
+        if _beating(choice, [look(situation.td)]):
+            return situation.td
     return td
 
 
-def _may_beat(there: Situation, own: Choice, error: float) -> bool:
+def _may_beat(situation: Situation, choice: Choice, error: float) -> bool:
     """Return True if a pair at the td of a situation may be as good as a pair with ``error``, and as long.
 
     Pairs by deformations are not compared with pairs by levels.
     """
-    if (there.basis == "energy") != (own[0].basis == "energy"):
+    if (situation.basis == "energy") != (choice[0].basis == "energy"):
         return False
-    share = there.kinetic_share
-    mean = mean_in_flight(there)
-    least = 0.0 if mean is None else float(shortfall(np.array(there.energy_td), mean))
+    share = situation.kinetic_share
+    mean = mean_in_flight(situation)
+    smallest_shortfall = (
+        0.0 if mean is None else float(shortfall(np.array(situation.energy_td), mean))
+    )
     return bool(
-        as_printed(least if share is None else sqrt(share)) <= error
-        and longest_rigid_times(there, np.array([there.td]))[0] >= own[1].rigid_time
+        as_printed(smallest_shortfall if share is None else sqrt(share)) <= error
+        and longest_rigid_times(situation, np.array([situation.td]))[0]
+        >= choice[1].rigid_time
     )
 
 
-def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
+def _beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
     """Return the choices that are better than a given one in error or rigid time and worse in neither.
 
     Errors are compared as printed.
     """
-    error = as_printed(error_of(*own))
-    rigid = own[1].rigid_time
-    found = (
-        (there, best, as_printed(error_of(there, best)))
-        for there, best in _acceptable(situations)
+    error = as_printed(error_of(*choice))
+    rigid = choice[1].rigid_time
+    rivals = (
+        (situation, best, as_printed(error_of(situation, best)))
+        for situation, best in _acceptable(situations)
     )
     return [
-        (there, best)
-        for there, best, its in found
-        if its <= error
+        (situation, best)
+        for situation, best, rival_error in rivals
+        if rival_error <= error
         and best.rigid_time >= rigid
-        and (its, best.rigid_time) != (error, rigid)
+        and (rival_error, best.rigid_time) != (error, rigid)
     ]
 
 
@@ -324,9 +336,8 @@ def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """
     history = situation.history
     flight = situation.flight
-    last = min(
-        window[1], not_after(float(history.time[-2]))
-    )  # a run that ends at td is useless
+    # a run that ends at td is useless
+    last = min(window[1], not_after(float(history.time[-2])))
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
         return last
@@ -381,21 +392,23 @@ def _by_modes(
         return _by_residual(situation, window, look)
     first = max(start, compared.first)
     last = min(window[1], compared.last)
-    every: list[list[Choice]] = []
+    choices: list[list[Choice]] = []
     for share in _LEAST_RIGID:
         times = _offered_by_modes(situation, (window[0], first, last), share)
         pairs = _acceptable(look(td) for td in times)
-        least = share * (last - first)
-        every.append([pair for pair in pairs if pair[1].rigid_time >= least] or pairs)
-        if not times or any(best.error <= MOST_GOOD for _, best in every[-1]):
+        least_time = share * (last - first)
+        choices.append(
+            [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
+        )
+        if not times or any(best.error <= MOST_GOOD for _, best in choices[-1]):
             break
-    if not every[0]:
+    if not choices[0]:
         return _by_residual(situation, window, look)
-    is_good = any(best.error <= MOST_GOOD for _, best in every[-1])
-    long = every[-1] if is_good else every[0]
+    is_good = any(best.error <= MOST_GOOD for _, best in choices[-1])
+    long = choices[-1] if is_good else choices[0]
     limit = min(best.error for _, best in long) + like_quality(situation)
     alike = _longest(pair for pair in long if pair[1].error <= limit)
-    return _td(alike), _td(_longest(every[0]))
+    return _td(alike), _td(_longest(choices[0]))
 
 
 def _offered_by_modes(
@@ -440,8 +453,8 @@ def _least_error(profile: Profile, first: float, last: float) -> tuple[float, fl
     errors = profile.error[rows]
     if not errors.size:
         return np.inf, first
-    least = int(np.argmin(errors))
-    return float(errors[least]), float(profile.time[rows][least])
+    best = int(np.argmin(errors))
+    return float(errors[best]), float(profile.time[rows][best])
 
 
 def _by_level(
@@ -455,9 +468,8 @@ def _by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    best = next(
-        (td for td in below if _acceptable([situation.at(td)])), None
-    )  # without a search for an oscillator at each td
+    # without a search for an oscillator at each td
+    best = next((td for td in below if _acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
     limit = falls[best] + situation.settings.tolerance
@@ -472,9 +484,9 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
     """Yield acceptable choices by descending bound of the rigid time, while a longer one is possible."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
-    most = longest_rigid_times(situation, tds)
-    order = np.lexsort((-tds, -most))
-    for td, possible in zip(tds[order].tolist(), most[order].tolist(), strict=True):
+    bounds = longest_rigid_times(situation, tds)
+    order = np.lexsort((-tds, -bounds))
+    for td, possible in zip(tds[order].tolist(), bounds[order].tolist(), strict=True):
         if possible <= 0 or possible < longest:
             return
         for pair in _acceptable([situation.at(td)]):
@@ -485,9 +497,9 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """Return the situations with their recommended pairs, without pairs that save nothing."""
     return [
-        (one.situation, one.saving)
-        for one in candidates_at([*situations], in_flight=True)
-        if one.saving
+        (candidates.situation, candidates.saving)
+        for candidates in candidates_at([*situations], in_flight=True)
+        if candidates.saving
     ]
 
 

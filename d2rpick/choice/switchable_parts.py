@@ -117,7 +117,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
     )
     moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
-    known = {
+    facts = {
         part.id: PartFacts(
             part,
             masses.get(part.id),
@@ -133,7 +133,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         for at, part in enumerate(run.parts)
     }
     return RunFacts(
-        known, spans, longest, None if flights else "no flight is seen in the history"
+        facts, spans, longest, None if flights else "no flight is seen in the history"
     )
 
 
@@ -149,7 +149,7 @@ def _flies(part: Part, flight: Flight, members: Sequence[Part] | None) -> bool |
     if members is None:
         return None
     together = flight.parts if flight.source == "momentum" and flight.parts else members
-    return part.id in {one.id for one in together}
+    return part.id in {member.id for member in together}
 
 
 def _in_flight(
@@ -173,9 +173,9 @@ def _in_flight(
 def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float | None:
     """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
     start, end = span
-    after = energy[window(time, end, end + _LANDING * (end - start))]
-    if end < float(time[-1]) and after.size > 1:
-        return float(after[-1] - after[0])
+    energies = energy[window(time, end, end + _LANDING * (end - start))]
+    if end < float(time[-1]) and energies.size > 1:
+        return float(energies[-1] - energies[0])
     return None
 
 
@@ -322,12 +322,14 @@ def _judged(
     """Return the row of a part with its verdict and reasons; ``alone`` is the part that drives the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
-    kept = tuple(_to_keep(row, fact, data, alone)) or tuple(_in_pieces(row, inventory))
-    if kept:
-        return row._replace(verdict=KEEP, reasons=kept)
-    open_ = tuple(_not_known(row, facts, inventory, data))
-    if open_:
-        return row._replace(verdict=UNKNOWN, reasons=open_)
+    reasons_to_keep = tuple(_to_keep(row, fact, data, alone)) or tuple(
+        _in_pieces(row, inventory)
+    )
+    if reasons_to_keep:
+        return row._replace(verdict=KEEP, reasons=reasons_to_keep)
+    unknowns = tuple(_not_known(row, facts, inventory, data))
+    if unknowns:
+        return row._replace(verdict=UNKNOWN, reasons=unknowns)
     return row._replace(
         verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory))
     )
@@ -335,10 +337,10 @@ def _judged(
 
 def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     """Yield the parts that welds and ties connect to a part; they are inactive while it is rigid."""
-    others = inventory.joined.get(row.id, {}) if inventory else {}
-    if others:
-        kinds = ", ".join(sorted(frozenset[str]().union(*others.values())))
-        yield f"joined to {name_units(others)} ({kinds})"
+    joined = inventory.joined.get(row.id, {}) if inventory else {}
+    if joined:
+        kinds = ", ".join(sorted(frozenset[str]().union(*joined.values())))
+        yield f"joined to {name_units(joined)} ({kinds})"
 
 
 def _to_keep(
@@ -439,12 +441,12 @@ def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | N
     computed = [
         row for row in rows if row.elements and row.kind not in ("rigid", "void")
     ]
-    left = [row.smallest_step for row in computed if row.id not in switched]
-    known = [step for step in left if step is not None]
+    remaining = [row.smallest_step for row in computed if row.id not in switched]
+    known_steps = [step for step in remaining if step is not None]
     steps = [row.smallest_step for row in computed if row.smallest_step is not None]
-    if len(known) < len(left) or not steps:
+    if len(known_steps) < len(remaining) or not steps:
         return None
-    return min(known) / min(steps) if known else float("inf")
+    return min(known_steps) / min(steps) if known_steps else float("inf")
 
 
 def landing_alone(rows: Sequence[PartRow]) -> int | None:

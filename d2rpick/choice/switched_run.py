@@ -98,12 +98,12 @@ class Done(NamedTuple):
             return "no landing was seen after it"
         if self.landed_rigid:
             return f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: rigid in the contact"
-        found = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
+        landed = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
         if self.moved is None:
-            return found
+            return landed
         if abs(self.moved) <= self.step:
-            return f"{found}, as planned"
-        return f"{found}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
+            return f"{landed}, as planned"
+        return f"{landed}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
 
 
 def switched_history(
@@ -139,15 +139,21 @@ def switched_history(
         cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
     new = [
-        one
-        for one in absent
-        if not any(tr < one.end and one.start < td for tr, td in done)
+        absent_window
+        for absent_window in absent
+        if not any(
+            tr < absent_window.end and absent_window.start < td for tr, td in done
+        )
     ]
-    cautions += [one.caution for one in new]
-    more = tuple((one.start, one.end) for one in new if one.whole)
+    cautions += [absent_window.caution for absent_window in new]
+    whole_windows = tuple(
+        (absent_window.start, absent_window.end)
+        for absent_window in new
+        if absent_window.whole
+    )
     return (
         by_the_model(history) if absent else history,
-        tuple(sorted((*done, *more))),
+        tuple(sorted((*done, *whole_windows))),
         tuple(cautions),
     )
 
@@ -158,7 +164,9 @@ def by_the_model(history: History) -> History:
     Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
     """
     whole = tuple(
-        replace(one, flying=one.chosen) for one in history.momenta if one.parts is None
+        replace(momenta, flying=momenta.chosen)
+        for momenta in history.momenta
+        if momenta.parts is None
     )
     return replace(history, evidence=Given(whole, history.balance))
 
@@ -168,21 +176,30 @@ def rigid_times(reference: Reference) -> tuple[Times, ...]:
 
     If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
-    found = tuple((one.start, one.end) for one in _absent_times(reference))
+    windows = tuple(
+        (momenta.start, momenta.end) for momenta in _absent_times(reference)
+    )
     history = reference.history
     run = reference.run
-    of_parts = next((one for one in history.momenta if one.parts is not None), None)
+    of_parts = next(
+        (momenta for momenta in history.momenta if momenta.parts is not None), None
+    )
     whole = next(
-        (one for one in history.momenta if one.parts is None and not one.velocity), None
+        (
+            momenta
+            for momenta in history.momenta
+            if momenta.parts is None and not momenta.velocity
+        ),
+        None,
     )
     if (
-        found
+        windows
         or of_parts is None
         or whole is None
         or of_parts.masses is None
         or believed(of_parts, whole)
     ):
-        return found
+        return windows
     energies = if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
     void = energies is not None and bool(
         ((of_parts.masses == 0) & (energies > 0)).any()
@@ -199,21 +216,21 @@ def done_windows(
     planned: Sequence[Flight] | None,
 ) -> tuple[Done, ...]:
     """Find when the flights of done windows landed, and when they were planned to land."""
-    found = []
+    done = []
     for tr, td in windows:
         flight = _around(history, flights, tr, td)
-        before = _around(history, planned or (), tr, td)
-        found.append(
+        planned_flight = _around(history, planned or (), tr, td)
+        done.append(
             Done(
                 tr,
                 td,
                 flight,
                 flight.end if flight else None,
-                before.end if before else None,
+                planned_flight.end if planned_flight else None,
                 history.step,
             )
         )
-    return tuple(found)
+    return tuple(done)
 
 
 def _around(
@@ -244,13 +261,13 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     if rigid.any():
         names = [
             part.name
-            for part, one in zip(parts, rigid.tolist(), strict=True)
-            if not one
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if not is_rigid
         ]
         if names and history.parts:
-            found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
+            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
             yield Caution(
-                "partly-rigid", f"{found}; the window counts as done for the others"
+                "partly-rigid", f"{deforming}; the window counts as done for the others"
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
@@ -274,10 +291,10 @@ class _Absent(NamedTuple):
         """Warning about the rigid parts of the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
-            found = f"the parts were rigid {when}, give or take an output interval: taken as done"
-            return Caution("rigid-times", found)
-        found = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
-        return Caution("partly-rigid", found)
+            window_text = f"the parts were rigid {when}, give or take an output interval: taken as done"
+            return Caution("rigid-times", window_text)
+        window_text = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
+        return Caution("partly-rigid", window_text)
 
 
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
@@ -291,23 +308,23 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
     time = reference.history.time
-    least = round_off(reference.history)
-    moves = np.interp(time, balance.time, balance.kinetic) > least
+    rounding = round_off(reference.history)
+    moves = np.interp(time, balance.time, balance.kinetic) > rounding
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
     energies = reference.run.part_energies(parts)
-    found = []
+    windows = []
     for states in stretches(gone, FEWEST):
         start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
         names = [
             part.title or f"part {part.id}"
-            for part, one in zip(parts, rigid.tolist(), strict=True)
-            if one
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if is_rigid
         ]
-        deform = ~rigid & (np.ptp(energies[states], axis=0) > least)
-        found.append(_Absent(start, end, listing(names), not deform.any()))
-    return tuple(found)
+        deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
+        windows.append(_Absent(start, end, listing(names), not deform.any()))
+    return tuple(windows)
 
 
 def _deformable(
@@ -315,10 +332,10 @@ def _deformable(
 ) -> tuple[Part, ...]:
     """Return the chosen parts, or all, ``among`` others that have internal energy at the times of the history."""
     run, history = reference
-    there = {part.id for part in run.parts if among is None} | {
+    ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
     }
-    parts = [part for part in history.parts or run.parts if part.id in there]
+    parts = [part for part in history.parts or run.parts if part.id in ids]
     if not parts:
         return ()
     energies = run.part_energies(parts)
@@ -337,9 +354,8 @@ def rigid_parts(
     ``time`` has the times of the parts' states, shape (n,).
     """
     inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    inside = slice(
-        inside.start + 1, max(inside.start + 1, inside.stop - 1)
-    )  # the switch comes at the first step after tr
+    # the switch comes at the first step after tr
+    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))
     if not parts or len(time[inside]) < FEWEST:
         return None
     energies = run.part_energies(parts)[inside]
@@ -394,40 +410,42 @@ def _judged(
     """Choose the parts to compare among ``parts``, with objections and notes."""
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
-    some = rigid is not None and bool(rigid.any()) and not rigid.all()
+    only_some_rigid = rigid is not None and bool(rigid.any()) and not rigid.all()
     objections = list[str]()
     notes = list[str]()
     chosen = parts
-    if some and rigid is not None:
+    if only_some_rigid and rigid is not None:
         still = tuple(
-            part for part, one in zip(parts, rigid.tolist(), strict=True) if one
+            part
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if is_rigid
         )
         if history.parts is None:
             chosen = still
             notes.append(f"judged by the parts that were rigid: {_names(still)}")
         else:
-            others = (part for part in parts if part not in still)
+            deforming = (part for part in parts if part not in still)
             objections.append(
-                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}"
+                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(deforming)}"
             )
-    wrong = _reported_wrong(without, switched.run, chosen, pair)
-    if not wrong and chosen is parts:
+    misreported = _reported_wrong(without, switched.run, chosen, pair)
+    if not misreported and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
-    left = tuple(part for part in chosen if part not in wrong)
-    if not left:
-        who = f"the energies of {_names(wrong)}"
+    comparable = tuple(part for part in chosen if part not in misreported)
+    if not comparable:
+        energies_text = f"the energies of {_names(misreported)}"
         objections.append(
-            f"{who} are reported wrongly after td: nothing is left to compare but the motion"
+            f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
         )
-    elif wrong:
-        found = f"left out of the comparison: {_names(wrong)}, whose energy is reported wrongly after td"
-        notes.append(f"{found}; some solvers do so with solids that were rigid")
+    elif misreported:
+        left_out = f"left out of the comparison: {_names(misreported)}, whose energy is reported wrongly after td"
+        notes.append(f"{left_out}; some solvers do so with solids that were rigid")
     selection = Selection(
-        parts=tuple(str(part.id) for part in left or chosen),
+        parts=tuple(str(part.id) for part in comparable or chosen),
         springs=tuple(str(part.id) for part in history.springs),
     )
     energies = without.run.history(selection), switched.run.history(selection)
-    return SameParts(*energies, tuple(objections), tuple(notes), known=bool(left))
+    return SameParts(*energies, tuple(objections), tuple(notes), known=bool(comparable))
 
 
 def _reported_wrong(
@@ -436,17 +454,20 @@ def _reported_wrong(
     """Return the parts whose energy after td differs from that at tr by more than it can, beyond round-off."""
     time = switched.part_time
     energies = switched.part_energies(parts)
-    first = (
-        int(np.searchsorted(time, pair[1])) + 1
-    )  # the first state from td on may still be rigid
+    # the first state from td on may still be rigid
+    first = int(np.searchsorted(time, pair[1])) + 1
     last = int(np.searchsorted(time, pair[0], side="right")) - 1
     if last < 0 or first >= time.size:
         return ()
     largest = np.abs(without.run.part_energies(parts)).max(axis=0)
-    off = np.abs(energies[first] - energies[last]) > np.maximum(
+    is_misreported = np.abs(energies[first] - energies[last]) > np.maximum(
         largest, round_off(without.history)
     )
-    return tuple(part for part, one in zip(parts, off.tolist(), strict=True) if one)
+    return tuple(
+        part
+        for part, misreported in zip(parts, is_misreported.tolist(), strict=True)
+        if misreported
+    )
 
 
 def _names(parts: Iterable[Part]) -> str:

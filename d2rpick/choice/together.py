@@ -21,9 +21,10 @@ class Together:
     @cached_property
     def beside(self) -> Beside:
         """Parts that vibrate with the chosen ones but were not chosen."""
+        # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
             vibrating_beside,
-        )  # imported here: an oscillator does not need it
+        )
 
         return vibrating_beside(self._history, self._flight)
 
@@ -35,8 +36,9 @@ class Together:
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
         """Kinetic energy of the parts that vibrate together, at times in the flight; None if it is not written."""
+        # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
             kinetic_energy_of,
-        )  # imported here: an oscillator does not need it
+        )
 
         return kinetic_energy_of(self._history, self._flight)

@@ -94,12 +94,12 @@ class Offer(OfTd):
         Windows need all candidates, and the reason why no tr is recommended needs those before the flight too.
         """
         if self.pair:
-            known = self.candidates
+            candidates = self.candidates
         else:
-            known = None
-        if known and self.basis == "energy":
-            known = next(candidates_at([self.situation], in_flight=True))
-        return suggest_at(self.situation, with_better=False, ranked=known)
+            candidates = None
+        if candidates and self.basis == "energy":
+            candidates = next(candidates_at([self.situation], in_flight=True))
+        return suggest_at(self.situation, with_better=False, ranked=candidates)
 
     @cached_property
     def quality(self) -> Quality | None:
@@ -117,16 +117,22 @@ def offers_of(
 ) -> Iterator[Offer]:
     """Yield the offer of each situation; ``peaks`` are the times of the energy peaks [time]."""
     for judged in judged_of(situations, in_flight=True):
-        found = [*ranked(judged)]
-        kept = [
-            one.order[: 0 if one.recommended is None else one.recommended + 1]
-            for one in found
+        candidates_of_each = [*ranked(judged)]
+        orders = [
+            candidates.order[
+                : 0 if candidates.recommended is None else candidates.recommended + 1
+            ]
+            for candidates in candidates_of_each
         ]
-        few = judged.at(np.concatenate(kept))
-        ends = accumulate(rows.size for rows in kept)  # noise makes many candidates
-        for one, rows, end in zip(found, kept, ends, strict=True):
-            best = replace(one, judged=few, order=np.arange(end - rows.size, end))
-            yield Offer(one.situation, best, one.situation.td in peaks)
+        judged_up_to_best = judged.at(np.concatenate(orders))
+        ends = accumulate(rows.size for rows in orders)  # noise makes many candidates
+        for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
+            best = replace(
+                candidates,
+                judged=judged_up_to_best,
+                order=np.arange(end - rows.size, end),
+            )
+            yield Offer(candidates.situation, best, candidates.situation.td in peaks)
 
 
 # Another td is worth naming if its error is at most this share of that of the start, and printed digits show it [-].
@@ -203,33 +209,32 @@ def explore_of(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = looking(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
+    # the full search gives the reason why no oscillator is seen
     situations = [
-        one if one.evidence.span else fully(one.td) for one in asked_at
-    ]  # the full search gives the reason why no oscillator is seen
-    offers = [
-        replace(one, recommended=one.td == chosen)
-        for one in _marked([*offers_of(situations, peaks)])
+        offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
-    asked = next((one for one in offers if one.td == td), None)
+    offers = [
+        replace(offer, recommended=offer.td == chosen)
+        for offer in _marked([*offers_of(situations, peaks)])
+    ]
+    requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
-    told = (
-        suggestion.situation
-    )  # the first td of the flight has too few states before it to show a vibration
+    # the first td of the flight has too few states before it to show a vibration
+    warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        situation = told = fully(
-            td
-        )  # the energy alone shows a different flight to each td: show that of ``suggest``
-    start = asked or max(
-        filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None
+        # the energy alone shows a different flight to each td: show that of ``suggest``
+        situation = warned = fully(td)
+    start = requested or max(
+        filter(_found, offers), key=lambda offer: offer.rigid_time or 0.0, default=None
     )
     return TradeOff(
         situation=situation,
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_cautions(told, window, inside, offers)),
-        asked=asked,
-        recommended=next((one for one in offers if one.recommended), None),
+        cautions=tuple(_cautions(warned, window, inside, offers)),
+        asked=requested,
+        recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
         step=_step(start, offers) if start else None,
     )
@@ -243,49 +248,54 @@ def _found(offer: Offer) -> bool:
 def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     """Mark the unbeaten offers; errors of deformations are not compared with errors of energies."""
     unbeaten = set()
-    for known in (True, False):
+    for is_residual in (True, False):
         group = [
-            one for one in offers if _found(one) and (one.basis != "energy") == known
+            offer
+            for offer in offers
+            if _found(offer) and (offer.basis != "energy") == is_residual
         ]
-        least = np.inf
+        smallest_error = np.inf
         longest = np.inf
-        read = {
-            one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error))
-            for one in group
+        printed = {
+            offer.td: (-as_read(offer.rigid_time or 0.0), as_printed(offer.error))
+            for offer in group
         }
-        for one in sorted(group, key=lambda one: read[one.td]):
-            rigid, error = read[one.td]
-            if error < least or (error, rigid) == (
-                least,
+        for offer in sorted(group, key=lambda offer: printed[offer.td]):
+            rigid, error = printed[offer.td]
+            # equal pairs do not beat each other
+            if error < smallest_error or (error, rigid) == (
+                smallest_error,
                 longest,
-            ):  # equal pairs do not beat each other
-                unbeaten.add(one.td)
-                least, longest = error, rigid
-    return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
+            ):
+                unbeaten.add(offer.td)
+                smallest_error, longest = error, rigid
+    return (replace(offer, unbeaten=offer.td in unbeaten) for offer in offers)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     """Return the nearest unbeaten offer with half the error, else the recommended one if it has less, else None."""
     error = np.inf if start.error is None else start.error
-    kept = _LEAST_KEPT * (start.rigid_time or 0.0)
-    alike = [
-        one
-        for one in offers
-        if start.pair is None or (one.basis == "energy") == (start.basis == "energy")
+    least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
+    comparable = [
+        offer
+        for offer in offers
+        if start.pair is None or (offer.basis == "energy") == (start.basis == "energy")
     ]
-    less = [
-        one
-        for one in alike
-        if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD
+    better = [
+        offer
+        for offer in comparable
+        if _found(offer) and (offer.error or 0.0) < error - EQUALLY_GOOD
     ]
     halved = [
-        one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error
+        offer
+        for offer in better
+        if offer.unbeaten and (offer.error or 0.0) <= _MUCH_LESS * error
     ]
-    near = [one for one in halved if (one.rigid_time or 0.0) >= kept]
+    long_enough = [offer for offer in halved if (offer.rigid_time or 0.0) >= least_time]
     return min(
-        near,
-        key=lambda one: abs(one.td - start.td),
-        default=next((o for o in less if o.recommended), None),
+        long_enough,
+        key=lambda offer: abs(offer.td - start.td),
+        default=next((o for o in better if o.recommended), None),
     )
 
 
@@ -297,12 +307,14 @@ def _cautions(
 ) -> Iterator[Caution]:
     """Yield the warnings that concern the whole window; each offer has those of its own td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
-    yield from (one for one in cautions_of(situation) if one.code not in of_td)
+    yield from (
+        caution for caution in cautions_of(situation) if caution.code not in of_td
+    )
     if inside[1] < window[1]:
-        kept = window[1] - inside[1]
+        kept_clear = window[1] - inside[1]
         yield Caution(
             "margin-kept",
-            f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}",
+            f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
         )
     if not any(map(_found, offers)):
         yield Caution(
@@ -325,17 +337,17 @@ def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     landings = {row.number: row.flight.end for row in plan.flights}
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
-    found = (
+    trade_offs = (
         explored_around(
             reference,
-            one.situation,
-            one.td_window,
+            trade_off.situation,
+            trade_off.td_window,
             steps=steps,
             since=landings.get(number - 1),
         )
-        for number, one in answers.items()
+        for number, trade_off in answers.items()
     )
-    return tuple(one for one in found if one)
+    return tuple(trade_off for trade_off in trade_offs if trade_off)
 
 
 def explored_around(

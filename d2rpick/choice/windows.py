@@ -59,16 +59,16 @@ def acceptable_windows(
         situation,
         np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
     )
-    kept = widest[judged.kept.reshape(-1, 3).all(axis=1)]
+    acceptable = widest[judged.kept.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:
-        return kept
+        return acceptable
     if (
-        kept.size
-        and kept[-1, 1] >= grid[-1]
-        and not (recommended is not None and kept[-1, 0] <= recommended)
+        acceptable.size
+        and acceptable[-1, 1] >= grid[-1]
+        and not (recommended is not None and acceptable[-1, 0] <= recommended)
     ):
-        kept = kept[:-1]
-    return kept
+        acceptable = acceptable[:-1]
+    return acceptable
 
 
 def clear_of_td(situation: Situation, windows: Samples) -> Samples:
@@ -76,8 +76,8 @@ def clear_of_td(situation: Situation, windows: Samples) -> Samples:
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
-    kept = windows[windows[:, 0] < end]
-    return np.stack([kept[:, 0], np.minimum(kept[:, 1], end)], axis=1)
+    early = windows[windows[:, 0] < end]
+    return np.stack([early[:, 0], np.minimum(early[:, 1], end)], axis=1)
 
 
 def alike_windows(
@@ -136,17 +136,16 @@ def coverage(
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    order = np.lexsort(
-        (-steps, times)
-    )  # at one time let windows start before others end, since the ends are included
+    # at one time let windows start before others end, since the ends are included
+    order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
     # the gap between two windows that start, or end, at the same time is empty
     lasting = (stretches[:, 0] < stretches[:, 1]) | (
         (steps[order][:-1] > 0) & (steps[order][1:] < 0)
     )
-    seen = lasting & (counts > 0)
-    return stretches[seen], counts[seen]
+    is_counted = lasting & (counts > 0)
+    return stretches[is_counted], counts[is_counted]
 
 
 def common_windows(runs: Sequence[Samples]) -> Samples:
@@ -170,11 +169,17 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
     # the largest acceptable energy is passed between samples; stay just below it in floating point
-    most = find_crossings(
+    highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * most_energy(situation)
     )[0]
     times = np.concatenate(
-        [history.time, candidates.tr, most, situation.vibration.knots(), ends]
+        [
+            history.time,
+            candidates.tr,
+            highest_crossings,
+            situation.vibration.knots(),
+            ends,
+        ]
     )
     return union(times[(times >= max(start, history.time[0])) & (times < td)])
 
@@ -187,29 +192,28 @@ def _residual_left(situation: Situation) -> float:
         return np.inf
     if share is None or sqrt(share) > limit:
         return -1.0
-    return sqrt(limit - sqrt(share)) * sqrt(
-        limit + sqrt(share)
-    )  # the square of a large limit overflows
+    # the square of a large limit overflows
+    return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))
 
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
     """Return the windows in which the error does not exceed ``level``, shape (n, 2) [time]."""
-    most = most_energy(situation)
+    highest = most_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
         return (situation.errors(times) <= level) & (
-            situation.vibration.whole.energies(times) <= most
+            situation.vibration.whole.energies(times) <= highest
         )
 
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])
-    within = grid[np.stack([first, last], axis=1)]
-    if not within.size:
-        return within
+    inner = grid[np.stack([first, last], axis=1)]
+    if not inner.size:
+        return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
     return narrow(
-        lambda t: keeps(t.ravel()).reshape(t.shape), within, beyond, steps=_END_HALVINGS
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_END_HALVINGS
     ).within
 
 
@@ -279,13 +283,13 @@ def _inside(times: Samples, windows: Samples) -> Samples:
 
 def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
     """Leave out points on a straight line: keep the ends of the windows, then add the worst point of each gap."""
-    kept = np.flatnonzero(np.isin(times, windows))
+    points = np.flatnonzero(np.isin(times, windows))
     while True:
-        off = np.abs(errors - np.interp(times, times[kept], errors[kept]))
+        deviations = np.abs(errors - np.interp(times, times[points], errors[points]))
         worst = np.repeat(
-            np.maximum.reduceat(off, kept), np.diff(kept, append=times.size)
+            np.maximum.reduceat(deviations, points), np.diff(points, append=times.size)
         )
-        new = np.flatnonzero((off == worst) & (off > _EXACT / 2))
+        new = np.flatnonzero((deviations == worst) & (deviations > _EXACT / 2))
         if not new.size:
-            return np.stack([times[kept], errors[kept]])
-        kept = np.union1d(kept, new)
+            return np.stack([times[points], errors[points]])
+        points = np.union1d(points, new)
