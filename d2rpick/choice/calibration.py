@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -88,14 +89,10 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
     deformable = [
         observation for observation in observations if not observation.rigid_nodes
     ]
-    classes = sorted(
-        {
-            name
-            for observation in observations
-            for name, count in observation.counts.items()
-            if count and name in MEASURED
-        }
-    )
+    names = set[str]()
+    for observation in observations:
+        names.update(name for name, count in observation.counts.items() if count)
+    classes = sorted(names & MEASURED.keys())
     if not deformable or not classes:
         raise ConfigurationError(
             "no leg without rigid parts has elements of a known formulation; give such a run too"
@@ -113,10 +110,10 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
         f"calibrated by {len(observations)} legs",
     )  # fmt: skip
     misfit = float(np.sqrt(np.mean((scaled @ solution - 1) ** 2)))
-    names = (*classes, _REST, _RIGID)
+    unknowns = (*classes, _REST, _RIGID)
     return Calibration(
         weights,
-        tuple(np.array(names)[is_determined].tolist()),
+        tuple(np.array(unknowns)[is_determined].tolist()),
         misfit,
         tuple(observations),
     )
@@ -231,9 +228,8 @@ def observations_of_runs(
                 )
             else:
                 legs_by_content[content] = tuple(legs)
-    return tuple(
-        observation for legs in legs_by_content.values() for observation in legs
-    ), tuple(dict.fromkeys(cautions))
+    observations = tuple(chain.from_iterable(legs_by_content.values()))
+    return observations, tuple(dict.fromkeys(cautions))
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:

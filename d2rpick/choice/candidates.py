@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
@@ -37,7 +37,7 @@ _MORE: Final = 8  # growth of the number of td judged at once: the first may hav
 # A residual that may be higher by this much gets a note [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
-_SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
+_SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
 
 
 class Candidate(Measured, Record):
@@ -228,10 +228,7 @@ class Judged:
     @property
     def near_td(self) -> NDArray[np.bool_]:
         """True for each candidate of many modes in the last part of the flight before td, which saves little."""
-        starts = [
-            -np.inf if situation.earliest_tr is None else situation.earliest_tr
-            for situation in self.situations
-        ]
+        starts = [_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.place]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
@@ -340,38 +337,43 @@ class Candidates(Sequence[Candidate]):
         values["sign_match"] = values["sign_match"] > 0 if is_compared else None
         history = situation.history
         td = situation.td
-        energy = values["energy"]
         if values["position_error"] is not None and situation.bodies:
             values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if is_compared else ()
-        objections = tuple(
-            chain.from_iterable(
-                objection.told(i)
-                for objection in judged.objections
-                if objection.holds[i]
-            )
-        )
-        remarks = _remarks(situation, reach, values if is_compared else {}, parts)
+        notes = list[str]()
+        for objection in judged.objections:
+            if objection.holds[i]:
+                notes += objection.told(i)
+        acceptable = not notes
+        if values["same_swing"]:
+            notes.append(_SAME_SWING)
+        notes += _remarks(situation, reach, values if is_compared else {}, parts)
+        energy_ratio = None
+        if situation.energy_td > 0 and not situation.at_rest:
+            energy_ratio = values["energy"] / situation.energy_td
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy_ratio=energy / situation.energy_td
-            if situation.energy_td > 0 and not situation.at_rest
-            else None,
+            energy_ratio=energy_ratio,
             rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            acceptable=not objections,
+            acceptable=acceptable,
             recommended=rank == self.recommended,
-            notes=(*objections, *_SAME_SWING * values["same_swing"], *remarks),
+            notes=tuple(notes),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
             parts=parts,
             **values,
         )
+
+
+def _start_of_flight(situation: Situation) -> float:
+    """Return the earliest tr in the flight [time]; minus infinity if it is unknown."""
+    return -np.inf if situation.earliest_tr is None else situation.earliest_tr
 
 
 def _known(value: Any) -> Any:
@@ -391,12 +393,9 @@ def judged_of(
     first, together = 0, 1
     while first < len(situations):
         batch = situations[first : first + together]
-        starts = [
-            situation.earliest_tr
-            if in_flight and situation.earliest_tr is not None
-            else -np.inf
-            for situation in batch
-        ]
+        starts = [-np.inf] * len(batch)
+        if in_flight:
+            starts = [_start_of_flight(situation) for situation in batch]
         moments_of_each = moments_of(
             [situation.vibration for situation in batch],
             batch[0].settings.tolerance,

@@ -95,16 +95,20 @@ def compare(
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
     judged = same_parts(reference, switched, pair)
+    end = np.inf
+    if situation.latest_td > situation.td:
+        end = situation.latest_td
+    centres: tuple[Track | None, Track | None] = (None, None)
+    if parts:
+        centres = (run.centre(parts), switched.run.centre(parts))
     comparison = compare_runs(
         judged.reference,
         judged.switched,
         pair,
-        situation.latest_td if situation.latest_td > situation.td else np.inf,
+        end,
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(switched.run, together)),
-        centres=(run.centre(parts), switched.run.centre(parts))
-        if parts
-        else (None, None),
+        centres=centres,
         known=judged.known,
         min_mean=min_mean,
     )
@@ -232,24 +236,16 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _range(reference, tr, td)
     rounding = round_off(reference)
-    return max(
-        digits,
-        rounding
-        if level + vibrates <= rounding
-        else min(_STILL * level, _STILL_OF_VIBRATION * vibrates),
-    )
+    if level + vibrates <= rounding:
+        return max(digits, rounding)
+    return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
 
 
 def _range(history: History, start: float, end: float) -> float:
     """Return the range of the energy between two times [energy]."""
-    return float(
-        np.ptp(
-            np.append(
-                history.between(start, end)[1],
-                history.energies_at(np.array([start, end])),
-            )
-        )
-    )
+    inside = history.between(start, end)[1]
+    at_ends = history.energies_at(np.array([start, end]))
+    return float(np.ptp(np.append(inside, at_ends)))
 
 
 def _rigid_window(

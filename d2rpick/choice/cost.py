@@ -155,7 +155,8 @@ class CostModel:
 
     def saved(self, parts: Collection[int]) -> Share:
         """Return the share c of a step saved while ``parts`` are rigid [-]; unknown for parts not in the deck."""
-        if absent := sorted(set(parts) - self.inventory.parts.keys()):
+        absent = sorted(set(parts) - self.inventory.parts.keys())
+        if absent:
             return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
         elements = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in elements.items())
@@ -205,13 +206,11 @@ class CostModel:
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
-            return Share(
-                None,
-                f"not all elements are known: {self.inventory.notes[0]}"
-                if self.inventory.notes
-                else None,
-            )
-        if unknown := sorted({*amount.unknown, *self.total.unknown}):
+            if not self.inventory.notes:
+                return Share(None)
+            return Share(None, f"not all elements are known: {self.inventory.notes[0]}")
+        unknown = sorted({*amount.unknown, *self.total.unknown})
+        if unknown:
             return Share(
                 None,
                 f"no weight is known for {', '.join(unknown)}; give one with `weights`",
@@ -253,7 +252,8 @@ def read_weights(path: str) -> Weights:
         raise ConfigurationError(
             f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
         ) from None
-    if unknown := [key for key in values if key not in _KEYS]:
+    unknown = [key for key in values if key not in _KEYS]
+    if unknown:
         raise ConfigurationError(
             f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}"
         )

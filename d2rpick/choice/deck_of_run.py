@@ -133,7 +133,10 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
     for part in parts:
-        if part in inventory.parts and (why := inventory.parts[part].unswitchable):
+        if part not in inventory.parts:
+            continue
+        why = inventory.parts[part].unswitchable
+        if why:
             yield Caution(
                 "unswitchable-part", f"{name_units([part])}: {why}; leave it out"
             )
@@ -204,7 +207,8 @@ def with_deck(
     A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
     """
     inventory = model.inventory
-    if foreign := of_another_model(reference.run, inventory):
+    foreign = of_another_model(reference.run, inventory)
+    if foreign:
         return replace(settings, bodies=()), (foreign,)
     ids = [part.id for part in reference.history.parts or ()]
     doubts_of_parts = (
@@ -265,8 +269,10 @@ def _surroundings(inventory: Inventory) -> Surroundings:
     on_free = {
         gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()
     }
-    if len(on_free) == 1 and (common := on_free.pop()) is not None:
-        gravity[None] = common
+    if len(on_free) == 1:
+        (common,) = on_free
+        if common is not None:
+            gravity[None] = common
     return Surroundings(gravity, supports, partial(_bodies, inventory))
 
 
@@ -305,9 +311,8 @@ def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
     """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
-        return tuple(
-            sorted({abs(value) for load in loads for value in load.values} or {0.0})
-        )
+        values = loads[0].values if loads else ()
+        return tuple(sorted({abs(value) for value in values} or {0.0}))
     if any(load.axis is None or len(load.values) > 1 for load in loads):
         return None
     along = [

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # Places in the record at which a continuing vibration is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
+_NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
 
 
 def longest_flight(
@@ -40,22 +41,23 @@ def longest_flight(
         If there is no flight and no ``otherwise``.
     """
     flights = flights_of(history, settings, fits)
-    if settings.landing is not None and (
-        last := _last_before(settings.landing, flights)
-    ):
-        flights = (last,)
+    if settings.landing is not None:
+        last = _last_before(settings.landing, flights)
+        if last:
+            flights = (last,)
     if not flights and otherwise:
         return otherwise
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
-        reason = (
-            held or "nothing in the record shows a flight, in which td could be chosen"
-        )
-        if settings.after is not None:
+        if held:
+            reason = held
+            cure = "only what nothing holds can be switched"
+        elif settings.after is not None:
+            reason = _NO_FLIGHT
             cure = "give `td`"
         else:
+            reason = _NO_FLIGHT
             cure = "give the end of the load as `after` where it is known"
-        cure = "only what nothing holds can be switched" if held else cure
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(
@@ -137,13 +139,9 @@ def _with_given_start(
         or given_flight.start != load_end
     ):
         return flights
-    return _in_order(
-        history,
-        flights,
-        given_flight
-        if given_flight.end is not None or end == last
-        else given_flight._replace(end=end),
-    )
+    if given_flight.end is None and end != last:
+        given_flight = given_flight._replace(end=end)
+    return _in_order(history, flights, given_flight)
 
 
 def _in_order(

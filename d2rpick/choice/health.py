@@ -103,14 +103,15 @@ def assess(
             "shares of it are meaningless"
         )
         return Health(**_ratio(balance), window=window, reason=reason, until=until)
+    negative_sliding = None
+    if balance.sliding is not None:
+        negative_sliding = -balance.sliding
     return Health(
         hourglass_share=_share(balance.against_hourglassing, peak),
         **_worst_part(balance),
         **_ratio(balance),
         sliding_share=_share(_without_friction(balance), peak),
-        negative_sliding_share=None
-        if balance.sliding is None
-        else _share(-balance.sliding, peak),
+        negative_sliding_share=_share(negative_sliding, peak),
         eroded_share=_share(balance.eroded, peak),
         window=window,
         **(_in_window(balance, *window, locked) if window else {}),
@@ -150,7 +151,8 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
         wrong_energies,
     )
 
-    if listings := list(wrong_energies(sources)):
+    listings = list(wrong_energies(sources))
+    if listings:
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
         text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
         yield Caution(WRONG_ENERGY, text)
@@ -357,7 +359,9 @@ def unsound(history: History) -> Iterator[Caution]:
             "energy-too-large",
             f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
         )
-    elif reason := _blew_up(history):
+        return
+    reason = _blew_up(history)
+    if reason:
         yield Caution("blew-up", reason)
     elif _has_nothing(history):
         reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"

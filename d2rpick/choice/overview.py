@@ -106,10 +106,9 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     if deck is not None:
         run, deck_warnings = _in_deck(run, deck)
     first = run.databases[0]
-    notes = [
-        *run.left_out,
-        *(note for database in run.databases for note in _notes(database)),
-    ]
+    notes = list(run.left_out)
+    for database in run.databases:
+        notes += _notes(database)
     notes += doubts(run.databases)
     notes += run.unused_energies(selection)
     states = None
@@ -178,9 +177,9 @@ def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
 
     inventory = read_inventory(deck)
     foreign = of_another_model(run, inventory)
-    return in_deck(run, inventory), (foreign,) if foreign else tuple(
-        doubts_of_solver((), inventory)
-    )
+    if foreign:
+        return run, (foreign,)
+    return in_deck(run, inventory), tuple(doubts_of_solver((), inventory))
 
 
 def _missing(run: Run) -> str:
@@ -288,7 +287,8 @@ def _history(run: Run, selection: Selection) -> History | None:
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
     try:
-        refuse_unsound(history, settings := Settings())
+        settings = Settings()
+        refuse_unsound(history, settings)
         flights = flights_of(history, settings)
     except RangeError:
         return ()

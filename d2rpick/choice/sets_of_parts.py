@@ -11,7 +11,6 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
 from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.candidates import ONE_BODY
-from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (
     bodies_of,
     doubts_of,
@@ -40,6 +39,7 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
@@ -218,25 +218,16 @@ def recommended_parts(
     if answer.recommended is None:
         if answer.facts.reason:
             raise FormatError(answer.facts.reason)
-        absent = [
-            part_set.message
-            for part_set in answer.cautions
-            if part_set.code == "parts-not-in-deck"
+        reasons = [
+            caution.message
+            for caution in answer.cautions
+            if caution.code == "parts-not-in-deck"
         ]
-        why = "; ".join(
-            dict.fromkeys(
-                [
-                    *absent,
-                    *(
-                        reason
-                        for part_set in answer.sets
-                        for reason in part_set.reasons
-                    ),
-                ]
-            )
-        )
+        for part_set in answer.sets:
+            reasons += part_set.reasons
+        why = "; ".join(dict.fromkeys(reasons)) or "no part may be switched"
         raise FormatError(
-            f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
+            f"{run.name}: no set of parts can be recommended ({why}); name the parts"
         )
     return answer.recommended.parts
 
@@ -299,13 +290,11 @@ class _Comparison:
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
         """Complete a set with its costs and errors, for a given (tr, td) or td, or for a td of its own."""
-        share = self.model.saved(part_set.parts) if self.model else Share(None)
-        reasons = [share.reason]
-        part_set = (
-            self._with_cost(part_set, self.model.inventory, share)
-            if self.model
-            else part_set
-        )
+        reasons = list[str | None]()
+        if self.model:
+            share = self.model.saved(part_set.parts)
+            reasons.append(share.reason)
+            part_set = self._with_cost(part_set, self.model.inventory, share)
         try:
             part_set = self._with_window(part_set, times)
         except (FormatError, RangeError) as error:
@@ -329,13 +318,15 @@ class _Comparison:
         }
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
         rigid = {part for part, count in rigid_elements.items() if count == whole[part]}
+        elements = sum(rigid_elements.values())
+        element_fraction = None
+        if whole:
+            element_fraction = elements / sum(whole.values())
         return part_set._replace(
             bodies=inventory.bodies(part_set.parts),
             moving=self._loose(inventory, part_set.parts),
-            elements=sum(rigid_elements.values()),
-            element_fraction=sum(rigid_elements.values()) / sum(whole.values())
-            if whole
-            else None,
+            elements=elements,
+            element_fraction=element_fraction,
             mass_fraction=self._mass_fraction(part_set.parts),
             cost_share=share.value,
             step_growth=step_growth(self.rows, {*part_set.parts, *rigid}),
@@ -469,9 +460,8 @@ def _cautions(
     yield from doubts_of_solver((), model.inventory)
     yield from left_rigid_in(run, model.inventory)
     yield from doubts_of_cost(model)
-    if missing := [
-        row.id for row in rows if row.elements is None and row.id in facts.parts
-    ]:
+    missing = [row.id for row in rows if row.elements is None and row.id in facts.parts]
+    if missing:
         yield Caution(
             "parts-not-in-deck",
             f"{name_units(missing)} of the history {are(missing)} not in the deck",

@@ -467,11 +467,9 @@ def _described_by_modes(
     else:
         guess = Span(quiet.start, last if quiet.end is None else quiet.end)
     described = find_described(history, td, guess, fits)
-    return (
-        Described(*described.span, described.vibration.vibration_energy)
-        if described
-        else None
-    )
+    if described is None:
+        return None
+    return Described(*described.span, described.vibration.vibration_energy)
 
 
 def _with_hidden_share(

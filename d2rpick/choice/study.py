@@ -220,6 +220,9 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         acceptable_windows(situation, answer.candidates, best.tr if best else None),
     )
     messages = {caution.code: caution.message for caution in answer.cautions}
+    alike = acceptable
+    if best:
+        alike = alike_windows(situation, answer.candidates, best, acceptable)
     row = StudyRow(
         source=source,
         status=NONE,
@@ -230,9 +233,7 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         time_unit=situation.history.time_unit,
         td=situation.td,
         acceptable=acceptable,
-        alike=alike_windows(situation, answer.candidates, best, acceptable)
-        if best
-        else acceptable,
+        alike=alike,
         profile=error_profile(situation, answer.candidates, acceptable),
     )
     if best is None:
@@ -314,7 +315,8 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
         yield Caution(
             "runs-left-out", f"{text} and are left out: {listing(left_out, most=NAMED)}"
         )
-    if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
+    cut = [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]
+    if cut:
         yield Caution(
             "cut-runs",
             f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}",

@@ -181,11 +181,12 @@ def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float
 
 def _masses(run: Run) -> dict[int, float]:
     """Return the known masses by part id [mass]."""
-    if (found := run.masses) is None:
+    masses = run.masses
+    if masses is None:
         return {}
     return {
         part.id: mass
-        for part, mass in zip(run.parts, found.tolist(), strict=True)
+        for part, mass in zip(run.parts, masses.tolist(), strict=True)
         if np.isfinite(mass)
     }
 
@@ -274,34 +275,39 @@ def _described(
     if by_deck[1] is None:
         step, source = printed.get(part, (None, None))
     else:
-        step, source = (by_deck[1], "deck")
-    mass = fact.mass if fact and fact.mass is not None else by_deck[0]
-    title = data.title if data and data.title else fact.part.title if fact else ""
+        step, source = by_deck[1], "deck"
+    mass = by_deck[0]
+    mass_source = None if mass is None else "deck"
+    if fact and fact.mass is not None:
+        mass = fact.mass
+        mass_source = "history"
+    title = fact.part.title if fact else ""
+    if data and data.title:
+        title = data.title
+    formulations = tuple[str, ...]()
+    if inventory and counts:
+        formulations = tuple(inventory.formulation(part, kind).name for kind in counts)
+    flight = None
+    if fact and facts.longest is not None and fact.flights:
+        flight = fact.flights[facts.longest]
+    shares_nodes = None
+    if inventory and data:
+        shares_nodes = tuple(sorted(inventory.neighbours.get(part, ())))
     return PartRow(
         id=part,
         title=title,
         elements=counts,
-        formulations=tuple(inventory.formulation(part, kind).name for kind in counts)
-        if inventory and counts
-        else (),
+        formulations=formulations,
         material=data.material.name if data and data.material else None,
         kind=_kind(data, counts),
         mass=mass,
-        mass_source=None
-        if mass is None
-        else "history"
-        if fact and fact.mass is not None
-        else "deck",
+        mass_source=mass_source,
         flights=fact.flights if fact else (),
-        flight=fact.flights[facts.longest]
-        if fact and facts.longest is not None and fact.flights
-        else None,
+        flight=flight,
         cost_share=model.share_of(part).value if model and counts is not None else None,
         smallest_step=step,
         step_source=source,
-        shares_nodes=tuple(sorted(inventory.neighbours.get(part, ())))
-        if inventory and data
-        else None,
+        shares_nodes=shares_nodes,
     )
 
 
