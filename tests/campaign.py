@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.workers import cores, on_cores
+from d2rpick.base.workers import choose_farm, count_cores
 from d2rpick.deck.reader import read_deck
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.formats.d3plot import open_legs
@@ -206,7 +206,7 @@ def main() -> int:
         for form in forms
     ]
     found: dict[str, Counter[str]] = {form: Counter() for form in forms}
-    with on_cores(cores(), "tests.faults") as farm:
+    with choose_farm(count_cores(), "tests.faults") as farm:
         for answer in farm.answers(partial(chunk, options.seed), tasks):
             form, numbers = tasks[answer.number]
             found[form] += (

@@ -17,7 +17,7 @@ os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
 import pytest
 from hypothesis import settings
 
-from d2rpick.base.workers import cores
+from d2rpick.base.workers import count_cores
 
 # A busy machine is no finding.  Each run asks other examples: a fifth of the usual hundred are as good as all.
 settings.register_profile("d2rpick", deadline=None, max_examples=20)
@@ -68,7 +68,7 @@ gc.set_threshold(20_000, 20, 50)
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Run a process on each core: each collects all tests, and what waits for a child leaves its core to that."""
-    return cores()
+    return count_cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

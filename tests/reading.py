@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.files import at_rest
+from d2rpick.base.files import read_at_rest
 from d2rpick.choice.question import Reference
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.database import Legs
@@ -89,7 +89,7 @@ def read_history(
 def on_disk(file: Path, of: type[OnDisk] = InPieces) -> OnDisk:
     """Content of a file that stays on its disk, however small it is itself."""
     with file.open("rb", buffering=0) as opened:
-        state = at_rest(str(file), opened, FormatError, may_grow=True)
+        state = read_at_rest(str(file), opened, FormatError, may_grow=True)
         assert not isinstance(state, bytes)
         return of(str(file), os.dup(opened.fileno()), state)
 

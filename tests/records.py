@@ -15,11 +15,11 @@ from d2rpick.histories.history import (
     Momenta,
     Record,
     Samples,
-    rows_of,
+    select_states,
 )
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator import from_mode, lacking_energy
+from d2rpick.vibration.oscillator import compute_lacking_energy, make_from_mode
 from tests import paper
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
@@ -56,7 +56,7 @@ def until(history: History, time: float) -> History:
     """Give what a record was when the run had come to a time."""
 
     def cut(record: Record) -> Record:
-        return rows_of(record, record.time <= time)
+        return select_states(record, record.time <= time)
 
     momenta, balance = (
         tuple(cut(one) for one in history.momenta),
@@ -104,10 +104,12 @@ def replayed_residual(
     """
     lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
     for mode in [modes] if isinstance(modes, Mode) else modes:
-        oscillator, at_td = from_mode(mode, td)
+        oscillator, at_td = make_from_mode(mode, td)
         at_tr = oscillator.free(
             at_td, tr - td
         )  # the closed form runs backwards as well
-        lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
+        lack += compute_lacking_energy(
+            oscillator, at_td, oscillator.rigid(at_tr, td - tr)
+        )
         whole += oscillator.vibration_energy(at_td)
     return np.sqrt(lack / whole)

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from d2rpick.histories.history import Samples
-from d2rpick.models.box_model import Parameters, build
+from d2rpick.models.box_model import Parameters, build_structure
 from d2rpick.models.box_run import PARTS, Record, simulate
 from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import ROOT
@@ -155,7 +155,7 @@ def _t01_globals(record: Record) -> Samples:
 
 
 def _masses() -> tuple[float, float]:
-    structure = build(Parameters())
+    structure = build_structure(Parameters())
     return float(structure.masses[: structure.of_box].sum()), float(
         structure.masses[structure.of_box :].sum()
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.deck import read_inventory
-from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
+from d2rpick.deck.geometry import compute_masses_and_steps, compute_sizes_and_lengths
 from d2rpick.deck.mesh import NO_NODE
 from d2rpick.deck.model import SPRING
 from d2rpick.histories.formats.radioss_th import TimeHistory
@@ -69,11 +69,11 @@ def read_nodes(deck: Path) -> Nodes:
     element by its nodes.
     """
     inventory = read_inventory(str(deck))
-    of_parts = masses_and_steps(inventory)
+    of_parts = compute_masses_and_steps(inventory)
     masses = np.zeros(len(inventory.coordinates))
     for elements in inventory.elements:
         ends = elements.nodes[:, :2] if elements.kind in _LINES else elements.nodes
-        sizes, _ = sizes_and_lengths(
+        sizes, _ = compute_sizes_and_lengths(
             elements.kind, elements.nodes, inventory.coordinates
         )
         for part in np.unique(elements.part).tolist():

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
-from d2rpick.base.errors import DeckError, if_written
-from d2rpick.base.files import write_whole
+from d2rpick.base.errors import DeckError, give_if_written
+from d2rpick.base.files import write_as_a_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -104,7 +104,7 @@ class Paged(Answer):
     def _repr_html_(self) -> str:
         from d2rpick.report.pages import glance
 
-        return glance(self.kind, self, if_written(self.plot))
+        return glance(self.kind, self, give_if_written(self.plot))
 
     def plot(self) -> Figure:
         """Draw the answer as a matplotlib Figure: the energy, and what was chosen or judged."""
@@ -213,7 +213,7 @@ def written(path: arguments.Path, page: str) -> Path:
     from d2rpick.api import arguments
 
     place = Path(*arguments.paths("path", path))
-    write_whole(place, page.encode())
+    write_as_a_whole(place, page.encode())
     return place
 
 

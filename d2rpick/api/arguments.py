@@ -153,9 +153,9 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
 
 def without_unit(value: object) -> str:
     """Say how a time with a unit is given, or nothing."""
-    from d2rpick.histories.names import in_seconds
+    from d2rpick.histories.names import parse_seconds
 
-    seconds = in_seconds(str(value))
+    seconds = parse_seconds(str(value))
     return (
         ""
         if seconds is None

@@ -11,10 +11,16 @@ from typing import TYPE_CHECKING
 from d2rpick.api import arguments
 from d2rpick.api.deck_in_folder import find_deck_in_folder, name_deck
 from d2rpick.api.request import Request
-from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
+from d2rpick.base.errors import (
+    ArgumentError,
+    Caution,
+    FormatError,
+    list_names,
+    name_units,
+)
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.question import Reference
-from d2rpick.histories.names import Selection, asks_for_recommended
+from d2rpick.histories.names import Selection, has_recommended
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -200,7 +206,7 @@ def selected(
     from d2rpick.deck.model import DISCRETE
 
     if foreign := of_another_model(run, model.inventory):
-        if asks_for_recommended(selection.parts, run.parts):
+        if has_recommended(selection.parts, run.parts):
             raise FormatError(
                 f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
             )
@@ -210,14 +216,14 @@ def selected(
         part for part, kinds in counts.items() if {*kinds} <= DISCRETE
     }
     parts = selection.parts
-    if asks_for_recommended(parts, run.parts):
+    if has_recommended(parts, run.parts):
         parts = tuple(map(str, recommended_parts(run, settings, model)))
     return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
 def _check_recommended(request: Request, run: histories.Run) -> None:
     """Refuse the word for the recommended set beside other parts, or without a deck."""
-    if asks_for_recommended(request.part, run.parts):
+    if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
                 "`parts` recommended stands for a whole set; leave the other `parts` out"
@@ -237,7 +243,7 @@ def _merged(asked: Asked, merge: int) -> Asked:
         return asked
     cautions, bodies = asked.cautions, asked.settings.bodies or ()
     if len(bodies) > 1:
-        apart = listing([name_units(body.parts) for body in bodies], between="; ")
+        apart = list_names([name_units(body.parts) for body in bodies], between="; ")
         found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
         cautions = (
             *cautions,

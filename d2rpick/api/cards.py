@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck.printed_card import PrintedCard, Printing, Solver as Module
+    from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
@@ -244,9 +244,9 @@ class Cards:
         cards = replace(cards, name=cards.name or found.name, end=end)
         if not parts or cards.node:
             return cards, ()
-        from d2rpick.deck.radioss_bodies import bodies_for
+        from d2rpick.deck.radioss_bodies import find_bodies
 
-        bodies = bodies_for(deck, parts)
+        bodies = find_bodies(deck, parts)
         cards = replace(
             cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced
         )
@@ -429,7 +429,7 @@ def card_of(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
     """Print the card of windows, judged as printed where there is a run."""
-    from d2rpick.deck.printing import DEFAULT, SOLVERS, cards as print_cards
+    from d2rpick.deck.printing import DEFAULT, SOLVERS, print_cards
 
     if run is None:
         request.without_history()

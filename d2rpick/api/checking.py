@@ -13,12 +13,12 @@ from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
 from d2rpick.base.files import STDIN
-from d2rpick.deck import main_decks
-from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck import find_main_decks
+from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.restarts import is_restart
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
-from d2rpick.rules import RULES, Checked, Configuration, check_deck, configuration_for
+from d2rpick.rules import RULES, Checked, Configuration, check_deck, find_configuration
 from d2rpick.rules.base import LS_DYNA, Severity, Unreadable
 
 if TYPE_CHECKING:
@@ -192,7 +192,7 @@ def findings_of(
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
     """Check a deck that was written here by the configuration nearest to it."""
     checked = check_deck(
-        deck, configuration_for(deck, Configuration(), SETTINGS), judge
+        deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
     return Findings(
         results=(checked,), cautions=tuple(judge.cautions), history=judge.run.sources
@@ -206,7 +206,7 @@ def _each(
     seen: set[str] = set()
     real_folder = cache(os.path.realpath)  # which asks the system for each folder above
     configured = cache(
-        lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
+        lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
     found_by_name = {name: _decks(name) for name in dict.fromkeys(named)}
     listed = [
@@ -232,7 +232,7 @@ def _each(
                 others = (
                     []
                     if isinstance(found, Checked) and found.solver == LS_DYNA
-                    else run_files(deck)
+                    else list_run_files(deck)
                 )
                 seen.update([real, *map(os.path.realpath, others)])
                 yield found
@@ -241,7 +241,7 @@ def _each(
 def _decks(name: str) -> list[str] | DeckError:
     """Give the main decks in a folder, or the deck itself; an error for a folder without any."""
     try:
-        return main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
+        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
     except DeckError as error:
         return error
 
@@ -257,7 +257,7 @@ def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
             for deck in decks
             if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
         ]
-        if len(beside) == 1 and not run_files(beside[0]):
+        if len(beside) == 1 and not list_run_files(beside[0]):
             legs.setdefault(beside[0], []).append(restart)
     return legs
 

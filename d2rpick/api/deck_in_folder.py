@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import ArgumentError, Caution, listing
+from d2rpick.base.errors import ArgumentError, Caution, list_names
 
 if TYPE_CHECKING:
     from d2rpick.api.request import Request
@@ -29,7 +29,7 @@ def find_deck_in_folder(request: Request) -> Request:
     decks = find_decks_of_run(folder)
     if len(decks) > 1:
         raise ArgumentError(
-            f"{folder}: {len(decks)} main decks ({listing(decks, most=5)}); name the deck of the run with `deck`,"
+            f"{folder}: {len(decks)} main decks ({list_names(decks, most=5)}); name the deck of the run with `deck`,"
             " or use none with `no_deck`"
         )
     if not decks:

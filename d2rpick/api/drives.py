@@ -14,7 +14,7 @@ from d2rpick.base.errors import ConfigurationError, D2RPickError
 from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
-from d2rpick.deck.writing import driven_deck
+from d2rpick.deck.writing import read_driven_deck
 from d2rpick.histories.opening import open_run
 from d2rpick.running.checks import check_driven
 from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Observer
@@ -79,7 +79,7 @@ class Driving:
     ) -> None:
         self.name, self.folder, self._told = deck, folder, told
         self.commands = Commands(starter, engine, threads)
-        self.deck = driven_deck(deck, numbers("--part", part) if part else ())
+        self.deck = read_driven_deck(deck, numbers("--part", part) if part else ())
         self.inventory = read_inventory(deck)
         known = wait_of_deck(self.inventory)
         if wait is not None:

@@ -121,12 +121,14 @@ class Motion:
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
         """Give the motion, and how it is switched where it is."""
-        from d2rpick.vibration.oscillator import Replay, trajectory
+        from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
         start, oscillator, switched = self.start, self.oscillator, None
         if self.tr is not None and self.td is not None:
             switched = Replay(oscillator, start, 0.0, self.tr, self.td)
-        return trajectory(oscillator, start, self.t_end, self.dt, switched), switched
+        return compute_trajectory(
+            oscillator, start, self.t_end, self.dt, switched
+        ), switched
 
 
 MOST_STATES = 1_000_000
@@ -288,17 +290,17 @@ class Scanning:
     """A scan that is about to be computed: the run without switching, what is recommended from it, and other tr."""
 
     def __init__(self, box: Box) -> None:
-        from d2rpick.base.workers import begin, cores
+        from d2rpick.base.workers import count_cores, start_importing
 
-        begin(box.jobs or cores(), "d2rpick.models.box_run")
+        start_importing(box.jobs or count_cores(), "d2rpick.models.box_run")
         from d2rpick.choice.answers import suggest
         from d2rpick.choice.question import Settings
-        from d2rpick.models.box_run import comparison_end, history_of, scan_times
+        from d2rpick.models.box_run import find_comparison_end, make_history, scan_times
 
         self.box, self.td, self.reference = box, next(iter(box.td), TD), box.simulated()
-        comparison_end(self.reference, self.td)
+        find_comparison_end(self.reference, self.td)
         times = scan_times(self.reference.released or self.td / 3, self.td)
-        self.answer = suggest(history_of(self.reference), self.td, Settings())
+        self.answer = suggest(make_history(self.reference), self.td, Settings())
         self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
         self.times = (
             sorted({*times, self.answer.recommended.tr})

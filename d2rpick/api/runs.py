@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
 from d2rpick.api.tables import is_table
-from d2rpick.base.errors import if_written
+from d2rpick.base.errors import give_if_written
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -61,8 +61,8 @@ class Run:
     def _repr_html_(self) -> str | None:
         from d2rpick.report.pages import glance
 
-        overview = if_written(self.overview)
-        history = if_written(lambda: self.files.history(self.chosen))
+        overview = give_if_written(self.overview)
+        history = give_if_written(lambda: self.files.history(self.chosen))
         if overview is None or history is None:
             return glance("overview", overview, None) if overview else None
         from d2rpick.report.figures_choice import draw_run

@@ -19,8 +19,8 @@ from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
-from d2rpick.base.files import append_whole, record_of, signed
-from d2rpick.base.workers import Farm, on_cores
+from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
+from d2rpick.base.workers import Farm, choose_farm
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
 from d2rpick.report.study import PLAIN, RUN
@@ -122,7 +122,7 @@ def study(
         input_format=known_format(input_format),
     )  # fmt: skip
     question = question_of(request, asked, curve=True)
-    with on_cores(min(processes, len(names)), "d2rpick.choice.study") as farm:
+    with choose_farm(min(processes, len(names)), "d2rpick.choice.study") as farm:
         return summary(request, question, names, list(rows_of(question, names, farm)))
 
 
@@ -241,7 +241,7 @@ def line(row: StudyRow, asked: str) -> str:
     }
     if row.curve is not None:
         record["curve"] = row.curve.tolist()
-    return signed(json.dumps(record, allow_nan=False))
+    return add_checksum(json.dumps(record, allow_nan=False))
 
 
 class Ledger:
@@ -283,7 +283,7 @@ class Ledger:
                 f'{name}:1: not a run of a study, which begins with {{"source": ; give another file'
             )
         for text in content.split(b"\n"):
-            if record := record_of(text):
+            if record := parse_record(text):
                 self._remember(record)
             else:
                 cut = text.startswith(_FIRST) and not text.endswith(
@@ -347,7 +347,7 @@ class Ledger:
         if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
             return
         try:
-            append_whole(
+            append_as_a_whole(
                 Path(self.name), self._end + line(row, self.asked).encode() + b"\n"
             )
         except OSError as error:

@@ -13,7 +13,7 @@ from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_jud
 from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.digits import round_as_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -235,7 +235,7 @@ def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestio
 
 
 def _read(pair: Pair) -> tuple[float, float]:
-    return as_read(pair.tr), as_read(pair.td)
+    return round_as_read(pair.tr), round_as_read(pair.td)
 
 
 def verify(

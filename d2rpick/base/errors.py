@@ -63,7 +63,7 @@ class Caution(NamedTuple):
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
-def if_written(read: Callable[[], _Read]) -> _Read | None:
+def give_if_written(read: Callable[[], _Read]) -> _Read | None:
     """Return what ``read`` returns, or None if a history does not contain it in every state."""
     try:
         return read()
@@ -71,12 +71,12 @@ def if_written(read: Callable[[], _Read]) -> _Read | None:
         return None
 
 
-def one_line(error: BaseException) -> str:
+def format_in_one_line(error: BaseException) -> str:
     """Return the message of any error in one line; an unforeseen error is to be reported.
 
     Examples
     --------
-    >>> one_line(RangeError("run: td 9 lies outside the record")), one_line(KeyError("time"))
+    >>> format_in_one_line(RangeError("run: td 9 lies outside the record")), format_in_one_line(KeyError("time"))
     ('run: td 9 lies outside the record', "internal error, please report it (KeyError: 'time')")
     """
     if not isinstance(error, FORESEEN):
@@ -92,14 +92,14 @@ def one_line(error: BaseException) -> str:
     return str(error)
 
 
-def printable(text: str) -> str:
+def make_printable(text: str) -> str:
     r"""Escape the characters of a name that would break a line or control a terminal.
 
     Letters of any language and blanks stay, as do the lone surrogates that stand for bytes of a file name.
 
     Examples
     --------
-    >>> printable("Gehäuse, IE"), printable("IE\n\x1b[31m")
+    >>> make_printable("Gehäuse, IE"), make_printable("IE\n\x1b[31m")
     ('Gehäuse, IE', 'IE\\n\\x1b[31m')
     """
     if text.isprintable():
@@ -114,12 +114,12 @@ def printable(text: str) -> str:
     )
 
 
-def in_rows(ids: Iterable[int]) -> list[str]:
+def format_ranges(ids: Iterable[int]) -> list[str]:
     """Return numbers in ascending order, three or more consecutive ones as a range.
 
     Examples
     --------
-    >>> in_rows([6, 1, 2, 3, 5, 12])
+    >>> format_ranges([6, 1, 2, 3, 5, 12])
     ['1-3', '5', '6', '12']
     """
     rows: list[list[int]] = []
@@ -148,7 +148,7 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
     'parts 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31, 33, 35, 37, 39 and 50 more'
     """
     numbers = sorted(set(ids))
-    texts = in_rows(numbers)[:_MOST_NAMED]
+    texts = format_ranges(numbers)[:_MOST_NAMED]
     unnamed = 0
     if texts:
         last_named = int(texts[-1].rpartition("-")[2])
@@ -158,20 +158,20 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
     return f"{kinds} {', '.join(texts)}{remainder}"
 
 
-def are(things: Collection[object]) -> str:
+def choose_verb(things: Collection[object]) -> str:
     """Return "is" for one thing, else "are"."""
     return "is" if len(things) == 1 else "are"
 
 
-def listing(
+def list_names(
     names: Sequence[object], most: int = _MOST_NAMED, between: str = ", "
 ) -> str:
     """Return printable names in one line, cut after ``most`` of them.
 
     Examples
     --------
-    >>> listing([3, 7, 8]), listing([3, 7, 8], most=2), listing([3, 7], between=",")
+    >>> list_names([3, 7, 8]), list_names([3, 7, 8], most=2), list_names([3, 7], between=",")
     ('3, 7, 8', '3, 7 and 1 more', '3,7')
     """
     remainder = f" and {len(names) - most} more" if len(names) > most else ""
-    return printable(between.join(map(str, names[:most]))) + remainder
+    return make_printable(between.join(map(str, names[:most]))) + remainder

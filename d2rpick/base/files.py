@@ -65,12 +65,12 @@ def bound(name: str) -> float:
     return value
 
 
-def beyond(name: str, value: float = float("inf")) -> str:
+def describe_excess(name: str, value: float = float("inf")) -> str:
     """Return a message that a value exceeds its bound, and what to do; empty if it does not.
 
     Examples
     --------
-    >>> beyond("DEPTH", 101), beyond("DEPTH", 100)
+    >>> describe_excess("DEPTH", 101), describe_excess("DEPTH", 100)
     ('more than 100 groups; is the file damaged? Copy it again, or set D2RPICK_MAX_DEPTH higher', '')
     """
     limit = bound(name)
@@ -80,20 +80,20 @@ def beyond(name: str, value: float = float("inf")) -> str:
     return f"{excess}; is the file damaged? Copy it again, or set D2RPICK_MAX_{name} higher"
 
 
-def unpacked_beyond(packed: int, unpacked: int) -> str:
+def describe_unpacked_excess(packed: int, unpacked: int) -> str:
     """Return a message if ``packed`` bytes unpack to more bytes than the bounds allow; empty otherwise."""
     ratio = unpacked / max(packed, 1) if unpacked > _ALLOWED else 0.0
-    return beyond("UNPACKED", unpacked) or beyond("RATIO", ratio)
+    return describe_excess("UNPACKED", unpacked) or describe_excess("RATIO", ratio)
 
 
-def long_line(data: bytes | Searched, most: float | None = None) -> int:
+def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
     r"""Return the address of a line that exceeds the bound, -1 if there is none; only part of the data is searched.
 
     ``most`` is the bound, if it is known already.
 
     Examples
     --------
-    >>> long_line(b"ab\n" * 9), long_line(b"ab\n" + bytes(1_000_001))
+    >>> find_long_line(b"ab\n" * 9), find_long_line(b"ab\n" + bytes(1_000_001))
     (-1, 3)
     """
     limit = int(min(bound("LINE") if most is None else most, len(data)))
@@ -132,7 +132,7 @@ class FileState(NamedTuple):
         latest = max(
             status.st_ctime_ns, status.st_mtime_ns if status.st_mtime_ns <= now else 0
         )
-        settled = now - latest > _TICK + _slowness(
+        settled = now - latest > _TICK + compute_slowness(
             latest, 0 if may_grow else status.st_size
         )
         return cls(
@@ -155,12 +155,12 @@ class FileState(NamedTuple):
         )
 
 
-def _slowness(changed: int, size: int) -> int:
+def compute_slowness(changed: int, size: int) -> int:
     """Return how much longer than usual a write may take, or a change stay invisible in the times [ns]."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
-def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
+def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
     """Return the state of a file once no write is in progress and a later one will show; None if it keeps changing.
 
     If the file ``may_grow``, the bytes up to the size of this state do not change: further bytes are appended.
@@ -170,7 +170,8 @@ def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
         if state.settled:
             return state
         time.sleep(
-            _PAUSE + _slowness(state.changed, 0 if may_grow else state.size) * 1e-9
+            _PAUSE
+            + compute_slowness(state.changed, 0 if may_grow else state.size) * 1e-9
         )
         now = FileState.of(file)
         if now.is_as(state) or (may_grow and now.continues(state)):
@@ -178,14 +179,18 @@ def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
     return None
 
 
-def settled_states(names: Sequence[str], error: type[D2RPickError]) -> list[FileState]:
+def wait_for_settled_states(
+    names: Sequence[str], error: type[D2RPickError]
+) -> list[FileState]:
     """Return the settled states of files that may grow, with one pause for all; ``error`` if one keeps changing."""
     states = [_state_of(name) for name in names]
     for _ in range(_TRIES):
         moving = [state for state in states if not state.settled]
         if not moving:
             return states
-        time.sleep(_PAUSE + max(_slowness(state.changed, 0) for state in moving) * 1e-9)
+        time.sleep(
+            _PAUSE + max(compute_slowness(state.changed, 0) for state in moving) * 1e-9
+        )
         states = [
             _settle(name, state) for name, state in zip(names, states, strict=True)
         ]
@@ -208,7 +213,7 @@ def _state_of(name: str) -> FileState:
     return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
 
 
-def at_rest(
+def read_at_rest(
     name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False
 ) -> FileState | bytes:
     """Return the `settled_state` of a file, or all bytes of a pipe or a terminal, which can be read only once.
@@ -222,7 +227,7 @@ def at_rest(
         )
     if not stat.S_ISREG(mode):
         return file.read()
-    state = settled_state(file, may_grow=may_grow)
+    state = wait_for_settled_state(file, may_grow=may_grow)
     if state is None:
         raise error(
             f"{name}: the file keeps changing while it is read; read it again when it is complete"
@@ -230,7 +235,7 @@ def at_rest(
     return state
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_as_a_whole(path: Path, content: bytes) -> None:
     """Write a file as a whole or not at all: to a temporary file in the same folder, which then replaces it.
 
     A replaced file keeps its mode, and its owner and group as far as the user may set them. A link stays, and the
@@ -276,7 +281,7 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
     scratch.chmod(stat.S_IMODE(status.st_mode))
 
 
-def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
+def append_as_a_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
     """Append to a file as a whole or not at all; ``durable`` waits for the disk; an OSError leaves it as it was."""
     size = None
     try:
@@ -295,21 +300,21 @@ def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
         raise
 
 
-def signed(text: str) -> str:
+def add_checksum(text: str) -> str:
     """Add a checksum to a JSON object as its last key.
 
     Examples
     --------
-    >>> record_of(signed('{"leg": 1}').encode())["leg"], record_of(b'{"leg": 1}')
+    >>> parse_record(add_checksum('{"leg": 1}').encode())["leg"], parse_record(b'{"leg": 1}')
     (1, None)
     """
-    return f'{text[:-1]}{_CHECKSUM}{_checksum(text[:-1].encode())}"}}'
+    return f'{text[:-1]}{_CHECKSUM}{_compute_checksum(text[:-1].encode())}"}}'
 
 
-def record_of(line: bytes) -> dict[str, Any] | None:
+def parse_record(line: bytes) -> dict[str, Any] | None:
     """Return the record of a signed line; None if the line is damaged."""
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
-    if checksum != f'{_checksum(body)}"}}'.encode():
+    if checksum != f'{_compute_checksum(body)}"}}'.encode():
         return None
     import json  # imported here for start-up
 
@@ -317,7 +322,7 @@ def record_of(line: bytes) -> dict[str, Any] | None:
     return record
 
 
-def _checksum(text: bytes) -> str:
+def _compute_checksum(text: bytes) -> str:
     """Return a short checksum of a text."""
     import hashlib
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     Node = TypeVar("Node", bound=Hashable)
 
 
-def reached(
+def find_reachable(
     starts: Iterable[Node],
     further: Callable[[Node], Iterable[Node]],
     *,
@@ -23,8 +23,10 @@ def reached(
     Examples
     --------
     >>> below = {1: [2, 3], 2: [4], 3: [1]}
-    >>> reached([1], lambda node: below.get(node, ())), reached([1], lambda node: below.get(node, ()), wide=True)
-    ([1, 3, 2, 4], [1, 2, 3, 4])
+    >>> find_reachable([1], lambda node: below.get(node, ()))
+    [1, 3, 2, 4]
+    >>> find_reachable([1], lambda node: below.get(node, ()), wide=True)
+    [1, 2, 3, 4]
     """
     nodes: dict[Node, None] = {}
     waiting = list(starts)

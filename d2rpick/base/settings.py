@@ -38,7 +38,7 @@ class NearestSettings(NamedTuple):
     notes: tuple[str, ...]
 
 
-def nearest_settings(folder: str) -> NearestSettings:
+def find_nearest_settings(folder: str) -> NearestSettings:
     """Find the settings in a folder or the folders above it; in each folder, d2rpick.toml precedes pyproject.toml.
 
     Raises
@@ -47,7 +47,7 @@ def nearest_settings(folder: str) -> NearestSettings:
         If the file is not TOML, or contains no table of settings.
     """
     notes: list[str] = []
-    for directory in _searched_folders(os.path.abspath(folder)):
+    for directory in _list_searched_folders(os.path.abspath(folder)):
         for name in (_OWN, _SHARED):
             source = os.path.join(directory, name)
             if not os.path.isfile(source):
@@ -63,12 +63,12 @@ def nearest_settings(folder: str) -> NearestSettings:
                 return NearestSettings(table, source, tuple(notes))
             if table is not None:
                 raise ConfigurationError(
-                    f"{source}: the configuration is {toml_text(table)}, a table was expected"
+                    f"{source}: the configuration is {format_toml_value(table)}, a table was expected"
                 )
     return NearestSettings({}, "", tuple(notes))
 
 
-def _searched_folders(folder: str) -> Iterator[str]:
+def _list_searched_folders(folder: str) -> Iterator[str]:
     """Yield a folder and those above it, up to the root of its repository or the user's home.
 
     Outside both, the search ends below the first folder that another user owns, and below the root of the system.
@@ -100,14 +100,16 @@ def _is_owned_by_user(path: str) -> bool:
         return False
 
 
-def toml_text(value: object) -> str:
+def format_toml_value(value: object) -> str:
     """Format a value from a TOML file for a message, cut if it is long.
 
     Examples
     --------
     >>> from datetime import date
-    >>> toml_text(True), toml_text(date(1979, 5, 27)), toml_text("x"), toml_text("x" * 99)[-5:]
-    ('true', '1979-05-27', "'x'", 'x ...')
+    >>> [format_toml_value(value) for value in (True, date(1979, 5, 27), "x")]
+    ['true', '1979-05-27', "'x'"]
+    >>> format_toml_value("x" * 99)[-5:]
+    'x ...'
     """
     if isinstance(value, bool):
         text = str(value).lower()

@@ -47,7 +47,7 @@ _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 _PATIENCE = 10
 
 
-def cores() -> int:
+def count_cores() -> int:
     """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
@@ -76,10 +76,12 @@ class Farm:
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
         """Yield the result of ``function`` for all items, in the order in which they finish."""
-        return (_computed(number, function, item) for number, item in enumerate(items))
+        return (
+            _compute_call(number, function, item) for number, item in enumerate(items)
+        )
 
 
-def _computed(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
+def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
     """Compute one call; an error becomes part of the answer."""
     try:
         return Finished(number, function(item), None)
@@ -91,7 +93,7 @@ class Cores(Farm):
     """A pool of processes on this machine that have imported ``module`` before they begin."""
 
     def __init__(self, processes: int, module: str) -> None:
-        begin(processes, module)
+        start_importing(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
         # the processes end when this end of the pipe is closed
         self._held, self._leash = Pipe(duplex=False)
@@ -122,7 +124,7 @@ class Cores(Farm):
                 if isinstance(future.exception(), BrokenProcessPool):
                     suspects.append((number, item))
                 else:
-                    yield _answer(number, future)
+                    yield _make_answer(number, future)
             for number, item in suspects:
                 yield self._answer_alone(number, function, item)
 
@@ -141,7 +143,7 @@ class Cores(Farm):
         """Compute a call in a pool of its own, so that no other call ends with its process."""
         pool, future = self._begin_pool(1, function, item)
         try:
-            return _answer(number, future)
+            return _make_answer(number, future)
         finally:
             pool.shutdown(wait=False)  # so that an interrupt does not wait for the call
 
@@ -168,7 +170,7 @@ class Cores(Farm):
         )
 
 
-def _answer(number: int, future: Future[Any]) -> Finished:
+def _make_answer(number: int, future: Future[Any]) -> Finished:
     """Return the result or the error of a finished call."""
     error = future.exception()
     if isinstance(error, BrokenProcessPool):
@@ -191,7 +193,7 @@ def _begin_work(held: Connection) -> None:
     Thread(target=follow, daemon=True).start()
 
 
-def begin(processes: int, module: str) -> None:
+def start_importing(processes: int, module: str) -> None:
     """Let one process import ``module`` in the background; later ones are forked from it.
 
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
@@ -216,7 +218,7 @@ def _start_server(module: str) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def on_cores(processes: int, module: str) -> Farm:
+def choose_farm(processes: int, module: str) -> Farm:
     """Return the farm for a number of processes on this machine; a single one is this process."""
     return Cores(processes, module) if processes > 1 else Farm()
 
@@ -278,10 +280,12 @@ class Cluster(Farm):
             if not numbers:
                 return
             for future, result in done.next_batch():
-                yield _of_cluster(numbers.pop(future.key), future.status, result)
+                yield _make_cluster_answer(
+                    numbers.pop(future.key), future.status, result
+                )
 
 
-def _of_cluster(number: int, status: str, result: Any) -> Finished:
+def _make_cluster_answer(number: int, status: str, result: Any) -> Finished:
     """Return the answer of a task of a cluster; ``result`` of a failed task is the error type, the error and its trace.
 
     The status of a successful task may have changed meanwhile: its worker may have died after it returned the result.

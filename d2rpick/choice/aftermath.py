@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.flight.margin import energy_of_approach
+from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -185,4 +185,4 @@ def energy_of_next_contact(situation: Situation) -> float | None:
         return None
     _, energies = history.between(end, np.inf)
     rise = float(energies.max(initial=-np.inf)) - history.energy_at(end)
-    return rise if rise > 0 else energy_of_approach(history, situation.flight)
+    return rise if rise > 0 else compute_energy_of_approach(history, situation.flight)

@@ -39,8 +39,8 @@ from d2rpick.choice.warnings import (
     out_of_place,
 )
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.balance import balance_of
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.balance import read_balance
+from d2rpick.histories.digits import round_as_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -358,7 +358,9 @@ def _anew(situation: Situation, td: float) -> Situation:
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Whether ``verify`` would verify a pair in the six digits that people read."""
     try:
-        return verify_at(_anew(situation, as_read(td)), as_read(tr)).verified
+        return verify_at(
+            _anew(situation, round_as_read(td)), round_as_read(tr)
+        ).verified
     except RangeError:  # rounded beyond an end of the record, or onto each other
         return False
 
@@ -466,7 +468,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources))
     )
     history, td = answer.situation.history, answer.situation.td
-    balance = balance_of(run.databases, history.parts, td)
+    balance = read_balance(run.databases, history.parts, td)
     if balance is None:
         return answer
     if isinstance(answer, Verdict):

@@ -21,9 +21,9 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
-from d2rpick.deck import ls_dyna_inventory, main_decks, radioss_inventory
+from d2rpick.deck import find_main_decks, ls_dyna_inventory, radioss_inventory
 from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import find_windows, read_switching
@@ -247,7 +247,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
     FormatError
         If no file contains CPU times of the run.
     """
-    decks = main_decks(folder)
+    decks = find_main_decks(folder)
     if len(decks) != 1:
         if decks:
             count = f"{len(decks)} main decks were found"
@@ -255,7 +255,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
             count = "no main deck was found"
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
     observations = tuple(
-        _of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0])
+        _of_radioss(decks[0]) if list_run_files(decks[0]) else _of_ls_dyna(decks[0])
     )
     if not observations:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
@@ -266,7 +266,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
 def _of_radioss(deck: str) -> Iterator[Observation]:
     """Read the CPU times of a Radioss run from the listings of its engine runs."""
     run = read_run(deck)
-    inventory = radioss_inventory.read(run)
+    inventory = radioss_inventory.read_radioss_inventory(run)
     windows = find_run_windows(run).windows.windows
     rigid = [
         _Rigid(switched.unit.id, switched.tr, switched.td or np.inf)
@@ -292,7 +292,7 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     """Read the CPU times of an LS-DYNA run from d3hsp and glstat."""
     content = read_deck(deck)
-    inventory = ls_dyna_inventory.read(content)
+    inventory = ls_dyna_inventory.read_ls_dyna_inventory(content)
     windows = find_windows(read_switching(content), read_parts(content)).windows
     rigid = [
         _Rigid(switched.part, switched.tr, switched.td or np.inf)

@@ -15,10 +15,10 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
 from d2rpick.choice.warnings import Objection, objections
-from d2rpick.histories.digits import not_before
+from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
-from d2rpick.vibration.model import NEAR_TD, measured_of, moments_of
+from d2rpick.vibration.model import NEAR_TD, find_moments, measure_all
 from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class Judged:
         at_rest = np.array([situation.at_rest for situation in situations])[place]
         energy_td = np.array([situation.energy_td for situation in situations])[place]
         vibrations = [situation.vibration for situation in situations]
-        energy, measured = measured_of(vibrations, tr, ends)
+        energy, measured = measure_all(vibrations, tr, ends)
         level_error = measures.level_error(energy, energy_td)
         if at_rest.any():
             # the ratio of two round-off energies is no error
@@ -396,7 +396,7 @@ def judged_of(
         starts = [-np.inf] * len(batch)
         if in_flight:
             starts = [_start_of_flight(situation) for situation in batch]
-        moments_of_each = moments_of(
+        moments_of_each = find_moments(
             [situation.vibration for situation in batch],
             batch[0].settings.tolerance,
             starts,
@@ -422,7 +422,7 @@ def _at_start(situation: Situation) -> Moments | None:
     if start is None or not situation.at_rest:
         return None
     first = max(start, float(situation.history.time[0]))
-    printed = not_before(first)
+    printed = round_up_as_read(first)
     return Moments.of("start", [printed if printed < situation.td else first])
 
 
@@ -472,10 +472,10 @@ def _remarks(
     if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         # imported here: a table has no parts
         from d2rpick.vibration.part_signs import (
-            main_contributors,
+            name_main_contributors,
         )
 
-        yield f"mismatch of {main_contributors(parts)}"
+        yield f"mismatch of {name_main_contributors(parts)}"
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:

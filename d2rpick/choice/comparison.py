@@ -12,7 +12,7 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.switched_run import FEWEST, SAME, same_parts
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.samples import stretches
+from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
@@ -339,7 +339,9 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     time = switched.time
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
-    still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST)
+    still = find_stretches(
+        np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST
+    )
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
     rounding = round_off(reference)
     moving = [

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import ConfigurationError, are, name_units
+from d2rpick.base.errors import ConfigurationError, choose_verb, name_units
 from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
@@ -157,7 +157,9 @@ class CostModel:
         """Return the share c of a step saved while ``parts`` are rigid [-]; unknown for parts not in the deck."""
         absent = sorted(set(parts) - self.inventory.parts.keys())
         if absent:
-            return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
+            return Share(
+                None, f"{name_units(absent)} {choose_verb(absent)} not in the deck"
+            )
         elements = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in elements.items())
         total = self.total

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, are, if_written, name_units
+from d2rpick.base.errors import Caution, choose_verb, give_if_written, name_units
 from d2rpick.choice.cost import ByDeck, CostModel, Share
 from d2rpick.deck.geometry import Placement
-from d2rpick.deck.pieces import pieces_of, supports_of
+from d2rpick.deck.pieces import count_pieces, find_supports
 from d2rpick.deck.radioss_files import LEFT_RIGID, RUINS
 from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.surroundings import Support, Surroundings
@@ -46,7 +46,9 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
     """Return True if a rigid body is one connected piece, or Radioss can treat its pieces separately."""
     alone = len(body) == 1 and inventory.solver == "radioss"
     return (
-        alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
+        alone
+        or frozenset(body) in inventory.ready
+        or count_pieces(inventory, body) == 1
     )
 
 
@@ -77,14 +79,14 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     ids_in_deck = inventory.parts.keys() | inventory.history_groups
     absent = [part for part in run.parts if part.id not in ids_in_deck]
     if not difference and inventory.complete and _has_energy(run, absent):
-        difference = f"{name_units(part.id for part in absent)} of the history {are(absent)} not in the deck"
+        difference = f"{name_units(part.id for part in absent)} of the history {choose_verb(absent)} not in the deck"
     text = f"{difference}: nothing of the deck is used; name that of the run"
     return Caution("deck-of-another-model", text) if difference else None
 
 
 def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
     """Return True if the history contains energy of any of the parts."""
-    return bool(parts) and bool(if_written(lambda: run.part_energies(parts).any()))
+    return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
@@ -123,7 +125,7 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
             )
             yield Caution(
                 "loose-pieces",
-                f"{lies} in {pieces_of(inventory, body.parts)} pieces that nothing joins; {cure}",
+                f"{lies} in {count_pieces(inventory, body.parts)} pieces that nothing joins; {cure}",
             )
 
 
@@ -260,7 +262,7 @@ def in_deck(run: Run, inventory: Inventory | None) -> Run:
 
 def _surroundings(inventory: Inventory) -> Surroundings:
     """Return gravity, supports and connected parts according to the deck."""
-    by_part, whole = supports_of(inventory)
+    by_part, whole = find_supports(inventory)
     supports: dict[int | None, tuple[Support, ...]] = {
         part: _supports(holds) for part, holds in by_part.items()
     }

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, listing
+from d2rpick.base.errors import Caution, list_names
 from d2rpick.histories.formats import FAMILIES
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 
@@ -38,7 +38,7 @@ def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
         and states * _TURNS_PER_PERIOD >= MIN_SAMPLES_PER_PERIOD * turns
     ):
         return
-    oftener = listing([name for name in _OFTENER if name != history.energy_format])
+    oftener = list_names([name for name in _OFTENER if name != history.energy_format])
     text = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
     yield Caution(
         "few-states",

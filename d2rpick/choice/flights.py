@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.margins import margin_of
-from d2rpick.flight.flight import Flight, all_seen, witnesses
-from d2rpick.flight.window import moments
-from d2rpick.histories.digits import not_after, sum_as_read
+from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
+from d2rpick.flight.window import list_moments
+from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,7 +70,7 @@ def longest_flight(
 
 def last_td(end: float, margin: float) -> float:
     """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
-    return not_after(sum_as_read(end, -margin)) if margin else end
+    return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
 def flights_of(
@@ -174,7 +174,7 @@ def _flights_of(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
-    witnessed = all_seen(history)
+    witnessed = find_all_seen(history)
     if witnessed:
         return tuple(
             Flight(
@@ -193,7 +193,7 @@ def _flights_of(
     )
 
     look = looking(history, settings, fits)
-    if settings.replay and not witnesses(history):
+    if settings.replay and not list_witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
         for share in _WHERE_IT_VIBRATES:
             flight = look(first + share * (float(history.time[-1]) - first)).flight
@@ -204,7 +204,7 @@ def _flights_of(
         look = looking(history, replace(settings, replay=False))
     flights: list[Flight] = []
     # the last quiet time before td shows most of the flight
-    for td in sorted(moments(history.time), reverse=True):
+    for td in sorted(list_moments(history.time), reverse=True):
         if flights and flights[-1].start is not None and td > flights[-1].start:
             continue
         situation = look(td)
@@ -229,13 +229,13 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
 
     # imported here: most evidence does not need it
     from d2rpick.flight.momentum import (
-        all_flights,
-        to_be_asked,
+        find_all_flights,
+        select_momenta_for_flight,
     )
 
     momenta_at_states = [
         momenta
-        for momenta in to_be_asked(history.momenta)
+        for momenta in select_momenta_for_flight(history.momenta)
         if np.array_equal(momenta.time, history.time)
     ]
     if not momenta_at_states:
@@ -244,11 +244,11 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
         (
             momenta
             for momenta in momenta_at_states
-            if all_flights(momenta, history.balance)
+            if find_all_flights(momenta, history.balance)
         ),
         momenta_at_states[0],
     )
-    flights = all_flights(momenta, history.balance)
+    flights = find_all_flights(momenta, history.balance)
     members = momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)

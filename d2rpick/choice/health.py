@@ -13,10 +13,10 @@ import numpy as np
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.flight import MOST_WORK
-from d2rpick.flight.internal_energy import largest
-from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
+from d2rpick.flight.internal_energy import find_largest
+from d2rpick.flight.work import FEWEST_STATES, compute_work_beyond_gravity
 from d2rpick.histories.history import LARGEST_ENERGY
-from d2rpick.histories.samples import window as within
+from d2rpick.histories.samples import find_window as within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -148,10 +148,10 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
         return
     # imported here: other histories do not need it
     from d2rpick.histories.listings import (
-        wrong_energies,
+        find_wrong_energies,
     )
 
-    listings = list(wrong_energies(sources))
+    listings = list(find_wrong_energies(sources))
     if listings:
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
         text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
@@ -208,7 +208,7 @@ def _peak(balance: Balance) -> float | None:
     """Return the peak of the internal energy [energy]; None if it is unknown or tiny."""
     if balance.internal is None:
         return None
-    highest = largest(
+    highest = find_largest(
         balance.internal, balance.kinetic, balance.total, balance.external_work
     )
     peak = float(balance.internal.max())
@@ -308,7 +308,7 @@ def _in_window(
             # printed digits
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
-    work = work_beyond_gravity(balance, start, end)
+    work = compute_work_beyond_gravity(balance, start, end)
     if work is not None:
         fields["window_work"] = work / locked
     return fields
@@ -353,7 +353,7 @@ def refuse_unsound(
 
 def unsound(history: History) -> Iterator[Caution]:
     """Yield the reasons why a run cannot be judged, with stable codes."""
-    highest = largest(history.energy)
+    highest = find_largest(history.energy)
     if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
@@ -409,6 +409,6 @@ def _has_nothing(history: History) -> bool:
     balance = history.balance
     if balance is None:
         return False
-    highest = largest(history.energy, balance.internal)
-    other_energies = largest(balance.kinetic, balance.external_work, balance.total)
+    highest = find_largest(history.energy, balance.internal)
+    other_energies = find_largest(balance.kinetic, balance.external_work, balance.total)
     return highest == 0 or max(highest, other_energies) <= _NOTHING

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_of
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
-from d2rpick.deck.printing import DEFAULT, SOLVERS, cards, solver_of
+from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -34,7 +34,7 @@ class CardRequest(NamedTuple):
         end = (
             float(history.time[-1]) if self.printing.end is None else self.printing.end
         )
-        solver = self.solver or solver_of(history.format)
+        solver = self.solver or find_solver(history.format)
         printing = self.printing._replace(part=ids, end=end)
         if "contact" in SOLVERS[solver].takes:
             printing = _with_pushes(printing, history, SOLVERS[solver].title)
@@ -131,7 +131,7 @@ def judged_card(
         return None
     solver, printing = request.of(history)
     every = sorted((*done, *windows))
-    plain = cards(every, printing, solver)
+    plain = print_cards(every, printing, solver)
     printed = plain.windows
     if "contact" in SOLVERS[solver].takes:
         printed = _narrowed(printed, history)
@@ -141,7 +141,7 @@ def judged_card(
         if asked not in done
     )
     remarks = tuple(_remarks(done, history, verdicts))
-    return cards(every, printing, solver, remarks), verdicts
+    return print_cards(every, printing, solver, remarks), verdicts
 
 
 def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:

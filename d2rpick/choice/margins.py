@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.margin import Margin, margin_before_contact
+from d2rpick.flight.margin import Margin, compute_margin
 
 if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
@@ -27,7 +27,7 @@ def bodies_of(
         return None
     # imported here: a table has no parts
     from d2rpick.flight.position_error import (
-        bodies_in_flight,
+        find_bodies_in_flight,
     )
 
     memory = history.known if fits is None else fits
@@ -35,7 +35,7 @@ def bodies_of(
     placement = settings.placement
     return memory.once(
         ("drift", flight, rigid_bodies),
-        lambda: bodies_in_flight(history, flight, rigid_bodies, placement),
+        lambda: find_bodies_in_flight(history, flight, rigid_bodies, placement),
     )
 
 
@@ -44,12 +44,12 @@ def margin_of(
 ) -> Margin:
     """Return the given margin, or the time by which switching in the flight may make the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
-        return margin_before_contact(history, flight, settings.margin)
+        return compute_margin(history, flight, settings.margin)
     bodies = bodies_of(history, flight, settings, fits)
     position_error = (
         None if bodies is None else _largest_error(bodies, flight.start, flight.end)
     )
-    return margin_before_contact(history, flight, place=position_error)
+    return compute_margin(history, flight, place=position_error)
 
 
 def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:

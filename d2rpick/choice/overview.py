@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
+from d2rpick.base.errors import (
+    Caution,
+    FormatError,
+    RangeError,
+    give_if_written,
+    list_names,
+)
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.health import (
@@ -20,13 +26,13 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
-from d2rpick.flight.momentum import with_parts_by_number
+from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.balance import balance_of
-from d2rpick.histories.database import doubts
-from d2rpick.histories.history import History, rows_of
+from d2rpick.histories.balance import read_balance
+from d2rpick.histories.database import note_doubts
+from d2rpick.histories.history import History, select_states
 from d2rpick.histories.names import Part, Selection, select_parts
-from d2rpick.histories.samples import median
+from d2rpick.histories.samples import compute_median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -109,7 +115,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     notes = list(run.left_out)
     for database in run.databases:
         notes += _notes(database)
-    notes += doubts(run.databases)
+    notes += note_doubts(run.databases)
     notes += run.unused_energies(selection)
     states = None
     time = np.empty(0)
@@ -121,7 +127,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     except FormatError as error:
         if (
             first.format == "csv"
-            and if_written(lambda: first.energy_channel) is not None
+            and give_if_written(lambda: first.energy_channel) is not None
         ):
             raise  # one energy shows which column is the time, so the table itself cannot be read
         notes.append(str(error))
@@ -138,7 +144,9 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max()))
+        sampling=Sampling(
+            float(steps.min()), float(compute_median(steps)), float(steps.max())
+        )
         if steps.size
         else None,
         complete=all(database.complete for database in run.databases),
@@ -211,7 +219,7 @@ def _notes(database: Legs) -> tuple[str, ...]:
 def _overviews(run: Run) -> Iterator[PartOverview]:
     """Yield each part with its highest internal energy."""
     if run.parts:
-        energies = if_written(lambda: run.part_energies(run.parts))
+        energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
     if energies is None:  # some parts come and go, so their columns have gaps
@@ -224,7 +232,7 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
 
 def _highest(run: Run, part: Part) -> float | None:
     """Return the highest internal energy of a part [energy]; None if it is not written."""
-    return if_written(lambda: _most(run.part_energies([part])))
+    return give_if_written(lambda: _most(run.part_energies([part])))
 
 
 def _most(energies: Samples) -> float | None:
@@ -235,7 +243,7 @@ def _most(energies: Samples) -> float | None:
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some windows."""
     if rigid:
-        when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
         effect = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
@@ -247,7 +255,7 @@ def _health(
     rigid: Sequence[Times],
 ) -> Health | None:
     """Return the health of the run outside of rigid windows; None without energies."""
-    balance = balance_of(
+    balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
     if balance is None or not balance.time.size:
@@ -263,7 +271,7 @@ def _health(
                 until=float(balance.time[-1]),
             )
         return assess(
-            replace(rows_of(balance, states), hourglass_of_parts=()),
+            replace(select_states(balance, states), hourglass_of_parts=()),
             until=float(balance.time[-1]),
         )
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
@@ -277,11 +285,11 @@ def _health(
 def _history(run: Run, selection: Selection) -> History | None:
     """Return the history that would be judged; None if an energy has to be chosen first, or there is no state."""
     if selection.parts:
-        selection = with_parts_by_number(run, selection)
+        selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    return if_written(lambda: run.history(selection))
+    return give_if_written(lambda: run.history(selection))
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:

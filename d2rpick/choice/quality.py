@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
-from d2rpick.histories.digits import above
+from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
@@ -115,7 +115,7 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )
     return tuple(
         f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {above(value, limit)} above the limit {limit:g}"
+        else f"{name} {format_above_limit(value, limit)} above the limit {limit:g}"
         for name, value, limit in limits
         if limit is not None and (value is None or value > limit)
     )  # fmt: skip

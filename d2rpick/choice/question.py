@@ -35,10 +35,10 @@ class Reference(NamedTuple):
         if selection.parts:
             # imported here: a table has no parts
             from d2rpick.flight.momentum import (
-                with_parts_by_number,
+                replace_words_by_part_ids,
             )
 
-            selection = with_parts_by_number(run, selection)
+            selection = replace_words_by_part_ids(run, selection)
         return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
+from d2rpick.base.errors import (
+    Caution,
+    FormatError,
+    RangeError,
+    choose_verb,
+    name_units,
+)
 from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.deck_of_run import (
@@ -31,9 +37,9 @@ from d2rpick.choice.switchable_parts import (
 )
 from d2rpick.choice.warnings import out_of_place
 from d2rpick.deck.geometry import Placement
-from d2rpick.flight.momentum import with_parts_by_number
-from d2rpick.histories.listings import printed_steps
-from d2rpick.histories.names import Part, Selection, asks_for_recommended, select_parts
+from d2rpick.flight.momentum import replace_words_by_part_ids
+from d2rpick.histories.listings import find_printed_steps
+from d2rpick.histories.names import Part, Selection, has_recommended, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
@@ -158,7 +164,7 @@ def parts_of(
     model = None if foreign else model
     run = in_deck(run, model.inventory if model else None)
     facts = facts_of(run, settings)
-    rows = rows_of(facts, model, printed_steps(run, *(beside if model else ())))
+    rows = rows_of(facts, model, find_printed_steps(run, *(beside if model else ())))
     comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
     for part_set in _sets(rows, given):
@@ -195,12 +201,12 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
     """
     if not names:
         return ()
-    if asks_for_recommended(names, run.parts):
+    if has_recommended(names, run.parts):
         cure = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(
             f"{run.name}: the recommended set is what is looked for here; {cure}"
         )
-    numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts
+    numbers = replace_words_by_part_ids(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
 
 
@@ -464,7 +470,7 @@ def _cautions(
     if missing:
         yield Caution(
             "parts-not-in-deck",
-            f"{name_units(missing)} of the history {are(missing)} not in the deck",
+            f"{name_units(missing)} of the history {choose_verb(missing)} not in the deck",
         )
     if not any(row.movable for row in rows):
         yield Caution(

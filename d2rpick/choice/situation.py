@@ -13,10 +13,10 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.margins import bodies_of, margin_of
 from d2rpick.choice.together import Together
-from d2rpick.flight.chosen import Described, begun_at, find_flight, landed_at
-from d2rpick.flight.flight import Flight, Seen, seen_flight
-from d2rpick.flight.internal_energy import largest, quiet_time, round_off
-from d2rpick.histories.digits import sum_as_read
+from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
+from d2rpick.flight.flight import Flight, Seen, find_seen_flight
+from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
+from d2rpick.histories.digits import sum_times_as_read
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
@@ -27,18 +27,18 @@ from d2rpick.vibration.identify import (
 from d2rpick.vibration.model import (
     Evidence,
     Vibration,
-    describing,
-    doubtful,
-    energy_at,
+    describe_energy_at,
+    find_energy_at,
+    is_doubtful,
     model_at,
 )
 from d2rpick.vibration.span import (
     Fits,
     Span,
-    described_span,
-    hidden_share,
+    estimate_hidden_share,
+    find_described_span,
+    find_span,
     most_described,
-    span_of,
 )
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _faint(history: History, start: float) -> float:
     """
     energies = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
-    highest = history.known.once("highest", lambda: largest(history.energy))
+    highest = history.known.once("highest", lambda: find_largest(history.energy))
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
@@ -152,7 +152,7 @@ class Situation:
     @cached_property
     def whole(self) -> Vibration:
         """Model of the vibration that the energy of all chosen parts shows."""
-        return energy_at(self.history, self.td, self.evidence)
+        return find_energy_at(self.history, self.td, self.evidence)
 
     @property
     def basis(self) -> str:
@@ -178,13 +178,13 @@ class Situation:
         start = self.flight.start
         if start is None:
             return None
-        return sum_as_read(start, self.settings.margin or 0.0)
+        return sum_times_as_read(start, self.settings.margin or 0.0)
 
     @property
     def latest_td(self) -> float:
         """End of the flight minus the margin [time]; infinite if no contact was seen."""
         end = self.flight.end
-        return float("inf") if end is None else sum_as_read(end, -self.margin)
+        return float("inf") if end is None else sum_times_as_read(end, -self.margin)
 
     @cached_property
     def margin(self) -> float:
@@ -244,7 +244,9 @@ class Situation:
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Return the times in (start, end] of the energy peaks, ascending: of the oscillator, else of the samples."""
-        return describing(self.history, self.td, self.evidence).peaks(start, end)
+        return describe_energy_at(self.history, self.td, self.evidence).peaks(
+            start, end
+        )
 
     def sees_as(self, situation: Situation) -> bool:
         """Return True if both situations, of one record, share the flight and the evidence, and differ in td only."""
@@ -290,7 +292,7 @@ def examine(
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen_evidence = seen_flight(history, td)
+    seen_evidence = find_seen_flight(history, td)
     flying = None if seen_evidence.refusal else seen_evidence.flight
     # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
     if seen_evidence.refusal and seen_evidence.flight:
@@ -325,17 +327,17 @@ def examine(
     if fitted is not None and flight.source == "energy":
         # imported here: better evidence does not need it
         from d2rpick.vibration.modal_span import (
-            inner_window,
+            get_inner_window,
         )
 
-        inner = inner_window(history, fitted)
+        inner = get_inner_window(history, fitted)
         fitted = inner if inner.start < td <= inner.end else fitted
     models = find_models(
         history,
         around,
         fitted,
         settled,
-        lambda: doubtful(situation.whole),
+        lambda: is_doubtful(situation.whole),
         fits,
         situation.together,
     )
@@ -383,9 +385,9 @@ def _flight_at(
     if evidence.held:
         return flight
     if settings.after is not None:
-        flight = begun_at(history, flight, td, settings.after, described)
+        flight = start_flight_at(history, flight, td, settings.after, described)
     if settings.landing is not None:
-        flight = landed_at(history, flight, td, settings.landing)
+        flight = end_flight_at(history, flight, td, settings.landing)
     return _between_supports(history, flight, td)
 
 
@@ -427,11 +429,13 @@ def _oscillator(
     if settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
-        span = span_of(history, td, fit, bounds) if fit.describes_record else None
+        span = find_span(history, td, fit, bounds) if fit.describes_record else None
         return _with_hidden_share(history, fit, fits), span
     if settings.oscillator:
         judge = fits.remembered("given", partial(judge_given, settings.oscillator))
-        span, fit = described_span(history, td, bounds, judge, whole=whole, memory=fits)
+        span, fit = find_described_span(
+            history, td, bounds, judge, whole=whole, memory=fits
+        )
         return fit, span
     identify_mode = fits.remembered("one", partial(identify, memory=fits))
     quickly = partial(identify_mode, quick=True)
@@ -443,7 +447,7 @@ def _oscillator(
         span, fit = longest_fit
     else:
         fitter = quickly if quick else identify_mode
-        span, fit = described_span(
+        span, fit = find_described_span(
             history, td, bounds, fitter, whole=whole, memory=fits
         )
     return _with_hidden_share(history, fit, fits), span
@@ -460,7 +464,7 @@ def _described_by_modes(
         find_described,
     )
 
-    quiet = quiet_time(history, td)
+    quiet = find_quiet_time(history, td)
     last = float(history.time[-1])
     if quiet is None:
         guess = None
@@ -482,7 +486,7 @@ def _with_hidden_share(
     mode = fit.mode
 
     def add_share() -> Identification:
-        share = hidden_share(*window, mode)
+        share = estimate_hidden_share(*window, mode)
         return fit._replace(hidden_share=max(fit.hidden_share, share))
 
     return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)

@@ -18,8 +18,8 @@ from d2rpick.base.errors import (
     Caution,
     D2RPickError,
     RangeError,
-    listing,
-    one_line,
+    format_in_one_line,
+    list_names,
 )
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.quality import EQUALLY_GOOD
@@ -34,7 +34,7 @@ from d2rpick.choice.windows import (
     error_profile,
 )
 from d2rpick.histories.names import Selection
-from d2rpick.histories.samples import outline
+from d2rpick.histories.samples import draw_outline
 from d2rpick.histories.source import expand
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def ask(question: Question, source: str) -> StudyRow:
         return StudyRow(source, status, text, files=files, record_end=end)
     time = reference.history.time
     energy = reference.history.energy
-    curve = outline(time, energy, _STRETCHES) if question.curve else None
+    curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
     return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
 
 
@@ -251,7 +251,7 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
 def failed(source: str, error: BaseException) -> StudyRow:
     """Return the row of a run whose process returned none."""
     status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
-    return StudyRow(source, status, f"{source}: {one_line(error)}")
+    return StudyRow(source, status, f"{source}: {format_in_one_line(error)}")
 
 
 def stamps(source: str) -> tuple[Stamp, ...]:
@@ -313,13 +313,14 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     if left_out and judged:
         text = f"{len(left_out)} of {runs_of(len(rows))} could not be judged"
         yield Caution(
-            "runs-left-out", f"{text} and are left out: {listing(left_out, most=NAMED)}"
+            "runs-left-out",
+            f"{text} and are left out: {list_names(left_out, most=NAMED)}",
         )
     cut = [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]
     if cut:
         yield Caution(
             "cut-runs",
-            f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}",
+            f"{len(cut)} of {runs_of(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
         text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
@@ -348,7 +349,7 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
         sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
-            f"in {len(sources)} of {runs_of(len(judged))}: {listing(sources, most=NAMED)}",
+            f"in {len(sources)} of {runs_of(len(judged))}: {list_names(sources, most=NAMED)}",
         )
 
 
@@ -443,7 +444,7 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
     unsuited = [row.source for row in judged if not _holds(row.acceptable, tr)]
     return (
         f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(unsuited)}, "
-        f"not in {listing(unsuited, most=NAMED)}"
+        f"not in {list_names(unsuited, most=NAMED)}"
     )
 
 

@@ -21,8 +21,8 @@ from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.digits import not_after, sum_as_read
-from d2rpick.histories.samples import union
+from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
+from d2rpick.histories.samples import merge_times
 from d2rpick.vibration.measures import kinetic_share, vertices
 from d2rpick.vibration.span import Fits
 
@@ -194,7 +194,7 @@ def offered_times(
         highest = order[np.diff(intervals[order], prepend=-1) > 0]
         peaks = peaks[highest]
         grid = np.delete(grid, intervals[highest])
-    times = union(grid, peaks)
+    times = merge_times(grid, peaks)
     # a run that ends at td is useless
     return times[times < situation.history.time[-1]], set(peaks.tolist())
 
@@ -324,9 +324,11 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
     low, high = window
     margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
-    latest = sum_as_read(end, -margin)
+    latest = sum_times_as_read(end, -margin)
     latest = latest if latest > low else situation.latest_td
-    return min(high, max(low, latest if np.isinf(latest) else not_after(latest)))
+    return min(
+        high, max(low, latest if np.isinf(latest) else round_down_as_read(latest))
+    )
 
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
@@ -337,11 +339,11 @@ def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     history = situation.history
     flight = situation.flight
     # a run that ends at td is useless
-    last = min(window[1], not_after(float(history.time[-2])))
+    last = min(window[1], round_down_as_read(float(history.time[-2])))
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
         return last
-    return min(last, not_after(flight.end - _HIDDEN * spread))
+    return min(last, round_down_as_read(flight.end - _HIDDEN * spread))
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, if_written, name_units
+from d2rpick.base.errors import FormatError, give_if_written, name_units
 from d2rpick.choice.flights import flights_of
-from d2rpick.deck.geometry import masses_and_steps
+from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
-from d2rpick.deck.pieces import pieces_of
-from d2rpick.flight.momentum import deformable_parts, flying_together
+from d2rpick.deck.pieces import count_pieces
+from d2rpick.flight.momentum import find_parts_flying_together, list_deformable_parts
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.run import NO_STATES
-from d2rpick.histories.samples import window
+from d2rpick.histories.samples import find_window
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -139,8 +139,8 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
 
 def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
     """Return the energy of the parts that fly together, or of all that deform without momenta, and the flying parts."""
-    members = if_written(lambda: flying_together(run))
-    chosen = members or deformable_parts(run)
+    members = give_if_written(lambda: find_parts_flying_together(run))
+    chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
 
 
@@ -156,7 +156,7 @@ def _in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
     """Return the mean, change and scatter of a part's energy in a flight, and its energy in the landing."""
-    inside = energy[window(time, *span)]
+    inside = energy[find_window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)
     mean = float(inside.mean())
@@ -173,7 +173,7 @@ def _in_flight(
 def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float | None:
     """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
     start, end = span
-    energies = energy[window(time, end, end + _LANDING * (end - start))]
+    energies = energy[find_window(time, end, end + _LANDING * (end - start))]
     if end < float(time[-1]) and energies.size > 1:
         return float(energies[-1] - energies[0])
     return None
@@ -248,7 +248,7 @@ def rows_of(
     """
     inventory = model.inventory if model else None
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
-    sizes = masses_and_steps(inventory) if inventory else {}
+    sizes = compute_masses_and_steps(inventory) if inventory else {}
     rows = [
         _described(part, facts, model, sizes.get(part, (None, None)), printed)
         for part in ids
@@ -394,7 +394,7 @@ def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
         or not inventory.complete
     ):
         return
-    pieces = pieces_of(inventory, [row.id], among=inventory.parts.keys())
+    pieces = count_pieces(inventory, [row.id], among=inventory.parts.keys())
     if pieces > 1:
         yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
 

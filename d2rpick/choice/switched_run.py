@@ -12,13 +12,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
+from d2rpick.base.errors import (
+    Caution,
+    FormatError,
+    RangeError,
+    give_if_written,
+    list_names,
+)
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.flight.momentum import believed
+from d2rpick.flight.momentum import find_complete_stretches
 from d2rpick.histories.history import Given, History
 from d2rpick.histories.names import Part, Selection
-from d2rpick.histories.samples import stretches, window
+from d2rpick.histories.samples import find_stretches, find_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -197,10 +203,10 @@ def rigid_times(reference: Reference) -> tuple[Times, ...]:
         or of_parts is None
         or whole is None
         or of_parts.masses is None
-        or believed(of_parts, whole)
+        or find_complete_stretches(of_parts, whole)
     ):
         return windows
-    energies = if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
+    energies = give_if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
     void = energies is not None and bool(
         ((of_parts.masses == 0) & (energies > 0)).any()
     )
@@ -265,7 +271,7 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
             if not is_rigid
         ]
         if names and history.parts:
-            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
+            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {list_names(names)}"
             yield Caution(
                 "partly-rigid", f"{deforming}; the window counts as done for the others"
             )
@@ -302,7 +308,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     parts = _deformable(reference)
     balance = reference.history.balance
     if parts:
-        kinetic = if_written(lambda: reference.run.part_kinetic_energies(parts))
+        kinetic = give_if_written(lambda: reference.run.part_kinetic_energies(parts))
     else:
         kinetic = None
     if kinetic is None or balance is None or balance.kinetic is None:
@@ -313,7 +319,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
     energies = reference.run.part_energies(parts)
     windows = []
-    for states in stretches(gone, FEWEST):
+    for states in find_stretches(gone, FEWEST):
         start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
@@ -323,7 +329,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
             if is_rigid
         ]
         deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
-        windows.append(_Absent(start, end, listing(names), not deform.any()))
+        windows.append(_Absent(start, end, list_names(names), not deform.any()))
     return tuple(windows)
 
 
@@ -353,13 +359,13 @@ def rigid_parts(
 
     ``time`` has the times of the parts' states, shape (n,).
     """
-    inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
+    inside = find_window(time, np.nextafter(tr, td), np.nextafter(td, tr))
     # the switch comes at the first step after tr
     inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))
     if not parts or len(time[inside]) < FEWEST:
         return None
     energies = run.part_energies(parts)[inside]
-    kinetic = if_written(lambda: run.part_kinetic_energies(parts))
+    kinetic = give_if_written(lambda: run.part_kinetic_energies(parts))
     still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
     if kinetic is not None:
         absent = (kinetic[inside] == 0).all(axis=0)
@@ -472,4 +478,4 @@ def _reported_wrong(
 
 def _names(parts: Iterable[Part]) -> str:
     """Return a list of part names for a sentence."""
-    return listing([part.name for part in parts])
+    return list_names([part.name for part in parts])

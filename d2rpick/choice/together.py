@@ -23,10 +23,10 @@ class Together:
         """Parts that vibrate with the chosen ones but were not chosen."""
         # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
-            vibrating_beside,
+            find_vibrating_parts,
         )
 
-        return vibrating_beside(self._history, self._flight)
+        return find_vibrating_parts(self._history, self._flight)
 
     @property
     def complete(self) -> bool:
@@ -38,7 +38,7 @@ class Together:
         """Kinetic energy of the parts that vibrate together, at times in the flight; None if it is not written."""
         # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
-            kinetic_energy_of,
+            extract_kinetic_energy,
         )
 
-        return kinetic_energy_of(self._history, self._flight)
+        return extract_kinetic_energy(self._history, self._flight)

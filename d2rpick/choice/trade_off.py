@@ -24,7 +24,7 @@ from d2rpick.choice.suggest_td import (
     within_flight,
 )
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.digits import round_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
         smallest_error = np.inf
         longest = np.inf
         printed = {
-            offer.td: (-as_read(offer.rigid_time or 0.0), as_printed(offer.error))
+            offer.td: (-round_as_read(offer.rigid_time or 0.0), as_printed(offer.error))
             for offer in group
         }
         for offer in sorted(group, key=lambda offer: printed[offer.td]):

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import Caution, listing, name_units
+from d2rpick.base.errors import Caution, list_names, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.few_states import cautions_of_few_states
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.flight.margin import margin_before_contact
-from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
+from d2rpick.flight.margin import compute_margin
+from d2rpick.histories.digits import (
+    format_above_limit,
+    format_window,
+    round_down_as_read,
+    round_to_first_as_read,
+)
 from d2rpick.vibration import measures
 from d2rpick.vibration.model import NOTHING_KEPT
 
@@ -155,7 +160,7 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
     kept = (
-        f"keep td before {not_after(flight.end - early):.6g}"
+        f"keep td before {round_down_as_read(flight.end - early):.6g}"
         if early < flight.end - flight.start
         else "no td is safe"
     )
@@ -220,7 +225,7 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
         if worst.assumed and situation.settings.bodies is None
         else ""
     )
-    contact = margin_before_contact(
+    contact = compute_margin(
         situation.history, situation.flight, place=worst.error
     ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
@@ -232,7 +237,10 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 def _moves_apart(parts: Sequence[Part]) -> str:
     """Name the parts that nothing holds in a body."""
-    away = f"{listing([part.name for part in parts])} fl{'ies' if len(parts) == 1 else 'y'} away from the other parts"
+    verb = "flies" if len(parts) == 1 else "fly"
+    away = (
+        f"{list_names([part.name for part in parts])} {verb} away from the other parts"
+    )
     return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
 
 
@@ -270,11 +278,11 @@ def _nearest_flight(situation: Situation) -> str:
         return f"; the next flight begins at {flight.start:.6g}"
     margin = _margin(situation.margin)
     last = (
-        f",{margin} its last td is {not_after(situation.latest_td):.6g}"
+        f",{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
         if margin
         else "; td must lie in it"
     )
-    return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)}{last}"
+    return f"; the nearest flight lasts from {format_window(flight.start, flight.end)}{last}"
 
 
 # Many modes never rest all at once, so the energy at rest is less than the lowest in flight.  This share of it gives
@@ -454,7 +462,9 @@ def objections(
     """
     begun = np.array(
         [
-            np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr)
+            np.nan
+            if one.earliest_tr is None
+            else round_to_first_as_read(one.earliest_tr)
             for one in situations
         ]
     )
@@ -517,7 +527,9 @@ def _tell_always(reason: str, _: int) -> list[str]:
 
 def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
     limit = most[candidate]
-    return [f"error {above(error[candidate], limit)} above the tolerance {limit:g}"]
+    return [
+        f"error {format_above_limit(error[candidate], limit)} above the tolerance {limit:g}"
+    ]
 
 
 def _tell_keeps_nothing(
@@ -558,7 +570,7 @@ def _keeps_nothing(situation: Situation, residual: float) -> str:
 def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Say by how much more energy would come back after td than the reference has."""
     if means:
-        times = above(means.ratio(energy), MOST_KEPT)
+        times = format_above_limit(means.ratio(energy), MOST_KEPT)
         found = f"the mean energy after td is expected to be {times} times that of the reference"
         yield f"{found}, more than {MOST_KEPT:g} times"
 

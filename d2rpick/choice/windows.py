@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick.choice.candidates import Candidate, Candidates, judge
 from d2rpick.choice.warnings import most_energy
-from d2rpick.histories.samples import find_crossings, narrow, union
+from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
             ends,
         ]
     )
-    return union(times[(times >= max(start, history.time[0])) & (times < td)])
+    return merge_times(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
 def _residual_left(situation: Situation) -> float:
@@ -212,7 +212,7 @@ def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples
     if not inner.size:
         return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow(
+    return narrow_brackets(
         lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_END_HALVINGS
     ).within
 
@@ -246,7 +246,7 @@ def error_profile(
     if not windows.size:
         return np.zeros((2, 0))
     inner = monotone_grid(situation, candidates)
-    times = union(inner[_inside(inner, windows)], windows)
+    times = merge_times(inner[_inside(inner, windows)], windows)
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
         middles = middles[_inside(middles, windows)]
@@ -259,7 +259,7 @@ def error_profile(
         )
         if not bent.any():
             break
-        times = union(times, middles[bent])
+        times = merge_times(times, middles[bent])
     return _thinned(times, _errors(situation, times), windows)
 
 

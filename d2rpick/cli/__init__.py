@@ -15,7 +15,7 @@ import click
 
 from d2rpick.base import __version__
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import one_line
+from d2rpick.base.errors import format_in_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -177,7 +177,7 @@ class _Group(Documented, click.Group):
         except click.ClickException as error:
             _fail(error.format_message())
         except OSError as error:  # from a help or a version that cannot be written
-            _fail(one_line(error))
+            _fail(format_in_one_line(error))
         except click.Abort:  # which click makes of an interrupt
             _tell_error("interrupted")
             raise KeyboardInterrupt from None

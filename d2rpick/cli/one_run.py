@@ -20,7 +20,7 @@ from d2rpick.api.request import (
     check_window,
     time_or_window,
 )
-from d2rpick.base.errors import ArgumentError, DeckError, printable
+from d2rpick.base.errors import ArgumentError, DeckError, make_printable
 from d2rpick.cli import options
 from d2rpick.cli.options import (
     ANSWER,
@@ -493,7 +493,7 @@ def _write_and_check(
     from d2rpick.api.plans import written
 
     names, checked = written(plan, card, folder, overwrite=output.overwrite)
-    listed = [f"written  {printable(name)}" for name in names]
+    listed = [f"written  {make_printable(name)}" for name in names]
     return "\n".join(
         [*listed, "", checked.text("table", output.shown())]
     ), checked.passed

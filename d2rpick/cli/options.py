@@ -22,7 +22,7 @@ from d2rpick.api.request import (
     options_of,
 )
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.settings import nearest_settings
+from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
@@ -104,7 +104,7 @@ class Command(Documented):
         """Read the command line; what neither it nor the environment gives, the settings may."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
-        table, source, ctx.meta["d2rpick.unused"] = nearest_settings(os.curdir)
+        table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
             without = click.Context(

@@ -17,11 +17,11 @@ from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,
     D2RPickError,
-    listing,
-    one_line,
-    printable,
+    format_in_one_line,
+    list_names,
+    make_printable,
 )
-from d2rpick.base.files import write_whole
+from d2rpick.base.files import write_as_a_whole
 from d2rpick.cli.progress import on_terminal, reading
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ class Output:
         from pathlib import Path
 
         try:
-            write_whole(Path(name), content)
+            write_as_a_whole(Path(name), content)
         except BrokenPipeError:
             raise
         except OSError as error:
@@ -334,7 +334,7 @@ def tell(message: str) -> None:
 
     It is one line, on a terminal broken where that ends; never in a log, where ``COLUMNS`` may be set as well.
     """
-    text = printable(with_options(message))
+    text = make_printable(with_options(message))
     if on_terminal() and (width := columns_of(sys.stderr)):
         from d2rpick.report.tables import wrapped  # not above: --help does without it
 
@@ -352,10 +352,8 @@ def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     if isinstance(error, FORESEEN):
-        return with_options(one_line(error))
-    return (
-        f"{listing(inputs)}{': ' * bool(inputs)}{one_line(error)}; --debug shows where"
-    )
+        return with_options(format_in_one_line(error))
+    return f"{list_names(inputs)}{': ' * bool(inputs)}{format_in_one_line(error)}; --debug shows where"
 
 
 def text_bytes(text: str) -> bytes:

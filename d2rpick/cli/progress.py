@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +27,7 @@ def reading(
     ``period``: before the first line, and between two [s].  Nobody knows how long it will take: how much of a file has
     to be read depends on what is asked of it.
     """
-    what = "standard input" if names[0] == "-" else printable(names[0])
+    what = "standard input" if names[0] == "-" else make_printable(names[0])
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
     with telling(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option, Request
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.cli import options
 from d2rpick.cli.output import Output, in_words, tell, text_bytes
 from d2rpick.cli.progress import telling
@@ -255,4 +255,4 @@ def first(
         overwrite=output.overwrite,
     )
     output.notes(found.notes, ())
-    click.echo("\n".join(f"written  {printable(name)}" for name in found.files))
+    click.echo("\n".join(f"written  {make_printable(name)}" for name in found.files))

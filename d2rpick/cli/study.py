@@ -216,7 +216,9 @@ def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -
         if not cluster.threads and not quiet:
             tell(f"note: {scheduler}: no workers yet, waiting for some")
         return cluster
-    return workers.on_cores(min(jobs or workers.cores(), calls), "d2rpick.choice.study")
+    return workers.choose_farm(
+        min(jobs or workers.count_cores(), calls), "d2rpick.choice.study"
+    )
 
 
 @options.command

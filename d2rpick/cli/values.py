@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import SETTINGS, Cards, solvers
 from d2rpick.api.request import JUDGING, UNLIMITED, Number, options_of, typed
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.settings import RULE_KEYS, refuse_unknown, toml_text
+from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -291,7 +291,7 @@ def _given(
     for name in COMMANDS:
         if name in shared:
             raise ConfigurationError(
-                f"{source}: {name} is {toml_text(shared[name])}, a table was expected"
+                f"{source}: {name} is {format_toml_value(shared[name])}, a table was expected"
             )
     refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown(tables, (*COMMANDS, "severity"), source)
@@ -315,7 +315,7 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
     ):
         expected = "a list" if option.nargs > 1 else _expected_kind(option)
         raise ConfigurationError(
-            f"{place} is {toml_text(value)}, {expected} was expected"
+            f"{place} is {format_toml_value(value)}, {expected} was expected"
         )
     try:
         found = option.type_cast_value(ctx, values if has_list else value)

@@ -41,11 +41,11 @@ def read_inventory(path: str) -> Inventory:
     from d2rpick.deck.radioss_run import read_run
     from d2rpick.deck.reader import read_deck
 
-    is_run = radioss_files.run_files(path)
+    is_run = radioss_files.list_run_files(path)
     if is_run:
-        inventory = radioss_inventory.read(read_run(path))
+        inventory = radioss_inventory.read_radioss_inventory(read_run(path))
     else:
-        inventory = ls_dyna_inventory.read(read_deck(path))
+        inventory = ls_dyna_inventory.read_ls_dyna_inventory(read_deck(path))
     if not inventory.parts:
         why = f" ({inventory.notes[0]})" if inventory.notes else ""
         raise DeckError(
@@ -54,7 +54,7 @@ def read_inventory(path: str) -> Inventory:
     return inventory
 
 
-def main_decks(folder: str) -> list[str]:
+def find_main_decks(folder: str) -> list[str]:
     """Return the paths of the main decks in a folder and its subfolders.
 
     A main deck contains ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
@@ -65,8 +65,10 @@ def main_decks(folder: str) -> list[str]:
     DeckError
         If there is none, with what to do.
     """
-    decks = [path for path in _files(folder) if _begins(path)]
-    included = {os.path.realpath(path) for deck in decks for path in _includes(deck)}
+    decks = [path for path in _list_files(folder) if _is_main_deck(path)]
+    included = {
+        os.path.realpath(path) for deck in decks for path in _list_includes(deck)
+    }
     main_paths = [path for path in decks if os.path.realpath(path) not in included]
     if not main_paths:
         if decks:
@@ -86,7 +88,7 @@ def find_decks_of_run(folder: str) -> list[str]:
     deck.
     """
     try:
-        decks = main_decks(folder)
+        decks = find_main_decks(folder)
     except DeckError:
         return []
     return [
@@ -102,7 +104,7 @@ def _has_parts(path: str) -> bool:
     from d2rpick.deck import radioss_files  # not above: start-up
 
     try:
-        if radioss_files.run_files(path):
+        if radioss_files.list_run_files(path):
             from d2rpick.deck.radioss_run import read_run
 
             starter = read_run(path).starter
@@ -115,12 +117,12 @@ def _has_parts(path: str) -> bool:
         return True  # whoever reads the deck reports the error
 
 
-def _includes(path: str) -> list[str]:
+def _list_includes(path: str) -> list[str]:
     """Return the names of the files that a deck includes; none if it cannot be read, which the check reports."""
     from d2rpick.deck import radioss_files, reader  # not above: start-up
 
     try:
-        if radioss_files.run_files(path):
+        if radioss_files.list_run_files(path):
             from d2rpick.deck.radioss_run import read_run
 
             return list(read_run(path).included)
@@ -129,7 +131,7 @@ def _includes(path: str) -> list[str]:
         return []
 
 
-def _files(folder: str) -> Iterator[str]:
+def _list_files(folder: str) -> Iterator[str]:
     """Yield the paths of all visible files in a folder and its subfolders."""
     from pathlib import Path  # not above: start-up
 
@@ -140,10 +142,10 @@ def _files(folder: str) -> Iterator[str]:
         )
 
 
-def _begins(path: str) -> bool:
+def _is_main_deck(path: str) -> bool:
     """Return True if the beginning of a file identifies it as a main deck."""
     try:
-        head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
+        head = _read_head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
     except OSError:
         return False
     lines = (
@@ -153,7 +155,7 @@ def _begins(path: str) -> bool:
     return first.startswith((b"*KEYWORD", b"/BEGIN")) and b"\0" not in head
 
 
-def _head(path: str) -> bytes:
+def _read_head(path: str) -> bytes:
     """Return the first bytes of a file.
 
     A small file may just be saved, so its content is awaited. The beginning of a large file is complete, even if a

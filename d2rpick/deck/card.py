@@ -12,19 +12,19 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.graph import reached
+from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import (
     LONGEST,
     REFERENCE,
     ExpressionError,
     Number,
+    convert_plain,
+    convert_text,
     evaluate,
+    find_parameters,
     is_number,
-    names_in,
-    number,
-    of_kind,
-    plain,
+    parse_number,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
 _PAIRS = 4  # pairs of name and value in a line of *PARAMETER
 
 
-class Field(NamedTuple):
+class CardField(NamedTuple):
     """The text of one field without surrounding blanks, and its place: the column is counted from 1."""
 
     text: str
@@ -67,7 +67,7 @@ class Field(NamedTuple):
         return f"{self.file}:{self.line}"
 
 
-Problem = tuple[Field, str]
+Problem = tuple[CardField, str]
 """A field that cannot be read, and the reason."""
 
 
@@ -79,13 +79,13 @@ class Value(Generic[T]):
     """
 
     value: T
-    place: Field | Row
+    place: CardField | Row
     problem: str = ""
     parameters: tuple[str, ...] = ()
     position: int = 0
 
     @property
-    def field(self) -> Field:
+    def field(self) -> CardField:
         """Return the field itself."""
         if isinstance(self.place, Row):
             return self.place.field(self.position)
@@ -107,7 +107,7 @@ class Row:
         """Return True if the line is blank."""
         return not self.text.strip()
 
-    def field(self, position: int) -> Field:
+    def field(self, position: int) -> CardField:
         """Return field ``position`` (from 0), separated by commas or in fixed columns.
 
         It is empty beyond the end of the line.
@@ -119,7 +119,7 @@ class Row:
             sum(len(piece) + comma for piece in pieces[:position]), len(self.text)
         )
         column = 1 + start + len(text) - len(text.lstrip() or text)
-        return Field(text.strip(), self.block, self.distance, column)
+        return CardField(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
         """Return the text of a field; all texts of the line are cached, as callers read them one after the other."""
@@ -222,9 +222,9 @@ class Card:
         return frozenset(self.name.removeprefix(keyword).split("_")) - {""}
 
     @property
-    def here(self) -> Field:
+    def here(self) -> CardField:
         """Return the keyword as a field, for messages."""
-        return Field(f"*{self.name}", self.block, 0, 1)
+        return CardField(f"*{self.name}", self.block, 0, 1)
 
     def real(self, row: Row, position: int, default: float = 0.0) -> Value[float]:
         """Read a real number; parameters and expressions are evaluated, and a blank field gives the default."""
@@ -246,9 +246,12 @@ class Card:
         if not text:
             return Value(default, row, "", (), position)
         parameters: tuple[str, ...] = ()
-        if len(text) > LONGEST or (value_and_problem := plain(kind, text)) is None:
-            value_and_problem = of_kind(kind, text, self.scope.value)
-            parameters = names_in(text)
+        if (
+            len(text) > LONGEST
+            or (value_and_problem := convert_plain(kind, text)) is None
+        ):
+            value_and_problem = convert_text(kind, text, self.scope.value)
+            parameters = find_parameters(text)
         value, problem = value_and_problem
         return Value(default if problem else value, row, problem, parameters, position)
 
@@ -263,7 +266,11 @@ class Card:
         """Read a word in upper case."""
         text = row.cell(position)
         return Value(
-            self.scope.text(text).upper() or default, row, "", names_in(text), position
+            self.scope.text(text).upper() or default,
+            row,
+            "",
+            find_parameters(text),
+            position,
         )
 
 
@@ -278,7 +285,7 @@ class Definition(NamedTuple):
 
     name: str
     value: Number | str
-    place: Field
+    place: CardField
     order: int
     replaceable: bool = False
     uses: tuple[str, ...] = ()
@@ -350,7 +357,7 @@ class Scope:
 
     def closure(self, names: tuple[str, ...]) -> list[str]:
         """Return ``names`` and all parameters that their definitions use, directly or indirectly."""
-        return reached(
+        return find_reachable(
             names,
             lambda name: (
                 use for definition in self.definitions(name) for use in definition.uses
@@ -365,7 +372,7 @@ class Scope:
             return evaluate(text[1:-1], self._number)
         if "&" in text:
             return evaluate(text, self._number)
-        return number(text)
+        return parse_number(text)
 
     def text(self, text: str) -> str:
         """Return the text of a field with each reference ``&name`` to a character parameter replaced by its text."""
@@ -386,7 +393,7 @@ class Scope:
             self._whole._latest_wins = flags[:1] in (["2"], ["4"])
             return
         target = self._local if "LOCAL" in options else self._whole._shared
-        for row, name, text in _pairs(rows, options):
+        for row, name, text in _read_definitions(rows, options):
             definition = self._definition(row, name, text, "MUTABLE" in options)
             if definition is not None:
                 target.setdefault(definition.name, []).append(definition)
@@ -410,7 +417,7 @@ class Scope:
             return None
         value: Number | str
         problem = ""
-        uses = names_in(text)
+        uses = find_parameters(text)
         if kind == "C":
             value = text.strip().strip('"')
         else:
@@ -418,7 +425,7 @@ class Scope:
                 if uses or not is_number(text):
                     value = evaluate(text, self._number)
                 else:
-                    value = number(text)
+                    value = parse_number(text)
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
                 value = 0
@@ -447,10 +454,12 @@ class Scope:
         return definition.value
 
 
-def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, str]]:
+def _read_definitions(
+    rows: Sequence[Row], options: set[str]
+) -> Iterator[tuple[Row, str, str]]:
     """Yield the row, the name with its type letter, and the value text of each definition on the card."""
     if "EXPRESSION" in options:
-        yield from _expressions(rows)
+        yield from _read_expressions(rows)
         return
     for row in rows:
         for pair in range(1 if "TYPE" in options else _PAIRS):
@@ -459,7 +468,7 @@ def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, s
                 yield row, name, row.cell(2 * pair + 1)
 
 
-def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
+def _read_expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
     """Yield one definition per line; a line with a blank name field continues the previous expression."""
     pending: tuple[Row, str, str] | None = None
     for row in rows:

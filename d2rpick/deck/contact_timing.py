@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.force_switching import ForceSwitch, follow_pair
-from d2rpick.deck.radioss_sensors import either, inactive
+from d2rpick.deck.radioss_sensors import invert_spans, join_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ class Pushes(NamedTuple):
     speed: float | None = None
 
 
-class Timing(NamedTuple):
+class ForceTiming(NamedTuple):
     """Times of a force switch, and the windows that result.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
@@ -50,7 +50,7 @@ class Timing(NamedTuple):
     windows: Spans
 
 
-def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
+def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     """Return the times of an LS-DYNA pair of sets.
 
     It makes parts rigid when no force has acted for the wait, and deformable shortly before the next force. OFFSET is
@@ -83,10 +83,12 @@ def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
 
     waits = [tr - td for (_, td), (tr, _) in itertools.pairwise(windows)]
     wait, switched = _find_least_wait(waits, windows, follow, "pair of switch sets")
-    return Timing(windows[0][0], latest, wait, lead * (pushes.speed or 0.0), switched)
+    return ForceTiming(
+        windows[0][0], latest, wait, lead * (pushes.speed or 0.0), switched
+    )
 
 
-def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
+def find_sensor_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     """Return the times of a Radioss force sensor: parts are deformable during each force, and for the wait after it.
 
     Before the first window and after the last one they are deformable in any case.
@@ -102,10 +104,10 @@ def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
         pushed = tuple((start, end + wait) for start, end in pushes.spans)
-        active = either(
+        active = join_spans(
             [pushed, ((0.0, first),) if first > 0 else (), ((last, math.inf),)]
         )
-        return inactive(active)
+        return invert_spans(active)
 
     waits = [
         tr - end
@@ -113,7 +115,7 @@ def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
         if end > -math.inf
     ]
     wait, switched = _find_least_wait(waits, windows, follow, "sensor")
-    return Timing(first, last, wait, 0.0, switched)
+    return ForceTiming(first, last, wait, 0.0, switched)
 
 
 def _find_least_wait(

@@ -31,7 +31,7 @@ def choose_step_cap(tr: float, td: float) -> float:
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
-def legs(
+def plan_legs(
     windows: Sequence[Times], end: float, step_cap: float | None
 ) -> list[EngineFile]:
     """Return the engine runs for some windows up to ``end``; a window that begins at 0 needs no run before it.
@@ -57,16 +57,16 @@ def legs(
     return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
 
 
-def off(nodes: Sequence[int]) -> Iterator[str]:
+def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
     """Yield the lines that deactivate rigid bodies, all in one block.
 
     The OpenRadioss starter ignores a second such block that follows the first one directly.
     """
     if nodes:
-        yield from ("/RBODY/OFF", *listed(nodes))
+        yield from ("/RBODY/OFF", *write_numbers(nodes))
 
 
-def listed(ids: Sequence[int]) -> Iterator[str]:
+def write_numbers(ids: Sequence[int]) -> Iterator[str]:
     """Yield lines that list numbers."""
     yield from (
         " ".join(map(str, ids[i : i + _NODES_PER_LINE]))
@@ -74,20 +74,22 @@ def listed(ids: Sequence[int]) -> Iterator[str]:
     )
 
 
-def engine_lines(
+def write_engine_lines(
     leg: EngineFile, name: str, ids: Sequence[int], other_nodes: Sequence[int]
 ) -> Iterator[str]:
     """Yield the lines of an engine file: its run, and the main nodes that are rigid; ``other_nodes`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     if leg.cap is not None and ids:
-        yield from ("/RBODY/ON", *listed(ids))
-    yield from off(other_nodes if leg.cap is not None else (*ids, *other_nodes))
+        yield from ("/RBODY/ON", *write_numbers(ids))
+    yield from write_bodies_off(
+        other_nodes if leg.cap is not None else (*ids, *other_nodes)
+    )
     if leg.cap is not None:
-        yield from capped(leg.cap)
+        yield from write_step_limit(leg.cap)
 
 
-def capped(cap: float) -> Iterator[str]:
+def write_step_limit(cap: float) -> Iterator[str]:
     """Yield the lines that limit the time step while bodies are rigid."""
     yield from (
         "# with nothing deformable left the step would grow without limit",

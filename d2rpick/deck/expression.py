@@ -38,12 +38,12 @@ class ExpressionError(Exception):
 
 
 @lru_cache(4096)  # most fields are blank or 0
-def number(text: str) -> Number:
+def parse_number(text: str) -> Number:
     """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` without the exponent letter.
 
     Examples
     --------
-    >>> number("12"), number(" 12.e-3 "), number("1.5D-3"), number("1.5-3")
+    >>> parse_number("12"), parse_number(" 12.e-3 "), parse_number("1.5D-3"), parse_number("1.5-3")
     (12, 0.012, 0.0015, 0.0015)
     """
     text = text.strip()
@@ -53,26 +53,30 @@ def number(text: str) -> Number:
     mantissa = match[1]
     exponent = match[2] or match[3]
     if exponent is None and "." not in mantissa:
-        return _checked(int(mantissa))
-    return _checked(float(f"{mantissa}e{exponent or 0}"))
+        return _check_range(int(mantissa))
+    return _check_range(float(f"{mantissa}e{exponent or 0}"))
 
 
 def is_number(text: str) -> bool:
     """Return True if `number` can read the text."""
     try:
-        number(text)
+        parse_number(text)
     except ExpressionError:
         return False
     return True
 
 
 @lru_cache(4096)
-def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
+def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
     """Return the result of `of_kind` for a text that is a plain number; None if it must be evaluated."""
-    return None if "&" in text or text[0] == "<" else of_kind(kind, text, number)
+    return (
+        None
+        if "&" in text or text[0] == "<"
+        else convert_text(kind, text, parse_number)
+    )
 
 
-def of_kind(
+def convert_text(
     kind: Callable[[float], Any], text: str, value: Callable[[str], Number]
 ) -> tuple[Any, str]:
     """Convert a text to a number of a type (int or float).
@@ -81,7 +85,7 @@ def of_kind(
 
     Examples
     --------
-    >>> of_kind(int, "2.0", number), of_kind(int, "2.5", number)
+    >>> convert_text(int, "2.0", parse_number), convert_text(int, "2.5", parse_number)
     ((2, ''), (None, "'2.5' is not an integer"))
     """
     try:
@@ -94,20 +98,20 @@ def of_kind(
     return (None, f"{text!r} is not an integer")
 
 
-def real(text: str) -> float:
+def parse_real(text: str) -> float:
     """Parse a field as a number: a blank gives 0.0, other text NaN."""
     try:
-        return float(number(text)) if text.strip() else 0.0
+        return float(parse_number(text)) if text.strip() else 0.0
     except ExpressionError:
         return math.nan
 
 
-def names_in(text: str) -> tuple[str, ...]:
+def find_parameters(text: str) -> tuple[str, ...]:
     """Return the names of the parameters that a text uses, in lower case.
 
     Examples
     --------
-    >>> names_in("-&tEnd/6.0+&dt")
+    >>> find_parameters("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
     if "&" in text:
@@ -135,7 +139,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
         raise ExpressionError(f"{text!r} has no finite value") from None
 
 
-def _nint(x: Number) -> int:
+def _round_half_away(x: Number) -> int:
     """Round to the nearest integer, halves away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
@@ -168,17 +172,17 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     "float": (1, float),
     "int": (1, int),
     "aint": (1, lambda x: float(int(x))),
-    "nint": (1, _nint),
-    "anint": (1, lambda x: float(_nint(x))),
+    "nint": (1, _round_half_away),
+    "anint": (1, lambda x: float(_round_half_away(x))),
     "atan2": (2, math.atan2),
     "min": (2, min),
     "max": (2, max),
     "sign": (2, lambda x, y: abs(x) if y >= 0 else -abs(x)),
-    "mod": (2, lambda x, y: int(math.fmod(_nint(x), _nint(y)))),
+    "mod": (2, lambda x, y: int(math.fmod(_round_half_away(x), _round_half_away(y)))),
 }
 
 
-def _quotient(x: Number, y: Number) -> Number:
+def _divide(x: Number, y: Number) -> Number:
     """Divide as Fortran does: integers give an integer, rounded towards zero."""
     if isinstance(x, int) and isinstance(y, int):
         whole = abs(x) // abs(y)
@@ -186,7 +190,7 @@ def _quotient(x: Number, y: Number) -> Number:
     return x / y
 
 
-def _power(x: Number, y: Number) -> Number:
+def _raise_to_power(x: Number, y: Number) -> Number:
     """Raise to a power as Fortran does: integers give an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
@@ -197,8 +201,8 @@ _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = 
     "+": (1, operator.add),
     "-": (1, operator.sub),
     "*": (2, operator.mul),
-    "/": (2, _quotient),
-    "**": (3, _power),
+    "/": (2, _divide),
+    "**": (3, _raise_to_power),
 }
 
 
@@ -208,7 +212,7 @@ class _Parser:
     def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
         self.text = text
         self.lookup = lookup
-        self.tokens = [*_tokens(text), ""]
+        self.tokens = [*_split_tokens(text), ""]
         self.depth = 0
 
     def whole(self) -> Number:
@@ -241,7 +245,7 @@ class _Parser:
                 operand = self.nested(level)
             else:
                 operand = self.value(level + 1)
-            value = _checked(operate(value, operand))
+            value = _check_range(operate(value, operand))
         return value
 
     def signed(self) -> Number:
@@ -260,7 +264,7 @@ class _Parser:
             self.expect(")")
             return value
         if token[:1].isdigit() or token[:1] == ".":
-            return number(token)
+            return parse_number(token)
         if token[:1] == "&":
             return self.lookup(token[1:].strip().lower())
         name = token.lower()
@@ -288,7 +292,7 @@ class _Parser:
             raise ExpressionError(
                 f"{name}() takes {arity} values, found {len(arguments)}"
             )
-        return _checked(function(*arguments))
+        return _check_range(function(*arguments))
 
     def expect(self, sign: str) -> None:
         """Remove the next token, which must be ``sign``."""
@@ -304,7 +308,7 @@ class _Parser:
         )
 
 
-def _tokens(text: str) -> Iterator[str]:
+def _split_tokens(text: str) -> Iterator[str]:
     """Yield the tokens of an expression."""
     position = 0
     text = text.rstrip()
@@ -317,7 +321,7 @@ def _tokens(text: str) -> Iterator[str]:
         position = match.end()
 
 
-def _checked(value: Number) -> Number:
+def _check_range(value: Number) -> Number:
     """Return the value; ExpressionError if it is not finite or too large."""
     if isinstance(value, int) and abs(value) >= _INTEGER_LIMIT:
         raise ExpressionError("an integer leaves the 64-bit range")

@@ -66,7 +66,9 @@ def follow_pair(
     """
     windows: list[tuple[float, float | None]] = []
     seen_by_second = contacts if second_contacts is None else second_contacts
-    for time, to_rigid in _switches((first, contacts), (second, seen_by_second), end):
+    for time, to_rigid in _follow_switches(
+        (first, contacts), (second, seen_by_second), end
+    ):
         if to_rigid and not (windows and windows[-1][1] is None):
             windows.append((time, None))
         elif not to_rigid and windows and windows[-1][1] is None:
@@ -74,7 +76,7 @@ def follow_pair(
     return windows
 
 
-def _switches(
+def _follow_switches(
     first: tuple[ForceSwitch, Spans],
     second: tuple[ForceSwitch | None, Spans],
     end: float,
@@ -85,14 +87,16 @@ def _switches(
     for acting, contacts in turns:
         if acting is None:
             return
-        time = _next(acting.with_force, max(acting.earliest, ready), contacts)
+        time = _find_next_switch(
+            acting.with_force, max(acting.earliest, ready), contacts
+        )
         if time >= end or time > acting.latest:
             return
         yield time, acting.to_rigid
         ready = max(time + acting.delay, math.nextafter(time, math.inf))
 
 
-def _next(with_force: bool, since: float, contacts: Spans) -> float:
+def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
     """Return the first time from ``since`` on with a force (or without one); infinity if there is none."""
     for start, end in contacts:
         if since < end:
@@ -114,11 +118,11 @@ def find_delay_without_chatter(
     contacts_before = [
         [span for span in contacts if span[1] <= tr] for tr, _ in windows
     ]
-    clusters = [_cluster(spans, windows) for spans in contacts_before if spans]
+    clusters = [_find_cluster(spans, windows) for spans in contacts_before if spans]
     return max((end - start for start, end in clusters), default=None)
 
 
-def _cluster(
+def _find_cluster(
     contacts: Spans, windows: Sequence[tuple[float, float]]
 ) -> tuple[float, float]:
     """Return the span from the first to the last contact after the previous window."""

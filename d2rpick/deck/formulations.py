@@ -44,14 +44,16 @@ _ELFORM_SHELL: Final = {
 }  # fmt: skip
 
 
-def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | None:
+def find_radioss_formulation(
+    kind: str, shell: int, triangle: int, solid: int
+) -> Formulation | None:
     """Return the formulation of a kind of element in Radioss by the flags of its property; None if it is unknown."""
     if kind == "shell":
-        return _layered(
+        return _add_layer_points(
             _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
         )
     if kind == "triangle":
-        return _layered(
+        return _add_layer_points(
             _ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False))
         )
     if kind == "solid":
@@ -60,25 +62,27 @@ def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | N
             SOLID,
             measured=solid in _ISOLID_MEASURED,
         )
-    return _plain(kind, measured=True)
+    return _make_plain_formulation(kind, measured=True)
 
 
-def ls_dyna(kind: str, elform: int) -> Formulation | None:
+def find_ls_dyna_formulation(kind: str, elform: int) -> Formulation | None:
     """Return the formulation of a kind of element in LS-DYNA by its ELFORM; None if it is unknown."""
     if kind == "shell":
         name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
-        return _layered(Formulation(f"{name} (ELFORM {elform})", cost, measured=False))
+        return _add_layer_points(
+            Formulation(f"{name} (ELFORM {elform})", cost, measured=False)
+        )
     if kind in ("solid", "thick shell"):
         return Formulation(f"{kind} (ELFORM {elform})", SOLID, measured=False)
-    return _plain(kind, measured=False)
+    return _make_plain_formulation(kind, measured=False)
 
 
-def _layered(shell: Formulation) -> Formulation:
+def _add_layer_points(shell: Formulation) -> Formulation:
     """Add the number of integration points per layer to the formulation of a shell."""
     return shell._replace(in_plane=_IN_PLANE.get(shell.cost or "", 0))
 
 
-def _plain(kind: str, *, measured: bool) -> Formulation | None:
+def _make_plain_formulation(kind: str, *, measured: bool) -> Formulation | None:
     """Return the formulation of a kind of element that has no variants; None if it is unknown."""
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
     cost = alike.get(kind)

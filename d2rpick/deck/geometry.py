@@ -43,7 +43,7 @@ _LINES: Final = frozenset({"beam", "truss"})
 _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})
 
 
-class _Measured(NamedTuple):
+class _ElementTotals(NamedTuple):
     """Number, total size and smallest wave length of the elements of one kind in one part."""
 
     kind: str
@@ -52,16 +52,16 @@ class _Measured(NamedTuple):
     length: float
 
 
-def masses_and_steps(
+def compute_masses_and_steps(
     inventory: Inventory,
 ) -> dict[int, tuple[float | None, float | None]]:
     """Return the mass [mass] and the smallest stable time step [time] of every part that has elements.
 
     None if the deck does not define the density, modulus, thickness or position of every element of the part.
     """
-    measured: dict[int, list[_Measured]] = {}
+    measured: dict[int, list[_ElementTotals]] = {}
     for elements in inventory.elements:
-        sizes, lengths = sizes_and_lengths(
+        sizes, lengths = compute_sizes_and_lengths(
             elements.kind, elements.nodes, inventory.coordinates
         )
         order = np.argsort(elements.part, kind="stable")
@@ -73,18 +73,18 @@ def masses_and_steps(
         for part, *values in zip(
             *(a.tolist() for a in (parts, counts, sums, lows)), strict=True
         ):
-            measured.setdefault(part, []).append(_Measured(elements.kind, *values))
+            measured.setdefault(part, []).append(_ElementTotals(elements.kind, *values))
     return {
         part: (
-            _mass(inventory.parts[part], part_elements),
-            _step(inventory.parts[part], part_elements),
+            _compute_mass(inventory.parts[part], part_elements),
+            _compute_step(inventory.parts[part], part_elements),
         )
         for part, part_elements in measured.items()
         if part in inventory.parts
     }
 
 
-def _mass(data: PartData, measured: Sequence[_Measured]) -> float | None:
+def _compute_mass(data: PartData, measured: Sequence[_ElementTotals]) -> float | None:
     """Return the mass of a part; None if it is unknown."""
     mass = 0.0
     for elements in measured:
@@ -92,18 +92,18 @@ def _mass(data: PartData, measured: Sequence[_Measured]) -> float | None:
             mass += elements.number * data.section.mass
             continue
         density = data.material.density if data.material else None
-        depth = _depth(elements.kind, data)
+        depth = _get_depth(elements.kind, data)
         if density is None or depth is None:
             return None
         mass += density * depth * elements.size
     return mass if math.isfinite(mass) and mass > 0 else None
 
 
-def _step(data: PartData, measured: Sequence[_Measured]) -> float | None:
+def _compute_step(data: PartData, measured: Sequence[_ElementTotals]) -> float | None:
     """Return the smallest stable time step of a part; None if it is unknown."""
     steps: list[float] = []
     for elements in measured:
-        speed = _wave_speed(elements.kind, data.material)
+        speed = _compute_wave_speed(elements.kind, data.material)
         if speed is None:
             return None
         steps.append(elements.length / speed)
@@ -112,7 +112,7 @@ def _step(data: PartData, measured: Sequence[_Measured]) -> float | None:
     return None
 
 
-def _depth(kind: str, data: PartData) -> float | None:
+def _get_depth(kind: str, data: PartData) -> float | None:
     """Return the factor that turns a size into a volume [length, area or 1]; None if it is unknown."""
     if kind in _SURFACES:
         return data.section.thickness
@@ -121,7 +121,7 @@ def _depth(kind: str, data: PartData) -> float | None:
     return 1.0 if kind in _VOLUMES else None
 
 
-def _wave_speed(kind: str, material: Material | None) -> float | None:
+def _compute_wave_speed(kind: str, material: Material | None) -> float | None:
     """Return the wave speed in elements of a kind; None if it is unknown."""
     if material is None or material.density is None or material.modulus is None:
         return None
@@ -136,12 +136,12 @@ def _wave_speed(kind: str, material: Material | None) -> float | None:
     return None
 
 
-def sizes_and_lengths(
+def compute_sizes_and_lengths(
     kind: str, nodes: Places, coordinates: Reals
 ) -> tuple[Reals, Reals]:
     """Return the size of each element [length, area or volume] and the length that a wave crosses; NaN if unknown."""
     pieces = [
-        _sizes(kind, nodes[at : at + _PIECE], coordinates)
+        _compute_sizes(kind, nodes[at : at + _PIECE], coordinates)
         for at in range(0, len(nodes), _PIECE)
     ]
     return np.concatenate([size for size, _ in pieces]), np.concatenate(
@@ -149,7 +149,7 @@ def sizes_and_lengths(
     )
 
 
-def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Return the size of each element and the length that a wave crosses, both (n,); NaN if unknown."""
     if kind in _LINES:
         length = np.linalg.norm(
@@ -157,34 +157,36 @@ def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
         )
         return length, length
     if kind in _SURFACES:
-        return _surfaces(nodes, coordinates)
+        return _measure_surfaces(nodes, coordinates)
     if kind in _VOLUMES:
         if kind == "tetrahedron":
-            return _tetrahedra(nodes, coordinates)
-        return _bricks(nodes, coordinates)
+            return _measure_tetrahedra(nodes, coordinates)
+        return _measure_bricks(nodes, coordinates)
     unknown = np.full(len(nodes), np.nan)
     return unknown, unknown
 
 
-def _surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+def _measure_surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Return the areas of shells, and the lengths that a wave crosses."""
     third = nodes[:, 2]
     last = nodes[:, 3] if nodes.shape[1] > 3 else third
     last = np.where(last == NO_NODE, third, last)
     corners = coordinates[np.stack([nodes[:, 0], nodes[:, 1], third, last], axis=1)]
-    area = _area(corners)
+    area = _compute_areas(corners)
     sides = corners - corners[:, [1, 2, 3, 0]]
     longest = np.sqrt(np.einsum("ijk,ijk->ij", sides, sides).max(axis=1))
     return area, np.where(last == third, 2.0, 1.0) * area / longest
 
 
-def _area(corners: Reals) -> Reals:
+def _compute_areas(corners: Reals) -> Reals:
     """Return the areas of quadrilaterals (n, 4, 3): half the cross product of their diagonals."""
-    cross = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    cross = _compute_cross_products(
+        corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    )
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", cross, cross)) / 2)
 
 
-def _cross(a: Reals, b: Reals) -> Reals:
+def _compute_cross_products(a: Reals, b: Reals) -> Reals:
     """Return the cross products of vectors (n, 3); several times faster than numpy.cross."""
     next_axis = [1, 2, 0]
     second_axis = [2, 0, 1]
@@ -193,20 +195,20 @@ def _cross(a: Reals, b: Reals) -> Reals:
     )
 
 
-def _tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Return the volumes of tetrahedra, and the lengths that a wave crosses."""
     corners = coordinates[nodes[:, :4]]
-    volume = np.abs(_sixth(corners, (0, 1, 2, 3)))
+    volume = np.abs(_compute_tetrahedron_volumes(corners, (0, 1, 2, 3)))
     faces = np.stack(
         [
-            _area(corners[:, [*face, face[-1]]])
+            _compute_areas(corners[:, [*face, face[-1]]])
             for face in ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3))
         ]
     )
     return volume, 3 * volume / faces.max(axis=0)
 
 
-def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Return the volumes of solids, and the lengths that a wave crosses; wedges and tetrahedra repeat or omit nodes."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
@@ -214,26 +216,32 @@ def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
             eight[:, column] == NO_NODE, eight[:, column - 1], eight[:, column]
         )
     corners = coordinates[eight]
-    volume = np.abs(sum(_below(corners, face) for face in _FACES))
-    faces = np.stack([_area(corners[:, list(face)]) for face in _FACES])
+    volume = np.abs(sum(_compute_volume_below(corners, face) for face in _FACES))
+    faces = np.stack([_compute_areas(corners[:, list(face)]) for face in _FACES])
     is_tetrahedron = (eight[:, 3:8] == eight[:, 3:4]).all(axis=1)
     factor = np.where(is_tetrahedron, 3.0, 1.0)
     return np.asarray(volume), factor * volume / faces.max(axis=0)
 
 
-def _below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
+def _compute_volume_below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
     """Return the signed volumes between the first corner and a face; their sum is the volume, even if nodes repeat."""
     a, b, c, d = face
-    return _sixth(corners, (0, a, b, c)) + _sixth(corners, (0, a, c, d))
+    return _compute_tetrahedron_volumes(
+        corners, (0, a, b, c)
+    ) + _compute_tetrahedron_volumes(corners, (0, a, c, d))
 
 
-def _sixth(corners: Reals, four: tuple[int, int, int, int]) -> Reals:
+def _compute_tetrahedron_volumes(
+    corners: Reals, four: tuple[int, int, int, int]
+) -> Reals:
     """Return the signed volumes of tetrahedra with these four corners."""
     a, b, c, d = (corners[:, at] for at in four)
-    return np.asarray(np.einsum("ij,ij->i", _cross(b - a, c - a), d - a) / 6)
+    return np.asarray(
+        np.einsum("ij,ij->i", _compute_cross_products(b - a, c - a), d - a) / 6
+    )
 
 
-class Placed(NamedTuple):
+class PartPosition(NamedTuple):
     """Position of a part in the deck.
 
     ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
@@ -245,7 +253,7 @@ class Placed(NamedTuple):
     watched: Mapping[int, Reals]
 
 
-class _Share(NamedTuple):
+class _PartShare(NamedTuple):
     """Elements of a part together: their size (), its first moments (3,) and its second moments (3, 3)."""
 
     size: float
@@ -260,19 +268,19 @@ class Placement:
         self._inventory = inventory
 
     @cached_property
-    def parts(self) -> Mapping[int, Placed]:
+    def parts(self) -> Mapping[int, PartPosition]:
         """Return the position of each part with known coordinates.
 
         Empty if elements may be missing or the deck moves nodes.
         """
         if self._inventory.moved or not self._inventory.complete:
             return {}
-        shares_by_part: dict[int, list[_Share]] = {}
+        shares_by_part: dict[int, list[_PartShare]] = {}
         for elements in self._inventory.elements:
-            for part, share in _shares(elements, self._inventory.coordinates):
+            for part, share in _compute_shares(elements, self._inventory.coordinates):
                 shares_by_part.setdefault(part, []).append(share)
         placed = (
-            (part, _placed(self._inventory, part, shares))
+            (part, _combine_shares(self._inventory, part, shares))
             for part, shares in shares_by_part.items()
         )
         return {
@@ -299,15 +307,17 @@ class Placement:
         return frozenset(max(groups, key=self._inventory.rigid_nodes, default=()))
 
 
-def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Share]]:
+def _compute_shares(
+    elements: Elements, coordinates: Reals
+) -> Iterable[tuple[int, _PartShare]]:
     """Return the contribution of the elements of one kind to each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:
         sizes = np.ones(len(elements.nodes))
     else:
-        sizes = sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
-    middles = _middles(elements.nodes, coordinates)
+        sizes = compute_sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
+    middles = _compute_centres(elements.nodes, coordinates)
     parts, part_index = np.unique(elements.part, return_inverse=True)
     total = np.bincount(part_index, sizes)
     # Elements without size do not define the position of their part.
@@ -323,7 +333,7 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     )
     second = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
     return [
-        (part, _Share(size, first_moment, second_moment))
+        (part, _PartShare(size, first_moment, second_moment))
         for part, size, first_moment, second_moment in zip(
             parts.tolist(),
             total.tolist(),
@@ -334,7 +344,7 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     ]
 
 
-def _middles(nodes: Places, coordinates: Reals) -> Reals:
+def _compute_centres(nodes: Places, coordinates: Reals) -> Reals:
     """Return the mean of the nodes of each element (n, 3)."""
     if (nodes != NO_NODE).all():
         return np.asarray(
@@ -348,7 +358,9 @@ def _middles(nodes: Places, coordinates: Reals) -> Reals:
     return np.asarray(summed / is_real.sum(axis=1)[:, np.newaxis])
 
 
-def _placed(inventory: Inventory, part: int, shares: Sequence[_Share]) -> Placed:
+def _combine_shares(
+    inventory: Inventory, part: int, shares: Sequence[_PartShare]
+) -> PartPosition:
     """Combine the contributions of all kinds of elements to the position of a part."""
     size = sum(share.size for share in shares)
     centre = np.asarray(sum(share.first for share in shares) / size)
@@ -365,4 +377,4 @@ def _placed(inventory: Inventory, part: int, shares: Sequence[_Share]) -> Placed
     positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     watched_nodes = inventory.watched[nodes[positions] == inventory.watched]
     watched = {node: inventory.coordinates[node] for node in watched_nodes.tolist()}
-    return Placed(centre, np.asarray(spread), watched)
+    return PartPosition(centre, np.asarray(spread), watched)

@@ -13,22 +13,22 @@ import numpy as np
 from d2rpick.deck import formulations, ls_dyna_loads
 from d2rpick.deck.card import LONG
 from d2rpick.deck.ls_dyna_parts import (
-    Parts,
+    DeckParts,
     SectionCard,
-    material_of,
+    name_material,
     read_parts,
     read_sections,
 )
-from d2rpick.deck.mesh import Mesh, layout, lines_of
+from d2rpick.deck.mesh import Mesh, place_fields, read_lines
 from d2rpick.deck.model import (
     Formulation,
     Inventory,
     Material,
     PartData,
     Section,
-    placed,
+    place_nodes,
 )
-from d2rpick.deck.reader import Deck, cuts, holds_mesh
+from d2rpick.deck.reader import Deck, find_cuts, has_mesh
 from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ _ELASTIC: Final = {
 }
 
 
-class _Kind(NamedTuple):
+class _LsDynaElementKind(NamedTuple):
     """A kind of element: its name, and the largest and the least number of nodes of an element."""
 
     name: str
@@ -155,37 +155,52 @@ class _Kind(NamedTuple):
 
 
 _KINDS: Final = {
-    "SHELL": _Kind("shell", 8, 3),
-    "SOLID": _Kind("solid", 8, 4),
-    "TSHELL": _Kind("thick shell", 8, 6),
-    "BEAM": _Kind("beam", 2, 2),
-    "DISCRETE": _Kind("spring", 2, 2),
-    "SEATBELT": _Kind("seatbelt", 2, 2),
-    "SPH": _Kind("particle", 0, 0),
+    "SHELL": _LsDynaElementKind("shell", 8, 3),
+    "SOLID": _LsDynaElementKind("solid", 8, 4),
+    "TSHELL": _LsDynaElementKind("thick shell", 8, 6),
+    "BEAM": _LsDynaElementKind("beam", 2, 2),
+    "DISCRETE": _LsDynaElementKind("spring", 2, 2),
+    "SEATBELT": _LsDynaElementKind("seatbelt", 2, 2),
+    "SPH": _LsDynaElementKind("particle", 0, 0),
 }
 
 
-def read(deck: Deck) -> Inventory:
+def read_ls_dyna_inventory(deck: Deck) -> Inventory:
     """Return the parts and elements of a deck."""
     parts = read_parts(deck)
-    cards = list(_element_cards(deck))
-    ids, coordinates, codes = _nodes(deck)
+    cards = list(_find_element_cards(deck))
+    ids, coordinates, codes = _read_nodes(deck)
     mesh = Mesh.of(
-        [block for card in cards if _followed(card) for block in _elements(card)],
+        [
+            block
+            for card in cards
+            if _is_readable(card)
+            for block in _read_elements(card)
+        ],
         ids,
         coordinates,
     )
-    notes = (*_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
-    joints = ls_dyna_loads.joints_of(deck)
+    notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
+    joints = ls_dyna_loads.read_joints(deck)
     return Inventory(
-        "ls-dyna", _parts(deck, parts, mesh), mesh.elements, mesh.coordinates, notes, parts.all_known and not notes,
-        joints=placed(joints.found, mesh.table), ties=joints.unknown, watched=mesh.table.known(_watched(deck)),
-        moved=_moves_nodes(deck), files=tuple(deck.sources),
-        boundary=ls_dyna_loads.read(deck, parts, (ids, coordinates, codes)).placed(mesh.table),
-    )  # fmt: skip
+        "ls-dyna",
+        _build_parts(deck, parts, mesh),
+        mesh.elements,
+        mesh.coordinates,
+        notes,
+        parts.all_known and not notes,
+        joints=place_nodes(joints.found, mesh.table),
+        ties=joints.unknown,
+        watched=mesh.table.known(_read_watched_nodes(deck)),
+        moved=_has_moved_nodes(deck),
+        files=tuple(deck.sources),
+        boundary=ls_dyna_loads.read_ls_dyna_boundary(
+            deck, parts, (ids, coordinates, codes)
+        ).placed(mesh.table),
+    )
 
 
-def first_shared_nodes(
+def find_shared_nodes(
     cards: Sequence[Card], bodies: Mapping[int, int]
 ) -> dict[tuple[int, int], int]:
     """Find a node for every two parts of different bodies that share one.
@@ -204,17 +219,17 @@ def first_shared_nodes(
     """
     owner: dict[int, int] = {}
     shared: dict[tuple[int, int], int] = {}
-    for part, node in _nodes_of(cards, bodies):
+    for part, node in _list_nodes(cards, bodies):
         first_part = owner.setdefault(node, part)
         if first_part != part and bodies[first_part] != bodies[part]:
             shared.setdefault((min(part, first_part), max(part, first_part)), node)
     return shared
 
 
-def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
+def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
     """Return the first of ``parts`` that contains each node, by node id."""
     part_by_node: dict[int, int] = {}
-    for part, node in _nodes_of(cards, parts):
+    for part, node in _list_nodes(cards, parts):
         part_by_node.setdefault(node, part)
     return part_by_node
 
@@ -226,7 +241,7 @@ def find_parts_of_nodes(
     parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:
-        for _, owners, members in _elements(card, _TEN):
+        for _, owners, members in _read_elements(card, _TEN):
             rows = np.isin(members, [*wanted]).any(axis=1)
             for part, element_nodes in zip(
                 owners[rows].tolist(), members[rows].tolist(), strict=True
@@ -236,12 +251,12 @@ def find_parts_of_nodes(
     return parts_by_node
 
 
-def _nodes_of(
+def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
     """Yield part and node id for each node of the elements of some parts, in the order of the deck."""
     for card in cards:
-        for _, owners, nodes in _elements(card, _TEN):
+        for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
             for part, element_nodes in zip(
                 owners[rows].tolist(), nodes[rows].tolist(), strict=True
@@ -251,34 +266,36 @@ def _nodes_of(
                 )
 
 
-def _watched(deck: Deck) -> Integers:
+def _read_watched_nodes(deck: Deck) -> Integers:
     """Return the node ids of *DATABASE_HISTORY_NODE: eight per line, or one with a title."""
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
         if set(options) <= {"ID", "LOCAL"}:
-            fields: Layout = layout(
+            fields: Layout = place_fields(
                 *[20 if card.width == LONG else 10] * (1 if options else 8)
             )
             node_ids = [
-                lines.integers(fields).ravel() for lines in lines_of(card) if len(lines)
+                lines.integers(fields).ravel()
+                for lines in read_lines(card)
+                if len(lines)
             ]
             ids += [numbers[numbers > 0] + card.transform.node for numbers in node_ids]
     return np.unique(np.concatenate(ids))
 
 
-def _moves_nodes(deck: Deck) -> bool:
+def _has_moved_nodes(deck: Deck) -> bool:
     """Return True if the deck moves nodes away from their coordinates."""
     moving = (*deck.named("NODE_TRANSFORM"), *deck.named("PART_MOVE"))
     return bool(moving) or any(card.transform.moved for card in deck.named("NODE"))
 
 
-def _notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
+def _list_notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
     """Yield notes on elements that may be missing."""
     yield from (
         f"{card.at}: elements of *{card.name} are not read"
         for card in cards
-        if not _followed(card)
+        if not _is_readable(card)
     )
     yield from (
         f"{include.name.at}: {include.name.text} was not read: {include.reason}"
@@ -288,12 +305,12 @@ def _notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
         yield f"{block.source.name}:{block.line}: elements in an encrypted block are not read"
     yield from (
         f"{block.source.name}: {sign}"
-        for block, sign in cuts(deck)
-        if holds_mesh(block)
+        for block, sign in find_cuts(deck)
+        if has_mesh(block)
     )
 
 
-def _element_cards(deck: Deck) -> Iterator[Card]:
+def _find_element_cards(deck: Deck) -> Iterator[Card]:
     """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
@@ -309,13 +326,13 @@ def _element_cards(deck: Deck) -> Iterator[Card]:
             yield card
 
 
-def _followed(card: Card) -> bool:
+def _is_readable(card: Card) -> bool:
     """Return True if the elements of a card can be read."""
     _, kind, *options = card.name.split("_")
     return kind in _KINDS and set(options) <= _OPTIONS
 
 
-def _width(card: Card) -> int:
+def _get_id_width(card: Card) -> int:
     """Return the number of columns of an id."""
     words = card.block.head.split()
     if card.width == LONG:
@@ -324,7 +341,7 @@ def _width(card: Card) -> int:
     return 10 if has_percent_suffix else 8
 
 
-def _elements(
+def _read_elements(
     card: Card, node_count: int | None = None
 ) -> Iterator[tuple[str, Integers, Integers]]:
     """Yield kind, part ids and node ids of the elements of a card, block by block, with the id offsets of the include.
@@ -332,13 +349,13 @@ def _elements(
     ``node_count`` is the number of nodes of each element; default: those that define its size.
     """
     kind = _KINDS[card.name.split("_")[1]]
-    width = _width(card)
+    width = _get_id_width(card)
     waiting_line: Integers | None = None
-    for lines in lines_of(card):
+    for lines in read_lines(card):
         if not len(lines):
             continue
         if kind.name == "particle":
-            ids = lines.integers(layout(width, width))
+            ids = lines.integers(place_fields(width, width))
             rows = ids[(ids > 0).all(axis=1)]
             yield (
                 kind.name,
@@ -347,10 +364,10 @@ def _elements(
             )
             continue
         values = lines.integers(
-            layout(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most)))
+            place_fields(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most)))
         )
         if kind.name == "solid":
-            values, waiting_line = _of_two_lines(
+            values, waiting_line = _join_lines(
                 values
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
@@ -365,7 +382,7 @@ def _elements(
         )
 
 
-def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
+def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
     """Join each line of element and part id with the line of nodes below it.
 
     Also return a last line that lacks its nodes.
@@ -381,7 +398,7 @@ def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
     return joined, waiting
 
 
-def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
+def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
     """Return ids (n,) and coordinates (n, 3) of all nodes, and the codes of their fixed translations (n,)."""
     ids = [np.empty(0, np.int64)]
     coordinates = [np.empty((0, 3))]
@@ -389,9 +406,9 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
     for card in deck.named("NODE"):
         if card.name != "NODE":
             continue
-        width = _width(card)
-        fields: Layout = layout(width, *[LONG if card.width == LONG else 16] * 3)
-        for lines in lines_of(card):
+        width = _get_id_width(card)
+        fields: Layout = place_fields(width, *[LONG if card.width == LONG else 16] * 3)
+        for lines in read_lines(card):
             if len(lines):
                 numbers = lines.integers(fields[:1])[:, 0]
                 has_id = numbers > 0
@@ -402,11 +419,13 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
                     if card.transform.scaled
                     else line_coordinates
                 )
-                codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[has_id])
+                codes.append(
+                    _read_codes(lines, [*fields, (sum(fields[-1]), width)])[has_id]
+                )
     return np.concatenate(ids), np.concatenate(coordinates), np.concatenate(codes)
 
 
-def _codes(lines: Lines, fields: Layout) -> Integers:
+def _read_codes(lines: Lines, fields: Layout) -> Integers:
     """Return the last of some fields as integers; mostly 0, which needs no parsing."""
     start, width = fields[-1]
     if (
@@ -417,16 +436,16 @@ def _codes(lines: Lines, fields: Layout) -> Integers:
     return lines.integers(fields)[:, -1]
 
 
-def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
+def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData]:
     """Return the data of all parts."""
     kinds = mesh.kinds
     sections = read_sections(deck)
-    materials = dict(_materials(deck, parts))
+    materials = dict(_read_materials(deck, parts))
     unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
     part_data: dict[int, PartData] = {}
     for part, name in parts.materials.items():
         material = materials.get(name)
-        section = _section(
+        section = _build_section(
             sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material
         )
         reason = unswitchable[part].reason if part in unswitchable else ""
@@ -436,13 +455,15 @@ def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
     return part_data
 
 
-def _section(
+def _build_section(
     card: SectionCard | None, kinds: set[str], material: Material | None
 ) -> Section:
     """Return the section of a part with the formulations of its elements."""
     formulations_by_kind: dict[str, Formulation] = {}
     for kind in sorted(kinds):
-        formulation = formulations.ls_dyna(kind, card.elform if card else 0)
+        formulation = formulations.find_ls_dyna_formulation(
+            kind, card.elform if card else 0
+        )
         if formulation and (card or kind == "spring"):
             formulations_by_kind[kind] = formulation
     if material is None or material.kind != "spring":
@@ -464,13 +485,13 @@ def _section(
     )
 
 
-def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
+def _read_materials(deck: Deck, parts: DeckParts) -> Iterator[tuple[str, Material]]:
     """Yield id and material of each *MAT card."""
     for card in deck.named("MAT"):
         if not card.data or card.name.startswith("MAT_ADD"):
             continue
         row = card.data[0]
-        number = material_of(card, card.data[0], 0)
+        number = name_material(card, card.data[0], 0)
         name = card.name.removesuffix("_TITLE")
         is_elastic = name.removeprefix("MAT_") in _ELASTIC
         density, modulus, poisson = (
@@ -478,11 +499,13 @@ def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
         )
         yield (
             number,
-            Material(name, _kind(name, number, parts), density, modulus, poisson),
+            Material(
+                name, _classify_material(name, number, parts), density, modulus, poisson
+            ),
         )
 
 
-def _kind(name: str, number: str, parts: Parts) -> str:
+def _classify_material(name: str, number: str, parts: DeckParts) -> str:
     """Return the kind of a material: rigid, spring, airbag, void or deformable."""
     if number in parts.rigid_materials:
         return "rigid"

@@ -15,14 +15,22 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.deck.ls_dyna_parts import (
-    Parts,
-    material_of,
-    nodes_of_set,
+    DeckParts,
+    find_rigid_materials,
+    find_set_nodes,
+    name_material,
     read_constraints,
-    rigid_materials,
 )
-from d2rpick.deck.mesh import layout, lines_of
-from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
+from d2rpick.deck.mesh import place_fields, read_lines
+from d2rpick.deck.model import (
+    Boundary,
+    Gravity,
+    Hold,
+    Joint,
+    Joints,
+    find_plateaus,
+    make_ids,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -64,53 +72,57 @@ _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
 _OWN_CENTRE: Final = (9, 10, 11)  # values of DOF that add a second line
 _RELATIVE: Final = 4  # value of VAD that adds a second line
-_POINT: Final = layout(20, 20)  # a line of *DEFINE_CURVE: abscissa, ordinate
+_POINT: Final = place_fields(20, 20)  # a line of *DEFINE_CURVE: abscissa, ordinate
 # Nodes within this fraction of the model size lie on the plane of a *CONSTRAINED_GLOBAL.
 _FLAT: Final = 1e-4
 
 
-def read(deck: Deck, parts: Parts, nodes: tuple[Places, Reals, Places]) -> Boundary:
+def read_ls_dyna_boundary(
+    deck: Deck, parts: DeckParts, nodes: tuple[Places, Reals, Places]
+) -> Boundary:
     """Return supports, prescribed motion and gravity.
 
     ``nodes`` holds ids, coordinates and codes of fixed translations.
     """
     numbers, coordinates, codes = nodes
     holds = [
-        *_supports(deck),
-        *_motions(deck),
-        *_of_nodes(numbers, codes),
-        *_of_materials(deck, parts),
+        *_read_supports(deck),
+        *_read_motions(deck),
+        *_read_node_supports(numbers, codes),
+        *_read_material_supports(deck, parts),
     ]
     holds += [
-        _of_plane(card, numbers, coordinates)
+        _read_plane_support(card, numbers, coordinates)
         for card in deck.named("CONSTRAINED_GLOBAL")
     ]
     return Boundary.of(
-        holds, [*_gravity(deck, parts)], whole=not deck.unread and not deck.encrypted
+        holds,
+        [*_read_gravity(deck, parts)],
+        whole=not deck.unread and not deck.encrypted,
     )
 
 
-def _name(card: Card) -> str:
+def _describe_card(card: Card) -> str:
     """Return the keyword with its place."""
     return f"*{card.name} ({card.at})"
 
 
-def _not_followed(card: Card) -> str:
+def _note_unknown_nodes(card: Card) -> str:
     """Return the note on a card whose nodes are unknown."""
-    return f"{_name(card)}: the nodes that it constrains are not known"
+    return f"{_describe_card(card)}: the nodes that it constrains are not known"
 
 
 # Supports.
 
 
-def _supports(deck: Deck) -> Iterator[Hold | str]:
+def _read_supports(deck: Deck) -> Iterator[Hold | str]:
     """Yield the supports of *BOUNDARY_SPC, or notes on those that cannot be read."""
     for card in deck.named(_SPC):
         options = card.options(_SPC)
         if card.name.startswith(_SYMMETRY):
             continue
         if not options <= {"NODE", "SET", "ID", "BIRTH", "DEATH"}:
-            yield _not_followed(card)
+            yield _note_unknown_nodes(card)
             continue
         step = 1 + ("ID" in options) + ("BIRTH" in options)
         for at in range("ID" in options, len(card.lines), step):
@@ -118,24 +130,27 @@ def _supports(deck: Deck) -> Iterator[Hold | str]:
                 times = card.lines[at + 1]
             else:
                 times = None
-            yield _spc(deck, card, card.lines[at], times)
+            yield _read_support(deck, card, card.lines[at], times)
 
 
-def _spc(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
+def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
     """Read a line of *BOUNDARY_SPC for a node or a node set; along local axes it is always a support."""
-    nodes = _members(deck, card, row)
+    nodes = _find_nodes(deck, card, row)
     fixed = [bool(card.integer(row, at).value) for at in range(2, 8)]
     if nodes is None:
-        return _not_followed(card)
+        return _note_unknown_nodes(card)
     axes = frozenset(axis for axis in range(3) if fixed[axis])
     along_own_axes = bool(card.integer(row, 1).value) and 0 < len(axes) < len(CODES[-1])
     held = Hold(
-        _name(card), nodes if any(fixed) else ids(()), axes=axes, counts=along_own_axes
+        _describe_card(card),
+        nodes if any(fixed) else make_ids(()),
+        axes=axes,
+        counts=along_own_axes,
     )
-    return held if times is None else _timed(held, card, times, 0)
+    return held if times is None else _set_times(held, card, times, 0)
 
 
-def _timed(hold: Hold, card: Card, row: Row, birth: int, death: int = 1) -> Hold:
+def _set_times(hold: Hold, card: Card, row: Row, birth: int, death: int = 1) -> Hold:
     """Add the birth time and the death time of a card; missing values mean 0 and never."""
     start, end = (
         card.real(row, at).value * card.transform.time for at in (birth, death)
@@ -143,26 +158,26 @@ def _timed(hold: Hold, card: Card, row: Row, birth: int, death: int = 1) -> Hold
     return hold._replace(start=start, end=end if end > 0 else inf)
 
 
-def _members(deck: Deck, card: Card, row: Row) -> Places | None:
+def _find_nodes(deck: Deck, card: Card, row: Row) -> Places | None:
     """Return the node, or the nodes of the node set (``_SET``), at the beginning of a line.
 
     None if they are unknown.
     """
     number = card.integer(row, 0).value
     single = None if "SET" in card.name.split("_") else {number + card.transform.node}
-    node_ids = single or nodes_of_set(deck, card, number)
-    return None if node_ids is None else ids(node_ids)
+    node_ids = single or find_set_nodes(deck, card, number)
+    return None if node_ids is None else make_ids(node_ids)
 
 
-def _of_nodes(numbers: Places, codes: Places) -> Iterator[Hold]:
+def _read_node_supports(numbers: Places, codes: Places) -> Iterator[Hold]:
     """Yield the supports that the codes of *NODE define."""
     for code, axes in enumerate(CODES):
-        held = numbers[codes == code] if code else ids(())
+        held = numbers[codes == code] if code else make_ids(())
         if held.size:
             yield Hold(f"*NODE, TC {code}", np.sort(held), axes=frozenset(axes))
 
 
-def _of_plane(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
+def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
     """Return the support of the nodes on a plane that a *CONSTRAINED_GLOBAL fixes."""
     rows = card.lines
     if rows:
@@ -170,18 +185,20 @@ def _of_plane(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
     else:
         code, normal = (0, 0)
     if not 0 < code < len(CODES) or normal not in (1, 2, 3) or not numbers.size:
-        return _not_followed(card)
+        return _note_unknown_nodes(card)
     height = coordinates[:, normal - 1] - card.real(rows[0], 2 + normal).value
     near = np.abs(height) <= _FLAT * float(np.nanmax(np.ptp(coordinates, axis=0)))
-    return Hold(_name(card), np.sort(numbers[near]), axes=frozenset(CODES[code]))
+    return Hold(
+        _describe_card(card), np.sort(numbers[near]), axes=frozenset(CODES[code])
+    )
 
 
-def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
+def _read_material_supports(deck: Deck, parts: DeckParts) -> Iterator[Hold]:
     """Yield the supports that *MAT_RIGID defines."""
-    for card in rigid_materials(deck):
+    for card in find_rigid_materials(deck):
         if len(card.data) < 2:
             continue
-        name = material_of(card, card.data[0], 0)
+        name = name_material(card, card.data[0], 0)
         row = card.data[1]
         kind = card.real(row, 0).value
         code = card.integer(row, 1).value
@@ -191,13 +208,19 @@ def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
             part for part, material in parts.materials.items() if material == name
         )
         if rigid_parts and (axes or along_own_axes):
-            yield Hold(_name(card), ids(()), rigid_parts, axes, counts=along_own_axes)
+            yield Hold(
+                _describe_card(card),
+                make_ids(()),
+                rigid_parts,
+                axes,
+                counts=along_own_axes,
+            )
 
 
 # Prescribed motion.
 
 
-def _motions(deck: Deck) -> Iterator[Hold | str]:
+def _read_motions(deck: Deck) -> Iterator[Hold | str]:
     """Yield the prescribed motions, or notes on those that cannot be read."""
     for card in deck.named(_MOTION):
         options = card.options(_MOTION)
@@ -208,7 +231,7 @@ def _motions(deck: Deck) -> Iterator[Hold | str]:
             "LOCAL",
             "ID",
         }:
-            yield _not_followed(card)
+            yield _note_unknown_nodes(card)
             continue
         rows = card.lines
         while len(rows) > ("ID" in options):
@@ -218,51 +241,55 @@ def _motions(deck: Deck) -> Iterator[Hold | str]:
                 abs(card.integer(row, 1).value) in _OWN_CENTRE
                 or card.integer(row, 2).value == _RELATIVE
             )
-            yield _motion(deck, card, row, options)
+            yield _read_motion(deck, card, row, options)
             rows = rows[1 + further :]
 
 
-def _motion(deck: Deck, card: Card, row: Row, options: frozenset[str]) -> Hold | str:
+def _read_motion(
+    deck: Deck, card: Card, row: Row, options: frozenset[str]
+) -> Hold | str:
     """Read a line of *BOUNDARY_PRESCRIBED_MOTION."""
     if "RIGID" in options:
         part = frozenset({card.integer(row, 0).value + card.transform.part})
     else:
         part = frozenset[int]()
-    nodes = ids(()) if part else _members(deck, card, row)
+    nodes = make_ids(()) if part else _find_nodes(deck, card, row)
     if nodes is None:
-        return _not_followed(card)
-    return _timed(Hold(_name(card), nodes, part, counts=True), card, row, 7, 6)
+        return _note_unknown_nodes(card)
+    return _set_times(
+        Hold(_describe_card(card), nodes, part, counts=True), card, row, 7, 6
+    )
 
 
 # Gravity.
 
 
-def _gravity(deck: Deck, parts: Parts) -> Iterator[Gravity | str]:
+def _read_gravity(deck: Deck, parts: DeckParts) -> Iterator[Gravity | str]:
     """Yield the body loads, which act against their axis, or notes.
 
     *LOAD_BODY_PARTS restricts all of them to some parts.
     """
-    curves = dict(_curves(deck)) if deck.named("LOAD_BODY", "LOAD_GRAVITY") else {}
-    limits = [_limited(card, parts) for card in deck.named("LOAD_BODY_PARTS")]
+    curves = dict(_read_curves(deck)) if deck.named("LOAD_BODY", "LOAD_GRAVITY") else {}
+    limits = [_read_loaded_parts(card, parts) for card in deck.named("LOAD_BODY_PARTS")]
     for card in deck.named("LOAD_BODY", "LOAD_GRAVITY"):
         if card.name == "LOAD_BODY_PARTS":
             continue
         if card.name in _ALONG:
-            loads = [_of_row(card, row, curves) for row in card.lines[:1]]
+            loads = [_read_body_load(card, row, curves) for row in card.lines[:1]]
         else:
             loads = [None]
         for load in loads:
             if load is None or None in limits:
-                yield f"{_name(card)} cannot be read, so gravity is found from the run alone"
+                yield f"{_describe_card(card)} cannot be read, so gravity is found from the run alone"
             elif load.values:
                 yield (
-                    load._replace(nodes=ids(()), parts=limits[0] or frozenset())
+                    load._replace(nodes=make_ids(()), parts=limits[0] or frozenset())
                     if limits
                     else load
                 )
 
 
-def _limited(card: Card, parts: Parts) -> frozenset[int] | None:
+def _read_loaded_parts(card: Card, parts: DeckParts) -> frozenset[int] | None:
     """Return the parts of a *LOAD_BODY_PARTS; None if they are unknown."""
     if card.lines:
         members = parts.members(
@@ -273,7 +300,7 @@ def _limited(card: Card, parts: Parts) -> frozenset[int] | None:
     return None if members is None else frozenset(members)
 
 
-def _of_row(
+def _read_body_load(
     card: Card, row: Row, curves: Mapping[int, tuple[float, ...]]
 ) -> Gravity | None:
     """Return the accelerations of a *LOAD_BODY.
@@ -286,7 +313,7 @@ def _of_row(
     scale = card.real(row, 1)
     ordinates = curves.get(curve.value + card.transform.rest, ())
     # Negative, because the card accelerates the ground.
-    values = plateaus(ordinates, -(scale.value or 1.0))
+    values = find_plateaus(ordinates, -(scale.value or 1.0))
     if (
         card.transform.scaled
         or curve.problem
@@ -298,7 +325,7 @@ def _of_row(
     return Gravity(None if system.value else _ALONG[card.name], values)
 
 
-def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
+def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Yield id and ordinates of each curve."""
     for card in deck.named("DEFINE_CURVE"):
         if card.data and card.options("DEFINE_CURVE") <= {"TITLE"}:
@@ -309,7 +336,7 @@ def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
             points = np.concatenate(
                 [
                     lines.reals(_POINT, slice(1, 2))[:, 0]
-                    for lines in lines_of(card)
+                    for lines in read_lines(card)
                     if len(lines)
                 ]
             )
@@ -321,10 +348,12 @@ def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
 # Joints.
 
 
-def joints_of(deck: Deck) -> Joints:
+def read_joints(deck: Deck) -> Joints:
     """Return the joints of parts in an LS-DYNA deck; joints of two rigid bodies that may rotate are not included."""
     joints = []
-    unknown = [_name(card) for name in _OTHER_TIES for card in deck.named(name)]
+    unknown = [
+        _describe_card(card) for name in _OTHER_TIES for card in deck.named(name)
+    ]
     for constraint in read_constraints(
         deck, "nodal rigid body", "extra nodes", "spotweld", "rivet", "generalized weld"
     ):
@@ -332,7 +361,7 @@ def joints_of(deck: Deck) -> Joints:
             joints.append(
                 Joint(
                     constraint.kind,
-                    ids(constraint.nodes),
+                    make_ids(constraint.nodes),
                     frozenset([constraint.part] if constraint.part else []),
                 )
             )
@@ -343,13 +372,13 @@ def joints_of(deck: Deck) -> Joints:
             card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD"))
             or "TIEBREAK" in card.name
         ):
-            tie = _of_contact(deck, card)
+            tie = _read_tied_contact(deck, card)
             joints += [tie] if tie else []
-            unknown += [] if tie else [_name(card)]
+            unknown += [] if tie else [_describe_card(card)]
     return Joints(tuple(joints), tuple(unknown))
 
 
-def _of_contact(deck: Deck, card: Card) -> Joint | None:
+def _read_tied_contact(deck: Deck, card: Card) -> Joint | None:
     """Return the joint that a tied contact makes between two parts, or nodes and a part; None for any other contact."""
     options = card.options("CONTACT")
     rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
@@ -365,10 +394,12 @@ def _of_contact(deck: Deck, card: Card) -> Joint | None:
     if kind == _PART_ID:
         return Joint(
             "tied contact",
-            ids(()),
+            make_ids(()),
             frozenset({first_id + offsets.part, second_id + offsets.part}),
         )
-    nodes = nodes_of_set(deck, card, first_id)
+    nodes = find_set_nodes(deck, card, first_id)
     if nodes:
-        return Joint("tied contact", ids(nodes), frozenset({second_id + offsets.part}))
+        return Joint(
+            "tied contact", make_ids(nodes), frozenset({second_id + offsets.part})
+        )
     return None

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal
 from weakref import WeakKeyDictionary
 
-from d2rpick.base.graph import reached
+from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field, Problem, Row, Value
+    from d2rpick.deck.card import Card, CardField, Problem, Row, Value
     from d2rpick.deck.reader import Deck
 
 
@@ -97,7 +97,7 @@ _ABLE: Final = (
 _MOST_ROWS = 8  # of a contact or wall without id; more rows may define a second one
 
 
-class PartSet(NamedTuple):
+class DeckPartSet(NamedTuple):
     """Members of a part set: parts, ranges of part ids, and further part sets.
 
     ``problems`` are fields that cannot be read; with one of them the members are unknown.
@@ -108,9 +108,9 @@ class PartSet(NamedTuple):
     sets: tuple[int, ...] = ()
     problems: tuple[Problem, ...] = ()
 
-    def joined(self, further: PartSet) -> PartSet:
+    def joined(self, further: DeckPartSet) -> DeckPartSet:
         """Return the union of two sets (``_COLLECT``)."""
-        return PartSet(
+        return DeckPartSet(
             self.parts + further.parts,
             self.ranges + further.ranges,
             self.sets + further.sets,
@@ -119,7 +119,7 @@ class PartSet(NamedTuple):
 
 
 @dataclass(eq=False, repr=False)
-class Parts:
+class DeckParts:
     """Material, title and section of each part; part sets by id (None for a kind of set that cannot be read).
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
@@ -130,7 +130,7 @@ class Parts:
     materials: dict[int, str] = field(default_factory=dict)
     titles: dict[int, str] = field(default_factory=dict)
     sections: dict[int, int] = field(default_factory=dict)
-    sets: dict[int, PartSet | None] = field(default_factory=dict)
+    sets: dict[int, DeckPartSet | None] = field(default_factory=dict)
     rigid_materials: set[str] = field(default_factory=set)
     problems: list[Problem] = field(default_factory=list)
     all_known: bool = True
@@ -164,29 +164,29 @@ class Parts:
 
         Sets that the deck does not define are included.
         """
-        return reached(
+        return find_reachable(
             [set_id],
             lambda one: content.sets if (content := self.sets.get(one)) else (),
         )
 
 
-def read_parts(deck: Deck) -> Parts:
+def read_parts(deck: Deck) -> DeckParts:
     """Return the parts, part sets and rigid materials of a deck."""
-    parts = Parts(
+    parts = DeckParts(
         problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted
     )
     parts.rigid_materials.update(
-        material_of(card, card.data[0], 0) for card in rigid_materials(deck)
+        name_material(card, card.data[0], 0) for card in find_rigid_materials(deck)
     )
     for card in deck.named("PART"):
-        _take_parts(card, parts)
+        _add_parts(card, parts)
     for card in deck.named("SET_PART"):
-        _take_set(card, parts)
+        _add_set(card, parts)
     parts.all_known = parts.all_known and not parts.problems
     return parts
 
 
-def rigid_materials(deck: Deck) -> Iterator[Card]:
+def find_rigid_materials(deck: Deck) -> Iterator[Card]:
     """Yield the cards of rigid materials."""
     cards = deck.named("MAT_RIGID", "MAT_020", "MAT_20")
     return (
@@ -196,7 +196,7 @@ def rigid_materials(deck: Deck) -> Iterator[Card]:
     )
 
 
-def material_of(card: Card, row: Row, position: int) -> str:
+def name_material(card: Card, row: Row, position: int) -> str:
     """Return the id of a material with its offset as text, or its name if the deck uses names."""
     value = card.integer(row, position)
     if value.problem:
@@ -204,7 +204,7 @@ def material_of(card: Card, row: Row, position: int) -> str:
     return str(value.value + card.transform.material)
 
 
-def _take_parts(card: Card, parts: Parts) -> None:
+def _add_parts(card: Card, parts: DeckParts) -> None:
     """Add the parts of a card."""
     options = card.options("PART")
     if options & _NO_DEFINITION:
@@ -215,7 +215,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
     # A composite is one part with a material for each ply, none of which makes it rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
-            _add(card, card.rows[:2], "", parts)
+            _add_part(card, card.rows[:2], "", parts)
         return
     if not options <= _FOLLOWED:
         parts.all_known = False
@@ -224,7 +224,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
     at = 0
     extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
     while at + 1 < len(rows):  # title, ids, and the lines of the options
-        _add(card, rows[at : at + 2], material_of(card, rows[at + 1], 2), parts)
+        _add_part(card, rows[at : at + 2], name_material(card, rows[at + 1], 2), parts)
         at += 2
         is_rotated = (
             "INERTIA" in options
@@ -234,7 +234,9 @@ def _take_parts(card: Card, parts: Parts) -> None:
         at += extra_lines + is_rotated
 
 
-def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
+def _add_part(
+    card: Card, lines: Sequence[Row], material: str, parts: DeckParts
+) -> None:
     """Add a part by its lines of title and ids."""
     title, row = lines
     part = card.integer(row, 0)
@@ -248,7 +250,7 @@ def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
             parts.sections[number] = section.value + card.transform.rest
 
 
-def _take_set(card: Card, parts: Parts) -> None:
+def _add_set(card: Card, parts: DeckParts) -> None:
     """Add a part set."""
     options = card.options("SET_PART")
     rows = card.data
@@ -259,12 +261,12 @@ def _take_set(card: Card, parts: Parts) -> None:
         parts.problems.append((first.field, first.problem))
         return
     set_id = first.value + card.transform.set_
-    values = _listed(card, options)
+    values = _read_listed_ids(card, options)
     ranges = "ADD" in options and any(value.value < 0 for value in values)
     if ranges or not options <= _SET_OPTIONS:
         parts.sets[set_id] = None
         return
-    content = _content(card, options, values)
+    content = _read_set_members(card, options, values)
     earlier = parts.sets.get(set_id)
     if earlier and "COLLECT" in options:
         parts.sets[set_id] = earlier.joined(content)
@@ -272,9 +274,9 @@ def _take_set(card: Card, parts: Parts) -> None:
         parts.sets[set_id] = content
 
 
-def _content(
+def _read_set_members(
     card: Card, options: Collection[str], values: Sequence[Value[int]]
-) -> PartSet:
+) -> DeckPartSet:
     """Return the members of a part set from the values on its lines."""
     offset = card.transform.set_ if "ADD" in options else card.transform.part
     message = "{!r} in a part set cannot be used, expected a positive id"
@@ -285,32 +287,32 @@ def _content(
     )
     ids = tuple(value.value + offset for value in values if value.value > 0)
     if "GENERATE" in options:
-        return PartSet(
+        return DeckPartSet(
             ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems
         )
     if "ADD" in options:
-        return PartSet(sets=ids, problems=problems)
-    return PartSet(parts=ids, problems=problems)
+        return DeckPartSet(sets=ids, problems=problems)
+    return DeckPartSet(parts=ids, problems=problems)
 
 
-def nodes_of_set(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
+def find_set_nodes(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
     """Return the nodes of the node set with this number on a card; None if the deck lacks it or it cannot be read."""
     if deck not in _NODE_SETS:
         _NODE_SETS[deck] = {
             id_: ids
             for set_card in deck.named("SET_NODE")
-            for id_, ids in _node_set(set_card)
+            for id_, ids in _read_node_set(set_card)
         }
     return _NODE_SETS[deck].get(number + card.transform.set_)
 
 
-def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
+def _read_node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
     """Yield id and nodes of a node set."""
     options = card.options("SET_NODE")
     if card.data and options <= _NODE_SET_OPTIONS:
         ids = [
             value.value + card.transform.node
-            for value in _listed(card, options)
+            for value in _read_listed_ids(card, options)
             if value.value > 0
         ]
         if "GENERATE" in options:
@@ -322,7 +324,7 @@ def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
         yield card.integer(card.data[0], 0).value + card.transform.set_, frozenset(ids)
 
 
-def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
+def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
     """Return the ids below the first line of a set."""
     columns = range(1 if "COLUMN" in options else _PER_LINE)
     return [
@@ -352,11 +354,11 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
     return {
         number: section
         for card in deck.named("SECTION")
-        for number, section in _sections(card)
+        for number, section in _read_card_sections(card)
     }
 
 
-def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
+def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
     """Yield id and section of each section of a card."""
     kind = card.name.split("_")[1]
     options = card.options(f"SECTION_{kind}")
@@ -381,7 +383,7 @@ def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
             yield number.value + card.transform.rest, section
 
 
-def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
+def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
     """Return the element cards that are searched for shared nodes, or (``searched`` False) those that cannot be."""
     cards = deck.named(*_SEARCHED)
     return [
@@ -400,7 +402,7 @@ class Constraint(NamedTuple):
     """A constraint: its kind, place, id (0 for none), nodes, and the rigid part to which it belongs."""
 
     kind: Kind
-    place: Field
+    place: CardField
     id: int
     nodes: frozenset[int]
     part: int | None = None
@@ -414,7 +416,9 @@ def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
             yield from read_card(deck, card, kind)
 
 
-def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_nodal_rigid_bodies(
+    deck: Deck, card: Card, kind: Kind
+) -> Iterator[Constraint]:
     """Yield the nodal rigid bodies of a card."""
     options = card.options(_BODY)
     rows = card.lines
@@ -423,11 +427,11 @@ def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constrai
     for row in rows[1::2] if "TITLE" in options else rows:
         body = card.integer(row, 0)
         nodes = card.integer(row, 2)
-        members = nodes_of_set(deck, card, nodes.value) if nodes.value else None
+        members = find_set_nodes(deck, card, nodes.value) if nodes.value else None
         yield Constraint(kind, body.field, body.value, members or frozenset())
 
 
-def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the extra nodes of a card."""
     for row in card.rows:
         part = card.integer(row, 0)
@@ -438,11 +442,11 @@ def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
             single = None
         else:
             single = frozenset({node_or_set.value + card.transform.node})
-        nodes = single or nodes_of_set(deck, card, node_or_set.value) or frozenset()
+        nodes = single or find_set_nodes(deck, card, node_or_set.value) or frozenset()
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
 
-def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the joint of a card."""
     if card.name.startswith(
         (
@@ -452,38 +456,38 @@ def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
         )
     ):
         return
-    for row in _first(card):
+    for row in _get_first_line(card):
         if card.name.endswith("_ID"):
             number = card.integer(card.lines[0], 0).value
         else:
             number = 0
-        yield _of_nodes(card, row, kind, _JOINT_NODES, number)
+        yield _read_node_list(card, row, kind, _JOINT_NODES, number)
 
 
-def _of_two_nodes(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Return the constraints with two nodes on a line: one per line, unless an option adds lines."""
-    rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _first(card)
-    return (_of_nodes(card, row, kind, 2) for row in rows)
+    rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _get_first_line(card)
+    return (_read_node_list(card, row, kind, 2) for row in rows)
 
 
-def _generalized_welds(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the generalized weld of a card."""
-    for row in _first(card):
+    for row in _get_first_line(card):
         members = card.integer(row, 0)
         yield Constraint(
             kind,
             members.field,
             0,
-            nodes_of_set(deck, card, members.value) or frozenset(),
+            find_set_nodes(deck, card, members.value) or frozenset(),
         )
 
 
-def _first(card: Card) -> tuple[Row, ...]:
+def _get_first_line(card: Card) -> tuple[Row, ...]:
     """Return the first line after the line of an id (``_ID``)."""
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
-def _of_nodes(
+def _read_node_list(
     card: Card, row: Row, kind: Kind, node_count: int, number: int = 0
 ) -> Constraint:
     """Read a constraint whose line lists its nodes."""
@@ -498,12 +502,12 @@ def _of_nodes(
 _CONSTRAINTS: Final[
     Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
 ] = {
-    "nodal rigid body": (_BODY, _nodal_rigid_bodies),
-    "extra nodes": ("CONSTRAINED_EXTRA_NODES", _extra_nodes),
-    "joint": ("CONSTRAINED_JOINT", _joints),
-    "spotweld": ("CONSTRAINED_SPOTWELD", _of_two_nodes),
-    "rivet": ("CONSTRAINED_RIVET", _of_two_nodes),
-    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _generalized_welds),
+    "nodal rigid body": (_BODY, _read_nodal_rigid_bodies),
+    "extra nodes": ("CONSTRAINED_EXTRA_NODES", _read_extra_nodes),
+    "joint": ("CONSTRAINED_JOINT", _read_joint),
+    "spotweld": ("CONSTRAINED_SPOTWELD", _read_node_pairs),
+    "rivet": ("CONSTRAINED_RIVET", _read_node_pairs),
+    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_generalized_weld),
 }
 
 

@@ -13,7 +13,7 @@ import math
 from itertools import count, repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.radioss_sensors import inactive
+from d2rpick.deck.radioss_sensors import invert_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -183,7 +183,7 @@ def _find_spans_of_sensor(
     strong = forces(kind, entity, value) if forces else None
     if strong is None:
         return f"{name} of {kind} {entity}), whose force no history shows"
-    return strong if above else inactive(strong)
+    return strong if above else invert_spans(strong)
 
 
 def _find_row(cards: Sequence[Card], number: int) -> tuple[Card, Row] | None:

@@ -13,8 +13,8 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import name_units
-from d2rpick.deck.expression import ExpressionError, real
-from d2rpick.deck.radioss_deck import Starter, number_of
+from d2rpick.deck.expression import ExpressionError, parse_real
+from d2rpick.deck.radioss_deck import Starter, get_number
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -47,12 +47,12 @@ _WIDTH, _REAL = 10, 20
 NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
-def layout(*widths: int) -> Layout:
+def place_fields(*widths: int) -> Layout:
     """Return first column and width of adjacent fields.
 
     Examples
     --------
-    >>> layout(8, 16, 16)
+    >>> place_fields(8, 16, 16)
     [(0, 8), (8, 16), (24, 16)]
     """
     ends = np.cumsum(widths).tolist()
@@ -69,7 +69,7 @@ class Lines:
         self._scope = scope
         data = data.replace(b"\r\n", b"\n")
         self.in_columns = not any(letter in data for letter in _ONE_BY_ONE)
-        cells = _table(np.frombuffer(data, np.uint8))
+        cells = _make_table(np.frombuffer(data, np.uint8))
         keep = ~np.isin(cells[:, 0], list(comments))
         unsure = np.flatnonzero(cells[:, min(_ID_ENDS, cells.shape[1] - 1)] == _BLANK)
         keep[unsure] &= (cells[unsure] != _BLANK).any(axis=1)
@@ -86,11 +86,17 @@ class Lines:
         """
         columns = [self._field(*field) for field in fields]
         if len(self) < _FEW and len({width for _, width in fields}) == 1:
-            ids = _integers(np.concatenate(columns)).reshape(len(fields), len(self)).T
+            ids = (
+                _parse_integers(np.concatenate(columns))
+                .reshape(len(fields), len(self))
+                .T
+            )
         else:
-            ids = np.stack([*map(_integers, columns)], axis=1)
+            ids = np.stack([*map(_parse_integers, columns)], axis=1)
         for row, texts in self._texts.items():
-            ids[row] = [_id(self._value(text)) for text in self._pieces(texts, fields)]
+            ids[row] = [
+                _make_id(self._value(text)) for text in self._pieces(texts, fields)
+            ]
         return ids
 
     def reals(self, fields: Layout, wanted: slice) -> Reals:
@@ -99,7 +105,7 @@ class Lines:
         0 for a blank, NaN for text that is not a number.
         """
         numbers = np.stack(
-            [_reals(self._field(*field)) for field in fields[wanted]], axis=1
+            [_parse_reals(self._field(*field)) for field in fields[wanted]], axis=1
         )
         for row, texts in self._texts.items():
             numbers[row] = [
@@ -148,21 +154,21 @@ class Lines:
             return math.nan
 
 
-def lines_of(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
+def read_lines(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
     """Yield the data lines of a card, piece by piece."""
-    for data in _pieces_of(card.block):
+    for data in _read_pieces(card.block):
         if data:
             yield Lines(data, card.scope, comments)
 
 
-def _pieces_of(block: Block) -> Iterator[bytes]:
+def _read_pieces(block: Block) -> Iterator[bytes]:
     """Yield the bytes below the keyword line in pieces of whole lines."""
     pieces = block.source.pieces(block.start, block.end)
     yield next(pieces).partition(b"\n")[2]
     yield from pieces
 
 
-def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return lines as rows of equal length, padded with blanks, without line ends."""
     ends = np.flatnonzero(raw == ord("\n"))
     if not raw.size or raw[-1] != ord("\n"):
@@ -177,7 +183,7 @@ def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.where(columns < lengths[:, np.newaxis], raw[offsets], _BLANK)
 
 
-def _integers(field: NDArray[np.uint8]) -> Integers:
+def _parse_integers(field: NDArray[np.uint8]) -> Integers:
     """Parse a field of digits; 0 for a blank, `NOTHING` for other text."""
     value = np.zeros(len(field), np.int64)
     is_valid = np.ones(len(field), bool)
@@ -193,7 +199,7 @@ def _integers(field: NDArray[np.uint8]) -> Integers:
     return np.where(is_valid & (groups <= 1), value, NOTHING)
 
 
-def _reals(field: NDArray[np.uint8]) -> Reals:
+def _parse_reals(field: NDArray[np.uint8]) -> Reals:
     """Parse a field of reals; 0 for a blank, NaN for other text."""
     blank = (field == _BLANK).all(axis=1)
     texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
@@ -201,15 +207,15 @@ def _reals(field: NDArray[np.uint8]) -> Reals:
     try:
         return texts.astype(np.float64)
     except ValueError:  # solvers also read numbers like 1.5-3
-        return np.array([real(text.decode("latin-1")) for text in texts.tolist()])
+        return np.array([parse_real(text.decode("latin-1")) for text in texts.tolist()])
 
 
-def _id(value: float) -> int:
+def _make_id(value: float) -> int:
     """Return a value as an id, or `NOTHING`."""
     return int(value) if value >= 0 and value == int(value) else NOTHING
 
 
-def distinct(values: Places) -> Places:
+def find_distinct(values: Places) -> Places:
     """Return the distinct values, ascending; sorting is faster here than hashing."""
     ordered = np.sort(values, axis=None)
     if ordered.size:
@@ -218,11 +224,13 @@ def distinct(values: Places) -> Places:
     return ordered
 
 
-def _used(wanted: Sequence[Places]) -> Places:
+def _find_used_ids(wanted: Sequence[Places]) -> Places:
     """Return the ids of the nodes of elements, ascending."""
     highest = max((int(node_ids.max(initial=0)) for node_ids in wanted), default=0)
     if highest > _DENSE:
-        used = distinct(np.concatenate([distinct(node_ids) for node_ids in wanted]))
+        used = find_distinct(
+            np.concatenate([find_distinct(node_ids) for node_ids in wanted])
+        )
         return used[used > 0]
     mask = np.zeros(highest + 1, bool)
     for node_ids in wanted:
@@ -244,7 +252,7 @@ class NodeTable:
     """
 
     def __init__(self, ids: Places, elements: Sequence[Places]) -> None:
-        used = _used(elements)
+        used = _find_used_ids(elements)
         self.ids = np.concatenate([ids, used[~np.isin(used, ids)]])
         self._order = np.argsort(self.ids, kind="stable")
         self._sorted = self.ids[self._order]
@@ -351,7 +359,7 @@ class Mesh(NamedTuple):
             yield f"{self.lost} nodes of elements are not in any {sign}NODE of the deck"
 
 
-class _Kind(NamedTuple):
+class _RadiossElementKind(NamedTuple):
     """Kind of element: its name, the nodes that define its size, and the number of ids on each of its lines."""
 
     name: str
@@ -360,15 +368,23 @@ class _Kind(NamedTuple):
 
 
 KINDS: Final = {
-    "SHELL": _Kind("shell", 4, (5,)), "SH3N": _Kind("triangle", 3, (4,)), "BRICK": _Kind("solid", 8, (9,)),
-    "TETRA4": _Kind("tetrahedron", 4, (5,)), "PENTA6": _Kind("pentahedron", 6, (7,)), "QUAD": _Kind("quad", 4, (5,)),
-    "TRIA": _Kind("tria", 3, (4,)), "BEAM": _Kind("beam", 2, (3,)), "TRUSS": _Kind("truss", 2, (3,)),
-    "SPRING": _Kind("spring", 2, (3,)), "TETRA10": _Kind("tetrahedron", 10, (1, 10)),
-    "BRIC20": _Kind("solid", 20, (9, 8, 4)), "SHEL16": _Kind("thick shell", 16, (9, 8)),
-}  # fmt: skip
+    "SHELL": _RadiossElementKind("shell", 4, (5,)),
+    "SH3N": _RadiossElementKind("triangle", 3, (4,)),
+    "BRICK": _RadiossElementKind("solid", 8, (9,)),
+    "TETRA4": _RadiossElementKind("tetrahedron", 4, (5,)),
+    "PENTA6": _RadiossElementKind("pentahedron", 6, (7,)),
+    "QUAD": _RadiossElementKind("quad", 4, (5,)),
+    "TRIA": _RadiossElementKind("tria", 3, (4,)),
+    "BEAM": _RadiossElementKind("beam", 2, (3,)),
+    "TRUSS": _RadiossElementKind("truss", 2, (3,)),
+    "SPRING": _RadiossElementKind("spring", 2, (3,)),
+    "TETRA10": _RadiossElementKind("tetrahedron", 10, (1, 10)),
+    "BRIC20": _RadiossElementKind("solid", 20, (9, 8, 4)),
+    "SHEL16": _RadiossElementKind("thick shell", 16, (9, 8)),
+}
 
 
-def elements_of(
+def read_elements(
     card: Card, *, damaged: bool = False
 ) -> Iterator[tuple[str, Integers, Integers]]:
     """Yield kind, part ids and node ids of the elements of a card; a missing node is 0.
@@ -376,9 +392,9 @@ def elements_of(
     With ``damaged`` also yield elements whose ids are incomplete.
     """
     kind = KINDS[card.words[0]]
-    fields: Layout = layout(*[_WIDTH] * max(kind.lines))
+    fields: Layout = place_fields(*[_WIDTH] * max(kind.lines))
     line_ids = [
-        lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)
+        lines.integers(fields) for lines in read_lines(card, _COMMENTS) if len(lines)
     ]
     if not line_ids:
         return
@@ -392,19 +408,19 @@ def elements_of(
     )
     is_element = (flat[:, : 1 + min(kind.nodes, 3)] > 0).all(axis=1) | damaged
     nodes = np.maximum(flat[is_element, 1 : 1 + kind.nodes], 0)
-    yield kind.name, np.full(len(nodes), number_of(card), np.int64), nodes
+    yield kind.name, np.full(len(nodes), get_number(card), np.int64), nodes
 
 
-def parts_with_elements(starter: Starter) -> set[int]:
+def find_parts_with_elements(starter: Starter) -> set[int]:
     """Return the parts that have elements of any kind."""
-    return {part for part, _ in _elements(starter)}
+    return {part for part, _ in _read_element_blocks(starter)}
 
 
-def parts_within(
+def find_parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
     """Return for each group of nodes and parts the parts all of whose nodes belong to it."""
-    elements = [*_elements(starter)]
+    elements = [*_read_element_blocks(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():
         of_parts = [members.ravel() for part, members in elements if part in parts]
@@ -419,26 +435,26 @@ def parts_within(
     return inside
 
 
-def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
+def _read_element_blocks(starter: Starter) -> Iterator[tuple[int, Integers]]:
     """Yield part and node ids of elements, block by block; node 0 if their lines cannot be read."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:
             yield from (
-                (number_of(card), nodes)
-                for _, _, nodes in elements_of(card, damaged=True)
+                (get_number(card), nodes)
+                for _, _, nodes in read_elements(card, damaged=True)
             )
         elif card.words[1:]:
-            yield number_of(card), np.zeros((1, 1), np.int64)
+            yield get_number(card), np.zeros((1, 1), np.int64)
 
 
-def nodes_of(cards: Iterable[Card]) -> tuple[Integers, Reals]:
+def read_nodes(cards: Iterable[Card]) -> tuple[Integers, Reals]:
     """Return ids (n,) and coordinates (n, 3) of nodes [length]."""
     ids = [np.empty(0, np.int64)]
     coordinates = [np.empty((0, 3))]
-    fields: Layout = layout(_WIDTH, _REAL, _REAL, _REAL)
+    fields: Layout = place_fields(_WIDTH, _REAL, _REAL, _REAL)
     for card in cards:
-        for lines in lines_of(card, _COMMENTS):
+        for lines in read_lines(card, _COMMENTS):
             if len(lines):
                 numbers = lines.integers(fields[:1])[:, 0]
                 ids.append(numbers[numbers > 0])

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.graph import reached
-from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, distinct
+from d2rpick.base.graph import find_reachable
+from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, find_distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -111,8 +111,8 @@ class Boundary(NamedTuple):
     def placed(self, table: NodeTable) -> Boundary:
         """Return the same with node places in place of node ids."""
         return Boundary(
-            placed(self.holds, table),
-            self.gravity and placed(self.gravity, table),
+            place_nodes(self.holds, table),
+            self.gravity and place_nodes(self.gravity, table),
             self.notes,
         )
 
@@ -123,7 +123,7 @@ NO_BOUNDARY: Final = Boundary()
 Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
-def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
+def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
     """Replace node ids by places in the table; nodes that are not in the table are dropped."""
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))
@@ -131,19 +131,19 @@ def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
     )
 
 
-def ids(numbers: Iterable[int]) -> Places:
+def make_ids(numbers: Iterable[int]) -> Places:
     """Return node ids as an ascending array."""
     return np.array(sorted(numbers), np.int64)
 
 
-def plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
+def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
     """Return the values at which a function is constant between two points, times ``scale``.
 
     Empty if it is never constant.
 
     Examples
     --------
-    >>> plateaus([0.0, 0.0, 1.0, 1.0], 9.81)
+    >>> find_plateaus([0.0, 0.0, 1.0, 1.0], 9.81)
     (0.0, 9.81)
     """
     return tuple(
@@ -271,7 +271,7 @@ class Inventory:
         """Return the number of elements by part and kind."""
         counts: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            _count(elements.kind, elements.part, counts)
+            _count_elements(elements.kind, elements.part, counts)
         return counts
 
     def formulation(self, part: int, kind: str) -> Formulation:
@@ -303,10 +303,10 @@ class Inventory:
                 parts.tolist(), np.split(order, starts[1:]), strict=True
             ):
                 pieces_by_part.setdefault(part, []).append(
-                    distinct(elements.nodes[rows])
+                    find_distinct(elements.nodes[rows])
                 )
         joined = {
-            part: distinct(np.concatenate(pieces))
+            part: find_distinct(np.concatenate(pieces))
             for part, pieces in pieces_by_part.items()
         }
         return {part: nodes[nodes != NO_NODE] for part, nodes in joined.items()}
@@ -416,7 +416,7 @@ class Inventory:
         springs = set(parts) - rigid
         return tuple(
             tuple(sorted([*body, *self._within(body, springs)]))
-            for body in _together(rigid, linked)
+            for body in _group_linked(rigid, linked)
         )
 
     def _within(self, body: Collection[int], springs: Collection[int]) -> list[int]:
@@ -430,7 +430,7 @@ class Inventory:
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
         """Return the groups of these parts that share nodes or are joined, directly or indirectly."""
-        return _together(parts, self._linked)
+        return _group_linked(parts, self._linked)
 
     def _linked(self, part: int) -> Iterable[int]:
         """Return the parts that share nodes with a part or are joined to it."""
@@ -458,7 +458,7 @@ class Inventory:
         inside = np.append(self._mask(parts), True)  # the last entry stands for NO_NODE
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            _count(
+            _count_elements(
                 elements.kind,
                 elements.part[inside[elements.nodes].all(axis=1)],
                 counts_by_part,
@@ -473,7 +473,7 @@ class Inventory:
         return mask
 
 
-def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
+def _count_elements(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
     """Add elements of a kind to the counts of their parts."""
     for part, count in zip(
         *(values.tolist() for values in np.unique(parts, return_counts=True)),
@@ -482,14 +482,14 @@ def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
         counts.setdefault(part, Counter())[kind] += count
 
 
-def _together(
+def _group_linked(
     parts: Collection[int], linked: Callable[[int], Iterable[int]]
 ) -> tuple[tuple[int, ...], ...]:
     """Return the groups of parts that are linked to each other, directly or indirectly."""
     remaining = set(parts)
     groups = []
     while remaining:
-        body = reached(
+        body = find_reachable(
             [min(remaining)], lambda part: remaining.intersection(linked(part))
         )
         remaining.difference_update(body)

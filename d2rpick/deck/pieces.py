@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
+from d2rpick.deck.geometry import compute_masses_and_steps, compute_sizes_and_lengths
 from d2rpick.deck.mesh import NO_NODE
 from d2rpick.deck.model import DISCRETE, SPRING
 
@@ -49,19 +49,19 @@ _FLAT: Final = 1e-6
 _HEAVY: Final = 0.05
 
 
-def pieces_of(
+def count_pieces(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
 ) -> int:
     """Return the number of pieces of some parts that nothing connects; 0 without elements.
 
     ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
     """
-    labels = labels_of(inventory, frozenset(parts if among is None else among))
+    labels = label_pieces(inventory, frozenset(parts if among is None else among))
     nodes = [inventory.nodes_by_part.get(part, np.empty(0, np.int64)) for part in parts]
     return np.unique(labels[np.concatenate(nodes)]).size
 
 
-def labels_of(
+def label_pieces(
     inventory: Inventory, parts: frozenset[int], *, springs: bool = True
 ) -> Places:
     """Return for each node of the deck the number of its piece (nodes,); memoised.
@@ -70,11 +70,15 @@ def labels_of(
     """
     labels_by_parts = _LABELS.setdefault(inventory, {})
     if (parts, springs) not in labels_by_parts:
-        labels_by_parts[parts, springs] = _labels(inventory, parts, springs=springs)
+        labels_by_parts[parts, springs] = _compute_labels(
+            inventory, parts, springs=springs
+        )
     return labels_by_parts[parts, springs]
 
 
-def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Places:
+def _compute_labels(
+    inventory: Inventory, parts: frozenset[int], *, springs: bool
+) -> Places:
     """Compute the piece of each node."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -82,7 +86,7 @@ def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Pl
     size = len(inventory.coordinates)
     ends = [
         np.stack([np.repeat(row[:, 0], row.shape[1]), row.ravel()])
-        for row in _rows(inventory, parts, springs=springs)
+        for row in _list_connections(inventory, parts, springs=springs)
         if row.size
     ]
     links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
@@ -94,7 +98,7 @@ def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Pl
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _rows(
+def _list_connections(
     inventory: Inventory, parts: frozenset[int], *, springs: bool
 ) -> Iterator[Places]:
     """Yield arrays with connected nodes in each row."""
@@ -111,7 +115,7 @@ def _rows(
         )[np.newaxis]
 
 
-def supports_of(
+def find_supports(
     inventory: Inventory,
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
     """Return the supports of each part that has some, and the supports of the model.
@@ -123,7 +127,7 @@ def supports_of(
     if not holds:
         return {}, ()
     part_nodes = inventory.nodes_by_part
-    labels = labels_of(inventory, frozenset(part_nodes))
+    labels = label_pieces(inventory, frozenset(part_nodes))
     hold_nodes = [
         np.concatenate(
             [hold.nodes, *(part_nodes[part] for part in hold.parts & part_nodes.keys())]
@@ -135,15 +139,17 @@ def supports_of(
         if not hold.counts and hold.start <= 0 and np.isinf(hold.end):
             for axis in hold.axes:
                 fixed[nodes, axis] = True
-    turning = _turning(inventory)
+    turning = _find_rotating_nodes(inventory)
     by_piece: dict[int, tuple[int, ...]] = {}
     whole: set[int] = set()
-    for piece, members in _pieces(inventory, labels, np.concatenate(hold_nodes)):
-        excused = _symmetries(inventory, members, fixed[members])
+    for piece, members in _find_held_pieces(
+        inventory, labels, np.concatenate(hold_nodes)
+    ):
+        excused = _find_symmetry_axes(inventory, members, fixed[members])
         by_piece[piece] = tuple(
             number
             for number, (hold, nodes) in enumerate(zip(holds, hold_nodes, strict=True))
-            if _counts(
+            if _is_held(
                 hold,
                 nodes[labels[nodes] == piece],
                 excused,
@@ -161,7 +167,7 @@ def supports_of(
     return holds_by_part, tuple(holds[number] for number in sorted(whole))
 
 
-def _pieces(
+def _find_held_pieces(
     inventory: Inventory, labels: Places, held: Places
 ) -> Iterator[tuple[int, Places]]:
     """Yield each piece with supported nodes, and the nodes of its elements."""
@@ -176,14 +182,14 @@ def _pieces(
             yield piece, members
 
 
-def _counts(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
+def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
     """Return True if a support holds some nodes of a piece; fixed rotations count if the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
 
 
-def _turning(inventory: Inventory) -> Mask:
+def _find_rotating_nodes(inventory: Inventory) -> Mask:
     """Return for each node True if it has rotations."""
     has_rotations = np.zeros(
         len(inventory.coordinates) + 1, bool
@@ -196,7 +202,9 @@ def _turning(inventory: Inventory) -> Mask:
     return has_rotations[:-1]
 
 
-def _symmetries(inventory: Inventory, members: Places, fixed: Mask) -> frozenset[int]:
+def _find_symmetry_axes(
+    inventory: Inventory, members: Places, fixed: Mask
+) -> frozenset[int]:
     """Return the axes along which a piece is held by a symmetry plane, or fixed completely; ``fixed`` is (members, 3).
 
     The piece lies on one side of the plane, all its nodes on the plane are fixed, and gravity does not act along the
@@ -261,7 +269,7 @@ class _Spring(NamedTuple):
     joins: frozenset[int]
 
 
-def inner_period(inventory: Inventory) -> InnerPeriod | None:
+def find_inner_period(inventory: Inventory) -> InnerPeriod | None:
     """Return the longest period in which the parts of a deck oscillate on springs relative to each other.
 
     None if no springs connect them, or a mass or stiffness is unknown: springs must be linear along their length
@@ -274,9 +282,9 @@ def inner_period(inventory: Inventory) -> InnerPeriod | None:
     )
     if inventory.moved or not inventory.complete:
         return None
-    labels = labels_of(inventory, stiff_parts, springs=False)
-    pieces = _masses_of_pieces(inventory, stiff_parts, labels)
-    springs = list(_springs(inventory, labels, pieces)) if pieces else []
+    labels = label_pieces(inventory, stiff_parts, springs=False)
+    pieces = _weigh_pieces(inventory, stiff_parts, labels)
+    springs = list(_find_springs(inventory, labels, pieces)) if pieces else []
     if not pieces or None in springs:
         return None
     springs_by_piece = {
@@ -292,21 +300,21 @@ def inner_period(inventory: Inventory) -> InnerPeriod | None:
         if springs_by_piece[label] and pieces[label].mass >= _HEAVY * sprung_mass
     ]
     return max(
-        (_period(label, pieces, springs_by_piece[label]) for label in heavy),
+        (_compute_period(label, pieces, springs_by_piece[label]) for label in heavy),
         key=lambda spring: spring.time,
         default=None,
     )
 
 
-def _masses_of_pieces(
+def _weigh_pieces(
     inventory: Inventory, parts: Collection[int], labels: Places
 ) -> Mapping[int, _Piece] | None:
     """Return the pieces by label; None if the mass of a part is unknown."""
-    masses = masses_and_steps(inventory)
+    masses = compute_masses_and_steps(inventory)
     pieces_by_label = dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
     for elements in inventory.elements:
-        element_sizes, _ = sizes_and_lengths(
+        element_sizes, _ = compute_sizes_and_lengths(
             elements.kind, elements.nodes, inventory.coordinates
         )
         for part in set(np.unique(elements.part).tolist()) & sizes.keys():
@@ -333,7 +341,7 @@ def _masses_of_pieces(
     return pieces_by_label
 
 
-def _springs(
+def _find_springs(
     inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]
 ) -> Iterator[_Spring | None]:
     """Yield the springs between two pieces; None for a spring with unknown stiffness."""
@@ -363,7 +371,7 @@ def _springs(
             )
 
 
-def _period(
+def _compute_period(
     label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]
 ) -> InnerPeriod:
     """Return the period in which a piece oscillates relative to the pieces on the other ends of its springs."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.base.errors import DeckError, printable
+from d2rpick.base.errors import DeckError, make_printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -108,7 +108,7 @@ class PrintedCard:
     sensors: Mapping[int, int] = field(default_factory=dict)
 
 
-class Solver(NamedTuple):
+class CardSolver(NamedTuple):
     """A solver whose input d2rpick can print.
 
     ``title`` is its name, ``histories`` are the formats that only this solver writes. ``switches`` is the field of
@@ -123,14 +123,14 @@ class Solver(NamedTuple):
     cards: Callable[[Sequence[Times], Printing, Sequence[str]], PrintedCard]
 
 
-def shortest(value: float, width: int = LONGEST) -> str:
+def write_number(value: float, width: int = LONGEST) -> str:
     """Return the shortest text of at most ``width`` characters that reads back as the number.
 
     If there is none, return the text that reads back as the nearest number.
 
     Examples
     --------
-    >>> shortest(0.02), shortest(1e-7), shortest(0.0128853793630525), shortest(20.0)
+    >>> write_number(0.02), write_number(1e-7), write_number(0.0128853793630525), write_number(20.0)
     ('0.02', '1.0e-7', '.01288538', '20.0')
     """
     texts = {f"{value:.0f}", f"{value:.0f}."}
@@ -160,11 +160,11 @@ def shortest(value: float, width: int = LONGEST) -> str:
     )
 
 
-def comments(remarks: Sequence[str]) -> Iterator[str]:
+def write_comments(remarks: Sequence[str]) -> Iterator[str]:
     """Yield remarks as lines that fit into the comment lines of a card."""
     for remark in remarks:
         yield from textwrap.wrap(
-            printable(remark),
+            make_printable(remark),
             _COMMENT_WIDTH,
             subsequent_indent="  ",
             break_long_words=False,

@@ -15,23 +15,29 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
-from d2rpick.deck.engine_files import capped, choose_step_cap, engine_lines, legs, off
+from d2rpick.deck.engine_files import (
+    choose_step_cap,
+    plan_legs,
+    write_bodies_off,
+    write_engine_lines,
+    write_step_limit,
+)
 from d2rpick.deck.part_sets import PartSets, number_sets, write_part_set
 from d2rpick.deck.printed_card import (
     LONGEST,
     PHYSICS,
+    CardSolver,
     PrintedCard,
-    Solver,
     check_ids,
-    comments,
-    shortest,
+    write_comments,
+    write_number,
 )
 from d2rpick.deck.switch_sets import (
     Waiting,
     group_by_lead,
-    header,
-    to_deformable,
-    to_rigid,
+    write_deformable_lines,
+    write_header,
+    write_rigid_lines,
 )
 
 if TYPE_CHECKING:
@@ -81,7 +87,7 @@ _OF_SENSORS = tuple(
 DEFAULT: Final = "ls-dyna"  # solver for histories that name none
 
 
-def _ls_dyna(
+def _print_ls_dyna(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
     """Print two unpaired CODE 0 sets for each window, with times of at most 9 characters.
@@ -93,21 +99,21 @@ def _ls_dyna(
     """
     windows = printed_card.check_windows(windows)
     ids = check_ids(printing.part)
-    sets = list(_sets(printing.swset, len(windows)))
+    sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
         # The lead id follows another id in the same line, separated by a blank.
         check_ids([printing.merge], LONGEST)
-    texts = [(shortest(tr), shortest(td)) for tr, td in windows]
+    texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
     notes = tuple(
         note
         for times, pair in zip(windows, texts, strict=True)
-        for note in _roundings(times, pair)
+        for note in _note_roundings(times, pair)
     )
-    comment_lines = (*notes, *_warnings(ids, printing), *comments(remarks))
+    comment_lines = (*notes, *_write_warnings(ids, printing), *write_comments(remarks))
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
     lines = [
-        *comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
+        *write_comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
         *comment_lines,
     ]
     lines = [f"$ {line}" for line in lines]
@@ -117,14 +123,14 @@ def _ls_dyna(
     for members, number in part_sets.items():
         lines += write_part_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
-        lines += _window(pair, numbers, ids, printing, part_sets)
+        lines += _write_window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
     return PrintedCard(
         text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes
     )
 
 
-def _window(
+def _write_window(
     texts: tuple[str, str],
     sets: tuple[int, int],
     ids: Sequence[int],
@@ -133,22 +139,22 @@ def _window(
 ) -> Iterator[str]:
     # Both begin with a comment line.
     """Yield the lines of the two switch sets of one window."""
-    rigid_lines = [*to_rigid(ids, printing, part_sets)]
-    deformable_lines = [*to_deformable(ids, part_sets)]
+    rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
+    deformable_lines = [*write_deformable_lines(ids, part_sets)]
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted, activated = _constraint_flags(printing)
+    deleted, activated = _choose_constraint_flags(printing)
     yield from (
-        *header(
+        *write_header(
             sets[0],
             texts[0],
-            shortest(cap),
+            write_number(cap),
             (len(rigid_lines) - 1, 0),
             constraints=deleted,
         ),
         *rigid_lines,
     )
     yield from (
-        *header(
+        *write_header(
             sets[1],
             texts[1],
             "0.0",
@@ -159,7 +165,7 @@ def _window(
     )
 
 
-def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
+def _choose_constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
     """Return NRBF and NCSF of the set that makes parts rigid, and of the set that makes them deformable."""
     is_deleted = (printing.delete_nodal_bodies, printing.delete_node_sets)
     return [flag * _DELETE for flag in is_deleted], [
@@ -167,7 +173,7 @@ def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
     ]
 
 
-def _ls_dyna_contact(
+def _print_ls_dyna_contact(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
     """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or of a rigid wall (CODE 1 and 3).
@@ -180,43 +186,43 @@ def _ls_dyna_contact(
         As `_ls_dyna`, and if no TIME3 gives as many windows as planned.
     """
     from d2rpick.deck.contact_timing import (
-        time_pair,
+        find_pair_timing,
     )  # not above: other cards do without
 
     windows = printed_card.check_windows(windows)
     ids = check_ids(printing.part)
-    kind, number, pushes = _force_of(printing)
+    kind, number, pushes = _find_force(printing)
     free, forced = _CODES[kind]
-    timing = time_pair(windows, pushes)
+    timing = find_pair_timing(windows, pushes)
     first, second = printing.swset
     part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
-    rigid_lines = [*to_rigid(ids, printing, part_sets)]
-    deformable_lines = [*to_deformable(ids, part_sets)]
+    rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
+    deformable_lines = [*write_deformable_lines(ids, part_sets)]
     cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
     waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
     returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
     spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
     comment_lines = (
-        *comments(
+        *write_comments(
             [f"Rigid from {spans} in the history; written by d2rpick {__version__}"]
         ),
     )
     comment_lines += (
-        *_warnings(ids, printing),
+        *_write_warnings(ids, printing),
         *_BY_FORCE[:2],
         _OF_OFFSET,
-        *comments(remarks),
+        *write_comments(remarks),
     )
     lines = [f"$ {line}" for line in comment_lines]
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
-    deleted, activated = _constraint_flags(printing)
-    earliest = shortest(timing.earliest)
+    deleted, activated = _choose_constraint_flags(printing)
+    earliest = write_number(timing.earliest)
     counts = (len(rigid_lines) - 1, 0)
     lines += (
-        *header(first, earliest, shortest(cap), counts, waits, deleted),
+        *write_header(first, earliest, write_number(cap), counts, waits, deleted),
         *rigid_lines,
-        *header(
+        *write_header(
             second,
             "0.0",
             "0.0",
@@ -230,7 +236,9 @@ def _ls_dyna_contact(
     return PrintedCard(text, timing.windows, {_FILE: text})
 
 
-def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
+def _number_switch_sets(
+    first: tuple[int, int], count: int
+) -> Iterator[tuple[int, int]]:
     """Yield the ids of the two switch sets of each window, all different."""
     if first[0] == first[1]:
         raise DeckError(f"both switch sets have id {first[0]}; give two different ids")
@@ -248,7 +256,7 @@ def _check_printed(texts: Sequence[str]) -> None:
             raise DeckError(f"{problem}; give different times")
 
 
-def _roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
+def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
     """Yield a note for each time that the card cannot write exactly."""
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
@@ -256,7 +264,7 @@ def _roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
             yield f"{name} is printed as {text}, {difference}: nearest in {LONGEST} characters."
 
 
-def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
+def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     """Yield the comment lines of an LS-DYNA card."""
     deleted = printing.delete_nodal_bodies or printing.delete_node_sets
     yield from (
@@ -277,7 +285,7 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         yield f"Part {printing.merge} is the lead: it must be rigid already."
 
 
-def _radioss(
+def _print_radioss(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
     """Print the engine files: one leg up to each switch, and one to the end of the run.
@@ -290,18 +298,18 @@ def _radioss(
     DeckError
         If windows overlap or are not in order, an id does not fit, or the run does not end after the last window.
     """
-    windows, ids, end = _of_run(windows, printing)
+    windows, ids, end = _check_run(windows, printing)
     files = {
         f"{printing.name}_{leg.number:04d}.rad": "\n".join(
-            engine_lines(leg, printing.name, ids, printing.off)
+            write_engine_lines(leg, printing.name, ids, printing.off)
         )
         + "\n"
-        for leg in legs(windows, end, printing.step_cap)
+        for leg in plan_legs(windows, end, printing.step_cap)
     }
-    return _told(windows, printing, (*_OF_RADIOSS, *remarks), files)
+    return _combine_card(windows, printing, (*_OF_RADIOSS, *remarks), files)
 
 
-def _radioss_sensors(
+def _print_radioss_sensors(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
     """Print time sensors that switch the bodies with these main nodes, and one engine file for the whole run.
@@ -314,16 +322,19 @@ def _radioss_sensors(
         As `_radioss` does.
     """
     from d2rpick.deck.radioss_sensors import (
-        inactive,
+        invert_spans,
     )  # not above: other cards do without
 
-    windows, _, _ = _of_run(windows, printing)
-    return _of_sensors(
-        windows, printing, _sensors(inactive(windows), printing.sensor), remarks
+    windows, _, _ = _check_run(windows, printing)
+    return _print_sensors(
+        windows,
+        printing,
+        _write_sensors(invert_spans(windows), printing.sensor),
+        remarks,
     )
 
 
-def _radioss_contact(
+def _print_radioss_contact(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
     """Print a force sensor of a contact or rigid wall that makes the bodies deformable during contacts.
@@ -335,13 +346,13 @@ def _radioss_contact(
     DeckError
         As `_radioss`, and if no Tdelay gives as many windows as planned.
     """
-    from d2rpick.deck.contact_timing import time_sensor
+    from d2rpick.deck.contact_timing import find_sensor_timing
 
-    windows, _, _ = _of_run(windows, printing)
-    kind, number, pushes = _force_of(printing)
-    timing = time_sensor(windows, pushes)
+    windows, _, _ = _check_run(windows, printing)
+    kind, number, pushes = _find_force(printing)
+    timing = find_sensor_timing(windows, pushes)
     row = f"{number:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{shortest(timing.wait, 20):>20}\n{row}\n"
+    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{write_number(timing.wait, 20):>20}\n{row}\n"
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
         (timing.latest, math.inf)
     ]
@@ -349,11 +360,11 @@ def _radioss_contact(
         f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).",
         *_BY_FORCE,
     )
-    sensors = _sensors(spans, printing.sensor, [sensor])
-    return _of_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
+    sensors = _write_sensors(spans, printing.sensor, [sensor])
+    return _print_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
 
 
-def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
+def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
     """Return kind, id and contact times of the contact or wall.
 
     Raises
@@ -378,7 +389,7 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
     return "RWALL", printing.wall or 0, pushes
 
 
-def _of_sensors(
+def _print_sensors(
     windows: Sequence[Times],
     printing: Printing,
     sensors: tuple[str, int],
@@ -391,13 +402,15 @@ def _of_sensors(
     ids = check_ids(printing.node)
     end = printing.end or 0.0
     cap = min(
-        leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None
+        leg.cap
+        for leg in plan_legs(windows, end, printing.step_cap)
+        if leg.cap is not None
     )
     lines = (
         f"/RUN/{printing.name}/1",
         f"{end!r:>20}",
-        *off(printing.off),
-        *capped(cap),
+        *write_bodies_off(printing.off),
+        *write_step_limit(cap),
     )
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
     nodes = ", ".join(map(str, ids))
@@ -409,7 +422,7 @@ def _of_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
         " where it takes fewer without switching, set --step-cap to the deformable step or more."
     )
-    card = _told(
+    card = _combine_card(
         tuple(windows),
         printing,
         (*_OF_SENSORS, *instructions, step_warning, *remarks),
@@ -421,7 +434,7 @@ def _of_sensors(
     )
 
 
-def _sensors(
+def _write_sensors(
     spans: Sequence[Times], first: int, further: Sequence[str] = ()
 ) -> tuple[str, int]:
     """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines all of them.
@@ -433,7 +446,7 @@ def _sensors(
 
     clock = "/SENSOR/TIME/{}\ndeformable\n"
     kinds = [
-        f"{clock}{shortest(start, 20):>20}\n{shortest(min(stop, NEVER), 20):>20}\n"
+        f"{clock}{write_number(start, 20):>20}\n{write_number(min(stop, NEVER), 20):>20}\n"
         for start, stop in spans
     ]
     kinds += further
@@ -449,7 +462,7 @@ def _sensors(
     return "".join(texts), last
 
 
-def _of_run(
+def _check_run(
     windows: Sequence[Times], printing: Printing
 ) -> tuple[tuple[Times, ...], list[int], float]:
     """Return windows, main nodes and end of a run.
@@ -474,7 +487,7 @@ def _of_run(
     return windows, ids, printing.end
 
 
-def _told(
+def _combine_card(
     windows: tuple[Times, ...],
     printing: Printing,
     remarks: Sequence[str],
@@ -483,7 +496,7 @@ def _told(
 ) -> PrintedCard:
     """Combine comments, cards for the starter deck and engine files to a card."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
-    head = comments(
+    head = write_comments(
         [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]
     )
     text = "".join(f"# {line}\n" for line in head)
@@ -497,43 +510,43 @@ def _told(
     return PrintedCard(text, windows, files, starter=starter)
 
 
-SOLVERS: Final[Mapping[str, Solver]] = {
-    "ls-dyna": Solver(
+SOLVERS: Final[Mapping[str, CardSolver]] = {
+    "ls-dyna": CardSolver(
         "LS-DYNA",
         ("glstat", "matsum", "binout"),
         "part",
         ("merge", "swset", "step_cap"),
-        _ls_dyna,
+        _print_ls_dyna,
     ),
-    "radioss": Solver(
-        "Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss
+    "radioss": CardSolver(
+        "Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _print_radioss
     ),
-    "radioss-sensors": Solver(
-        "Radioss", (), "node", ("step_cap", "end", "name"), _radioss_sensors
+    "radioss-sensors": CardSolver(
+        "Radioss", (), "node", ("step_cap", "end", "name"), _print_radioss_sensors
     ),
-    "ls-dyna-contact": Solver(
+    "ls-dyna-contact": CardSolver(
         "LS-DYNA",
         (),
         "part",
         ("merge", "swset", "step_cap", "contact", "wall"),
-        _ls_dyna_contact,
+        _print_ls_dyna_contact,
     ),
-    "radioss-contact": Solver(
+    "radioss-contact": CardSolver(
         "Radioss",
         (),
         "node",
         ("step_cap", "end", "name", "contact", "wall"),
-        _radioss_contact,
+        _print_radioss_contact,
     ),
 }
 
 
-def solver_of(history_format: str) -> str:
+def find_solver(history_format: str) -> str:
     """Return the solver that wrote a history of this format; several formats are joined by ``+``.
 
     Examples
     --------
-    >>> solver_of("radioss-th"), solver_of("glstat + matsum"), solver_of("csv")
+    >>> find_solver("radioss-th"), find_solver("glstat + matsum"), find_solver("csv")
     ('radioss', 'ls-dyna', 'ls-dyna')
     """
     formats = set(history_format.split(" + "))
@@ -543,7 +556,7 @@ def solver_of(history_format: str) -> str:
     )
 
 
-def cards(
+def print_cards(
     windows: Sequence[Times],
     printing: Printing,
     solver: str = DEFAULT,
@@ -570,7 +583,7 @@ def cards(
     Examples
     --------
     >>> from d2rpick.deck.printed_card import Printing
-    >>> card = cards([(0.02, 0.09), (0.2, 0.3)], Printing(part=(11,)))
+    >>> card = print_cards([(0.02, 0.09), (0.2, 0.3)], Printing(part=(11,)))
     >>> card.windows
     ((0.02, 0.09), (0.2, 0.3))
     """

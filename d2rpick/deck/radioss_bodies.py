@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import DeckError, are, name_units
+from d2rpick.base.errors import DeckError, choose_verb, name_units
 from d2rpick.deck import radioss_inventory
-from d2rpick.deck.geometry import Placement, masses_and_steps
-from d2rpick.deck.mesh import nodes_of
+from d2rpick.deck.geometry import Placement, compute_masses_and_steps
+from d2rpick.deck.mesh import read_nodes
 from d2rpick.deck.model import DISCRETE, Inventory
-from d2rpick.deck.pieces import pieces_of
+from d2rpick.deck.pieces import count_pieces
 from d2rpick.deck.radioss_deck import (
     Starter,
-    below_title,
-    blocks,
-    kept_off,
-    keyword,
-    whole,
+    find_bodies_kept_off,
+    get_lines_below_title,
+    parse_id,
+    read_blocks,
+    split_keyword,
 )
 from d2rpick.deck.radioss_flaws import NodeGroups
 from d2rpick.deck.radioss_rigid import Body
-from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
-from d2rpick.deck.reader import cuts
+from d2rpick.deck.radioss_run import RadiossRun, find_rigid_parts, read_run
+from d2rpick.deck.reader import find_cuts
 from d2rpick.deck.source import SourceFile
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ _GROUP_OF_VELOCITY: Final = {"TRA": 6, "ROT": 6, "T+G": 6, "GRID": 6, "AXIS": 2}
 _GROUP_OF_GRAVITY: Final = 4
 
 
-class Bodies(NamedTuple):
+class SwitchedBodies(NamedTuple):
     """Rigid bodies that switch some parts.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
@@ -61,7 +61,7 @@ class Bodies(NamedTuple):
     replaced: tuple[int, ...] = ()
 
 
-def bodies_for(path: str, parts: Collection[int]) -> Bodies:
+def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
     """Find the rigid bodies of some parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
@@ -82,35 +82,35 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
         their nodes and cannot switch them.
     """
     run = read_run(path)
-    starter = _whole(run)
-    inventory = radioss_inventory.read(run)
+    starter = _require_whole_starter(run)
+    inventory = radioss_inventory.read_radioss_inventory(run)
     groups = NodeGroups(starter)
-    if unknown := sorted(part for part in parts if not _nodes([part], groups)):
+    if unknown := sorted(part for part in parts if not _collect_nodes([part], groups)):
         raise DeckError(
-            f"{path}: {name_units(unknown)} {are(unknown)} without elements that can be read; give other parts"
+            f"{path}: {name_units(unknown)} {choose_verb(unknown)} without elements that can be read; give other parts"
         )
     nodes = list[int]()
     lacking = list[tuple[int, ...]]()
-    unused = frozenset(kept_off(run.legs))
+    unused = frozenset(find_bodies_kept_off(run.legs))
     for group in inventory.bodies(parts):
-        main_nodes = _ready(starter, inventory, group, groups, unused)
+        main_nodes = _find_ready_bodies(starter, inventory, group, groups, unused)
         nodes += main_nodes
         if not main_nodes:
             lacking.append(group)
-    new_bodies = _Made(starter, inventory, groups)
+    new_bodies = _BodyWriter(starter, inventory, groups)
     texts = [new_bodies.body(group) for group in lacking]
     mains = tuple(main for main, _ in texts)
     notes = tuple(
-        f"/RBODY with main node {main} is new, for {name_units(group)}{_apart(inventory, group)}"
+        f"/RBODY with main node {main} is new, for {name_units(group)}{_describe_pieces(inventory, group)}"
         for main, group in zip(mains, lacking, strict=True)
     )
     cards = "".join(text for _, text in texts)
-    replaced_bodies = replaced(run, cards)
+    replaced_bodies = find_replaced_bodies(run, cards)
     notes += tuple(
         f"/RBODY {body.id} ({body.card.at}) is off in the whole run and must be removed: a new body takes its nodes"
         for body in replaced_bodies
     )
-    return Bodies(
+    return SwitchedBodies(
         (*nodes, *mains),
         cards,
         notes,
@@ -119,26 +119,26 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
     )
 
 
-def replaced(run: Run, cards: str) -> tuple[Body, ...]:
+def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
     """Return the bodies that are off in the whole run and whose nodes belong to new bodies in ``cards``.
 
     A node belongs to one body, so these bodies have to be removed from the starter deck.
     """
     if run.starter is None or not cards:
         return ()
-    added = Starter(blocks=[*blocks(SourceFile("the card", cards.encode()))])
+    added = Starter(blocks=[*read_blocks(SourceFile("the card", cards.encode()))])
     members = [
         group_members
         for body in added.bodies
         if (group_members := added.group_members(body.group))
     ]
     groups = NodeGroups(run.starter)
-    unused = frozenset(kept_off(run.legs))
-    taken = _nodes({part for _, parts in members for part in parts}, groups)
+    unused = frozenset(find_bodies_kept_off(run.legs))
+    taken = _collect_nodes({part for _, parts in members for part in parts}, groups)
     return tuple(
         body
         for body in run.starter.bodies
-        if _is_unused(body, unused) and _touches(body, groups, taken)
+        if _is_unused(body, unused) and _has_nodes(body, groups, taken)
     )
 
 
@@ -147,22 +147,22 @@ def _is_unused(body: Body, unused: Collection[int]) -> bool:
     return body.node.value in unused and not body.sensor
 
 
-def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
+def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
     """Return a remark if the body joins pieces that nothing else connects."""
-    pieces = pieces_of(inventory, parts)
+    pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
     return ""
 
 
-def _stiff(inventory: Inventory, parts: Collection[int]) -> list[int]:
+def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
     """Return the parts that do not consist of springs alone; all parts if each of them does."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
 
 
-def _nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
+def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
     """Return the ids of all nodes of some parts."""
     return frozenset(
         node
@@ -171,7 +171,7 @@ def _nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
     )
 
 
-def _whole(run: Run) -> Starter:
+def _require_whole_starter(run: RadiossRun) -> Starter:
     """Return the starter deck.
 
     Raises
@@ -189,7 +189,7 @@ def _whole(run: Run) -> Starter:
         raise DeckError(
             f"{include.name.at}: {include.name.text} was not read ({include.reason}), so free ids are unknown; add it"
         )
-    for block, sign in cuts(run.deck):
+    for block, sign in find_cuts(run.deck):
         raise DeckError(f"{block.source.name}: {sign} Complete the file first")
     if starter.moved or starter.transformed:
         if starter.moved:
@@ -202,7 +202,7 @@ def _whole(run: Run) -> Starter:
     return starter
 
 
-def _ready(
+def _find_ready_bodies(
     starter: Starter,
     inventory: Inventory,
     group: Sequence[int],
@@ -213,16 +213,19 @@ def _ready(
 
     Empty if no body contains any of their nodes, or only bodies that are never rigid, which a new one replaces.
     """
-    stiff = set(_stiff(inventory, group))
-    group_nodes = _nodes(stiff, groups)
-    touching = [body for body in starter.bodies if _touches(body, groups, group_nodes)]
+    stiff = set(_select_stiff_parts(inventory, group))
+    group_nodes = _collect_nodes(stiff, groups)
+    touching = [
+        body for body in starter.bodies if _has_nodes(body, groups, group_nodes)
+    ]
     if not touching:
         return ()
-    parts_by_body = rigid_parts(
+    parts_by_body = find_rigid_parts(
         starter, {body.node.value: body.group for body in touching}
     )
     stiff_by_body = {
-        node: set(_stiff(inventory, parts)) for node, parts in parts_by_body.items()
+        node: set(_select_stiff_parts(inventory, parts))
+        for node, parts in parts_by_body.items()
     }
     held_parts = frozenset[int]().union(*stiff_by_body.values())
     if (
@@ -253,7 +256,7 @@ def _ready(
     )
 
 
-def _touches(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
+def _has_nodes(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
     """Return True if a body contains one of these nodes."""
     members = groups.members(body.group)
     if members is None:
@@ -263,7 +266,7 @@ def _touches(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
     return body.node.value in nodes or not nodes.isdisjoint(members)
 
 
-class _Made:
+class _BodyWriter:
     """Writes new bodies with ids that no card of the deck has."""
 
     def __init__(
@@ -271,10 +274,11 @@ class _Made:
     ) -> None:
         self._starter, self._inventory, self._groups = starter, inventory, groups
         self._masses = {
-            part: mass for part, (mass, _) in masses_and_steps(inventory).items()
+            part: mass
+            for part, (mass, _) in compute_masses_and_steps(inventory).items()
         }
         self._placed = Placement(inventory).parts
-        self._free = {"NODE": int(nodes_of(starter.named("NODE"))[0].max(initial=0))}
+        self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
         """Return main node and cards of a new body of some parts, with the velocities and gravity of its main node."""
@@ -297,9 +301,9 @@ class _Made:
     def next(self, kind: str) -> int:
         """Return an unused id above all ids of a kind of card."""
         if kind not in self._free:
-            words = (keyword(block) for block in self._starter.blocks)
+            words = (split_keyword(block) for block in self._starter.blocks)
             ids = (
-                whole(word)
+                parse_id(word)
                 for first, *further_words in words
                 if first == kind
                 for word in further_words
@@ -313,7 +317,7 @@ class _Made:
 
         The starter corrects it.
         """
-        parts = _stiff(self._inventory, parts)
+        parts = _select_stiff_parts(self._inventory, parts)
         masses = [
             mass
             for part in parts
@@ -332,7 +336,7 @@ class _Made:
 
     def _moving(self, parts: Sequence[int], alone: int) -> Iterator[str]:
         """Yield the initial velocities and gravity that act on the nodes of the body, for its main node."""
-        body_nodes = _nodes(parts, self._groups)
+        body_nodes = _collect_nodes(parts, self._groups)
         for card in self._starter.named("INIVEL"):
             column = _GROUP_OF_VELOCITY.get("".join(card.words[1:2]))
             reached = body_nodes & self._reached(card, column)
@@ -344,7 +348,7 @@ class _Made:
             if reached and column is not None:
                 yield self._again(card, column, alone)
         for card in self._starter.named("GRAV"):
-            if below_title(card) and body_nodes & self._reached(
+            if get_lines_below_title(card) and body_nodes & self._reached(
                 card, _GROUP_OF_GRAVITY
             ):
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.graph import reached
-from d2rpick.deck.card import Card, Field, Row, Scope, Value
-from d2rpick.deck.expression import ExpressionError, number, real
+from d2rpick.base.graph import find_reachable
+from d2rpick.deck.card import Card, CardField, Row, Scope, Value
+from d2rpick.deck.expression import ExpressionError, parse_number, parse_real
 from d2rpick.deck.radioss_rigid import (
     BODY,
     MADE_HERE,
@@ -61,10 +61,10 @@ _DEFAULT_ISOLID: Final = 1
 SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
 
-def blocks(source: SourceFile) -> Iterator[Block]:
+def read_blocks(source: SourceFile) -> Iterator[Block]:
     """Yield keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
     start: tuple[int, str] | None = None
-    for position, raw in _marks(source):
+    for position, raw in _find_marks(source):
         if start:
             yield Block(source, start[0], position, start[1])
         start = position, raw.rstrip(b"\r\n").decode("latin-1")
@@ -74,18 +74,18 @@ def blocks(source: SourceFile) -> Iterator[Block]:
         yield Block(source, start[0], None, start[1])
 
 
-def _marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
+def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
     """Yield offset and text of the lines that begin with ``/`` or ``#include``.
 
     Lines of a mesh are not looked at one by one.
     """
     position = 0
     for lines in source.pieces(0):
-        yield from ((position + at, raw) for at, raw in _marked(lines))
+        yield from ((position + at, raw) for at, raw in _find_marks_in_piece(lines))
         position += len(lines)
 
 
-def _marked(lines: bytes) -> list[tuple[int, bytes]]:
+def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
     """Return the same for a piece of whole lines."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
@@ -103,7 +103,7 @@ def _marked(lines: bytes) -> list[tuple[int, bytes]]:
     ]
 
 
-def keyword(block: Block) -> tuple[str, ...]:
+def split_keyword(block: Block) -> tuple[str, ...]:
     """Return the words of a keyword line in upper case; empty for an ``#include``.
 
     The run name in ``/RUN/name/1`` is in upper case too; `Card.block` has it as written.
@@ -113,28 +113,28 @@ def keyword(block: Block) -> tuple[str, ...]:
     return ()
 
 
-def whole(text: str) -> int:
+def parse_id(text: str) -> int:
     """Read an id from a keyword line or a field of 10 columns; 0 for other text."""
     text = text.strip()
     return int(text) if text.isdecimal() and len(text) <= _DIGITS else 0
 
 
-def card_of(block: Block) -> Card:
+def make_card(block: Block) -> Card:
     """Return a block as a card with fields of 10 columns."""
-    return Card("/".join(keyword(block)), block, Scope())
+    return Card("/".join(split_keyword(block)), block, Scope())
 
 
-def number_of(card: Card, at: int = 1) -> int:
+def get_number(card: Card, at: int = 1) -> int:
     """Return the id at a position of the keyword; 0 if there is none."""
-    return whole("".join(card.words[at:][:1]))
+    return parse_id("".join(card.words[at:][:1]))
 
 
-def below_title(card: Card) -> tuple[Row, ...]:
+def get_lines_below_title(card: Card) -> tuple[Row, ...]:
     """Return the lines below the title that are not blank; the title itself may be blank."""
     return tuple(row for row in card.rows[1:] if not row.blank)
 
 
-class Start(NamedTuple):
+class InitialVelocity(NamedTuple):
     """An /INIV: velocities at the start of a leg for ranges of nodes, or for a node group (0 for none)."""
 
     card: Card
@@ -143,7 +143,7 @@ class Start(NamedTuple):
 
 
 @dataclass(eq=False, repr=False)
-class Leg:
+class RadiossLeg:
     """One engine run: name and number from /RUN, its end, the main nodes that it switches, and its time-step limit."""
 
     run: Card
@@ -156,26 +156,26 @@ class Leg:
     )
     cap: Value[float] | None = None
     version: str = ""
-    starts: list[Start] = field(default_factory=list)
+    starts: list[InitialVelocity] = field(default_factory=list)
     # Sensors that are reset at its start.
     resets: list[int] = field(default_factory=list)
     sensor: int = 0  # sensor that ends it, at an unknown time
 
 
-def read_legs(source: SourceFile) -> list[Leg]:
+def read_legs(source: SourceFile) -> list[RadiossLeg]:
     """Read the legs of a file: one, or several for printed cards in one text."""
-    legs: list[Leg] = []
+    legs: list[RadiossLeg] = []
     waiting: list[Card] = []
-    for card in map(card_of, blocks(source)):
+    for card in map(make_card, read_blocks(source)):
         waiting.append(card)
         if card.words[0] == "RUN":
-            legs.append(_leg(card))
+            legs.append(_begin_leg(card))
         while legs and waiting:
-            _take(legs[-1], waiting.pop(0))
+            _add_to_leg(legs[-1], waiting.pop(0))
     return legs
 
 
-def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
+def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
     """Return the main nodes that the first leg deactivates and no leg activates, in the order of the file."""
     is_rigid_in_first_leg: dict[int, bool] = {}
     activated: set[int] = set()
@@ -193,67 +193,73 @@ def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
     )
 
 
-def _leg(card: Card) -> Leg:
+def _begin_leg(card: Card) -> RadiossLeg:
     """Begin a leg with its /RUN."""
     missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
-    return Leg(card, name, number_of(card, 2), next(numbers(card), missing))
+    return RadiossLeg(
+        card, name, get_number(card, 2), next(read_numbers(card), missing)
+    )
 
 
-def _take(leg: Leg, card: Card) -> None:
+def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
     """Add a card of an engine file to its leg."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(
-            (card, words[1] == "ON", tuple(_integer(value) for value in numbers(card)))
+            (
+                card,
+                words[1] == "ON",
+                tuple(_make_integer(value) for value in read_numbers(card)),
+            )
         )
     elif words[:2] == ("STOP", "LSENSOR"):
-        leg.sensor = next((int(value.value) for value in numbers(card)), 0)
+        leg.sensor = next((int(value.value) for value in read_numbers(card)), 0)
     elif words[:2] == ("SENS", "RESET"):
-        leg.resets += [int(value.value) for value in numbers(card)]
+        leg.resets += [int(value.value) for value in read_numbers(card)]
     elif words == ("DTIX",):
-        leg.cap = next(reversed(list(numbers(card))), None)
+        leg.cap = next(reversed(list(read_numbers(card))), None)
     elif words[0] == "INIV":
-        leg.starts.append(_start(card))
+        leg.starts.append(_read_start(card))
     elif words[0] == "VERS":
         leg.version = "".join(words[1:2])
 
 
-def _start(card: Card) -> Start:
+def _read_start(card: Card) -> InitialVelocity:
     """Read the nodes of an /INIV: type 0 lists nodes, type 1 first and last node of ranges, type 2 a node group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
-    type_ = number_of(card, 3)
+    type_ = get_number(card, 3)
     if card.words[1:2] == ("AXIS",):
         velocity_count = 5
     else:
         velocity_count = 1
-    ids = [_integer(value).value for value in numbers(card)][velocity_count:]
+    ids = [_make_integer(value).value for value in read_numbers(card)][velocity_count:]
     if type_ == 2:
-        return Start(card, (), ids[0] if ids else 0)
+        return InitialVelocity(card, (), ids[0] if ids else 0)
     if type_ == 1:
         pairs = zip(ids[::2], ids[1::2], strict=False)
     else:
         pairs = zip(ids, ids, strict=True)
-    return Start(card, tuple(pairs), 0)
+    return InitialVelocity(card, tuple(pairs), 0)
 
 
-def numbers(card: Card) -> Iterator[Value[float]]:
+def read_numbers(card: Card) -> Iterator[Value[float]]:
     """Yield all numbers below a keyword, in free format."""
     for distance, line in card.block.lines():
         column = 0
         for word in line.split():
             column = line.index(word, column)
-            word_field = Field(word, card.block, distance, column + 1)
+            word_field = CardField(word, card.block, distance, column + 1)
             column += len(word)
             try:
-                yield Value(float(number(word)), word_field)
+                yield Value(float(parse_number(word)), word_field)
             except ExpressionError as error:
                 yield Value(0.0, word_field, str(error))
 
 
-def _integer(value: Value[float]) -> Value[int]:
+def _make_integer(value: Value[float]) -> Value[int]:
     """Return a number as an integer."""
     if not value.problem and value.value != int(value.value):
         return Value(0, value.field, f"{value.field.text!r} is not an integer")
@@ -279,7 +285,7 @@ class Starter:
     @cached_property
     def cards(self) -> Sequence[Card]:
         """Return all blocks as cards, in reading order."""
-        return [card_of(block) for block in self.blocks]
+        return [make_card(block) for block in self.blocks]
 
     def named(self, *keywords: str) -> list[Card]:
         """Return the cards whose keyword begins with one of these words."""
@@ -289,7 +295,7 @@ class Starter:
     def version(self) -> int:
         """Return the input version of /BEGIN; 0 if there is none."""
         begin_cards = [card for card in self.named("BEGIN") if card.rows]
-        rows = below_title(begin_cards[-1]) if begin_cards else ()
+        rows = get_lines_below_title(begin_cards[-1]) if begin_cards else ()
         return begin_cards[-1].integer(rows[0], 0).value if rows else 0
 
     @property
@@ -309,11 +315,11 @@ class Starter:
     def _written_bodies(self) -> Iterator[Body]:
         """Yield the bodies of /RBODY."""
         for card in self.named("RBODY"):
-            for row in below_title(card)[: number_of(card) > 0]:
+            for row in get_lines_below_title(card)[: get_number(card) > 0]:
                 node, sensor, group, keeps = (card.integer(row, at) for at in _OF_BODY)
                 stays = bool(sensor.value or keeps.value)
                 yield Body(
-                    number_of(card), node, sensor.value, group.value, card, stays
+                    get_number(card), node, sensor.value, group.value, card, stays
                 )
 
     def _bodies_of_parts(self) -> Iterator[Body]:
@@ -321,7 +327,7 @@ class Starter:
         for card in self.named("PART") if self.version >= _RIGID_PARTS_SINCE else ():
             if len(card.rows) > 2 and card.integer(card.rows[1], _IRIGID).value == 1:
                 node, sensor = (card.integer(card.rows[2], at) for at in _OF_RIGID_PART)
-                part = number_of(card)
+                part = get_number(card)
                 yield Body(
                     0,
                     node,
@@ -335,7 +341,9 @@ class Starter:
     def _merges(self) -> Iterator[Merge]:
         """Yield the lines of /MERGE/RBODY."""
         for card in self.named("MERGE"):
-            for row in below_title(card) if card.words[1:2] == ("RBODY",) else ():
+            for row in (
+                get_lines_below_title(card) if card.words[1:2] == ("RBODY",) else ()
+            ):
                 main, main_kind, merged, kind = (
                     card.integer(row, at).value for at in range(4)
                 )
@@ -349,25 +357,26 @@ class Starter:
         """Yield the ids of all nodes."""
         for card in self.named("NODE"):
             for _, line in card.block.lines():
-                yield whole(line[:_WIDTH])
+                yield parse_id(line[:_WIDTH])
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
         """Return the /PART lines by part id."""
         return {
-            number_of(card): PartLine(
+            get_number(card): PartLine(
                 card.rows[0].text.strip(),
                 *(card.integer(row, at).value for at in range(3)),
             )
             for card in self.named("PART")
-            for row in below_title(card)[:1]
+            for row in get_lines_below_title(card)[:1]
         }
 
     @cached_property
     def subsets(self) -> Mapping[int, tuple[int, ...]]:
         """Return the ids of the subsets in each subset."""
         return {
-            number_of(card): _ids(below_title(card)) for card in self.named("SUBSET")
+            get_number(card): _read_ids(get_lines_below_title(card))
+            for card in self.named("SUBSET")
         }
 
     @cached_property
@@ -375,7 +384,7 @@ class Starter:
         """Return the kind of members of each node group (NODE, PART, SUBSET or GRNOD) and their ids."""
         group_cards = (card for card in self.named("GRNOD") if card.words[1:])
         written = {
-            number_of(card, 2): (card.words[1], _ids(below_title(card)))
+            get_number(card, 2): (card.words[1], _read_ids(get_lines_below_title(card)))
             for card in group_cards
         }
         rigid_parts = {
@@ -387,7 +396,7 @@ class Starter:
     def sensors(self) -> Mapping[int, Card]:
         """Return the sensor cards by id."""
         return {
-            number_of(card, 2): card for card in self.named("SENSOR") if card.words[1:]
+            get_number(card, 2): card for card in self.named("SENSOR") if card.words[1:]
         }
 
     @property
@@ -404,7 +413,7 @@ class Starter:
     def unturned(self) -> dict[int, str]:
         """Return the kind of elements of solids whose stresses do not rotate with a rigid body, by part."""
         defaults = [
-            _isolid_and_iframe(card, card.rows[0])
+            _read_isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
@@ -416,7 +425,7 @@ class Starter:
         )
         # The flags of each property; their line may be blank.
         flags = {
-            number_of(card, 2): _isolid_and_iframe(card, card.rows[1])
+            get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids
         }
         props = {
@@ -425,7 +434,7 @@ class Starter:
             if (prop_isolid or isolid or _DEFAULT_ISOLID) in _NOT_TURNED
             and (frame or iframe) != _ICOROTATIONAL
         }
-        bricks = {number_of(card) for card in self.named("BRICK")}
+        bricks = {get_number(card) for card in self.named("BRICK")}
         turned = [
             part
             for part, line in self.parts.items()
@@ -434,7 +443,7 @@ class Starter:
         formulations = dict.fromkeys(
             turned, "bricks with Isolid 1, 2 or 12 without Iframe 2"
         )
-        parts_without_frame = map(number_of, self.named(*WITHOUT_FRAME))
+        parts_without_frame = map(get_number, self.named(*WITHOUT_FRAME))
         return formulations | dict.fromkeys(
             parts_without_frame, "tetrahedra, 20-node bricks or 16-node shells"
         )
@@ -443,7 +452,7 @@ class Starter:
         """Return the nodes and the complete parts of a node group; None if they are unknown."""
         nodes = set[int]()
         parts = set[int]()
-        for kind, ids in map(self._group, reached([group], self._groups_in)):
+        for kind, ids in map(self._group, find_reachable([group], self._groups_in)):
             if kind in ("NODE", "NODENS"):
                 nodes.update(ids)
             elif kind == "GENE" and -1 not in ids:
@@ -453,7 +462,9 @@ class Starter:
             elif kind in ("MAT", "PROP"):
                 parts.update(self._parts_of(kind, ids))
             elif kind == "SUBSET":
-                below = {*reached(ids, lambda number: self.subsets.get(number, ()))}
+                below = {
+                    *find_reachable(ids, lambda number: self.subsets.get(number, ()))
+                }
                 parts.update(
                     part for part, line in self.parts.items() if line.subset in below
                 )
@@ -487,24 +498,24 @@ class Starter:
         return ids if kind == "GRNOD" else ()
 
 
-def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
+def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
     """Return the values of Isolid and Iframe in a line."""
     return card.integer(row, 0).value, card.integer(row, 7).value
 
 
-def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
+def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
     """Return the ids on lines with fields of 10 columns; -1 for text that is not an id."""
     cells = [
         row.text[start : start + _WIDTH].strip()
         for row in rows
         for start in range(0, len(row.text), _WIDTH)
     ]
-    return tuple(whole(cell) or -1 for cell in cells if cell)
+    return tuple(parse_id(cell) or -1 for cell in cells if cell)
 
 
-def reals(row: Row, count: int) -> list[float]:
+def read_reals(row: Row, count: int) -> list[float]:
     """Read numbers in fields of 20 columns; 0 for a blank, NaN for text that is not a number."""
     return [
-        real(row.text[at : at + 2 * _WIDTH])
+        parse_real(row.text[at : at + 2 * _WIDTH])
         for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)
     ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
-    from d2rpick.deck.card import Field
+    from d2rpick.deck.card import CardField
 
 THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"
@@ -38,11 +38,11 @@ class Flaw(NamedTuple):
     """
 
     code: str
-    place: Field
+    place: CardField
     message: str
 
 
-def recognises(head: bytes) -> bool:
+def is_radioss(head: bytes) -> bool:
     """Return True if a file that begins like this is a starter deck or an engine file."""
     first = _KEYWORD.search(head)
     return (
@@ -52,7 +52,7 @@ def recognises(head: bytes) -> bool:
     )
 
 
-def run_files(path: str) -> list[str]:
+def list_run_files(path: str) -> list[str]:
     """Return the files of the run that ``path`` belongs to; empty if it is not a file of a Radioss run.
 
     The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in one folder belong together. A
@@ -64,7 +64,7 @@ def run_files(path: str) -> list[str]:
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
             # a larger buffer than the file costs ten times the reading
             head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
-        if not recognises(head):
+        if not is_radioss(head):
             return []
         from pathlib import Path  # not above: start-up
 
@@ -72,7 +72,7 @@ def run_files(path: str) -> list[str]:
         file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects: there may be many runs
     except (OSError, ValueError):
         return []  # whoever reads the file reports the error
-    name = _run_name(path, head)
+    name = _find_run_name(path, head)
     numbered = (
         re.fullmatch(_NUMBERED, file_name)
         for file_name in file_names
@@ -85,7 +85,7 @@ def run_files(path: str) -> list[str]:
     return [path, *files]
 
 
-def root_of(path: str) -> str:
+def find_root(path: str) -> str:
     """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``, empty for another name.
 
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
@@ -95,9 +95,9 @@ def root_of(path: str) -> str:
     return numbered[1] if numbered else ""
 
 
-def _run_name(path: str, head: bytes) -> str:
+def _find_run_name(path: str, head: bytes) -> str:
     """Return the name of a run from its file name, else from its content."""
-    if root := root_of(path):
+    if root := find_root(path):
         return root
     match = re.search(_NAME, head)
     return (match[1] or match[2] or b"").decode("latin-1").strip() if match else ""

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import in_rows
-from d2rpick.deck.mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
-from d2rpick.deck.radioss_deck import Start, Starter, number_of, reals
+from d2rpick.base.errors import format_ranges
+from d2rpick.deck.mesh import KINDS, NOT_COUNTED, read_elements, read_nodes
+from d2rpick.deck.radioss_deck import InitialVelocity, Starter, get_number, read_reals
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field
+    from d2rpick.deck.card import Card, CardField
     from d2rpick.deck.mesh import Integers, Reals
     from d2rpick.deck.radioss_rigid import Body
-    from d2rpick.deck.radioss_run import Run
+    from d2rpick.deck.radioss_run import RadiossRun
 
 _PENALTY_SINCE: Final = 2026  # input version from which a wall has Iform
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
@@ -62,11 +62,11 @@ class NodeGroups:
         for card in self._starter.named(*KINDS):
             if card.words[1:]:
                 part = nodes_by_part.setdefault(
-                    number_of(card), [np.empty(0, np.int64)]
+                    get_number(card), [np.empty(0, np.int64)]
                 )
-                part += [np.unique(nodes) for _, _, nodes in elements_of(card)]
+                part += [np.unique(nodes) for _, _, nodes in read_elements(card)]
         unknown = {
-            number_of(card)
+            get_number(card)
             for card in self._starter.named(*NOT_COUNTED)
             if card.words[1:]
         }
@@ -83,10 +83,10 @@ class NodeGroups:
     @cached_property
     def placed(self) -> tuple[Integers, Reals]:
         """Return ids (n,) and coordinates (n, 3) of all nodes [length]."""
-        return nodes_of(self._starter.named("NODE"))
+        return read_nodes(self._starter.named("NODE"))
 
 
-def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
+def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
     """Return the flaws of a run in which the rigid bodies with these main nodes are switched, or kept off.
 
     A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
@@ -104,31 +104,32 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     groups = NodeGroups(starter)
     unknown = [body for body in bodies if groups.members(body.group) is None]
     flaws = [
-        _unknown(body.group, _numbered([body]), body.card.here) for body in unknown
+        _make_unknown(body.group, _name_bodies([body]), body.card.here)
+        for body in unknown
     ]
     flaws += [
         flaw
         for wall in starter.named("RWALL")
-        for flaw in _of_wall(wall, starter, groups, bodies)
+        for flaw in _check_wall(wall, starter, groups, bodies)
     ]
-    flaws += [*_of_starts(run, groups, bodies)]
+    flaws += [*_check_starts(run, groups, bodies)]
     if not run.deck.unread:  # otherwise an unread include may contain a velocity
-        flaws += _of_velocities(run, starter, groups, bodies)
+        flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))
 
 
-def _unknown(group: int, whose: str, field: Field) -> Flaw:
+def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
     """Return the flaw that the nodes of a group are unknown."""
     message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
     return Flaw(NOT_FOLLOWED, field, message)
 
 
-def _numbered(bodies: Sequence[Body]) -> str:
+def _name_bodies(bodies: Sequence[Body]) -> str:
     """Return the names of some bodies."""
-    return f"/RBODY {', '.join(in_rows(body.id for body in bodies))}"
+    return f"/RBODY {', '.join(format_ranges(body.id for body in bodies))}"
 
 
-def _within(body: Body, groups: NodeGroups) -> frozenset[int]:
+def _get_body_nodes(body: Body, groups: NodeGroups) -> frozenset[int]:
     """Return the nodes of a body."""
     return groups.members(body.group) or frozenset()
 
@@ -136,7 +137,7 @@ def _within(body: Body, groups: NodeGroups) -> frozenset[int]:
 # Rigid walls.
 
 
-def _of_wall(
+def _check_wall(
     card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
     """Yield the flaws of a rigid wall: bodies whose nodes the starter removes from it.
@@ -157,8 +158,8 @@ def _of_wall(
     wall = f"/{card.name}"
     for group in (added, left_out):
         if groups.members(group) is None:
-            yield _unknown(group, wall, card.here)
-    near = _near(card, node, starter, groups)
+            yield _make_unknown(group, wall, card.here)
+    near = _find_nodes_near_wall(card, node, starter, groups)
     without = groups.members(left_out)
     if near is None:
         yield Flaw(
@@ -169,27 +170,27 @@ def _of_wall(
     if without is None:
         return
     nodes = ((groups.members(added) or frozenset()) | (near or frozenset())) - without
-    lost = [(body, nodes & _within(body, groups)) for body in bodies]
+    lost = [(body, nodes & _get_body_nodes(body, groups)) for body in bodies]
     owners = [body for body, taken in lost if taken]
     if owners:
         count = len(frozenset[int]().union(*(taken for _, taken in lost)))
-        problem = f"the starter removes {count} of {len(nodes)} nodes from {wall}, those of {_numbered(owners)}"
+        problem = f"the starter removes {count} of {len(nodes)} nodes from {wall}, those of {_name_bodies(owners)}"
         why = "even while the bodies are off (warning 446), so they go through the wall"
         cure = "give every /RBODY Ikrem 1, and deactivate the body before it touches the wall"
         yield Flaw(THROUGH_WALL, card.here, f"{problem}, {why}; {cure}")
 
 
-def _near(
+def _find_nodes_near_wall(
     card: Card, node: int, starter: Starter, groups: NodeGroups
 ) -> frozenset[int] | None:
     """Return the nodes within the distance of a wall, on its front side; None if they are unknown."""
     rows = card.rows[1:]
-    reach, _, diameter = reals(rows[1], 3)
+    reach, _, diameter = read_reals(rows[1], 3)
     if reach == 0:
         return frozenset()
     words = set(card.name.split("/"))
     kind = next(iter(words & _GEOMETRIES), "PLANE" if words & _WITH_KIND else "")
-    points = np.array([reals(row, 3) for row in rows[2:5]])
+    points = np.array([read_reals(row, 3) for row in rows[2:5]])
     if not kind or not len(points) or starter.transformed:
         return None
     ids, coordinates = groups.placed
@@ -198,7 +199,7 @@ def _near(
             return None
         points[0] = coordinates[ids == node][0]
     with np.errstate(invalid="ignore", over="ignore"):  # fields that are not a number
-        distance = _distance(kind, coordinates, points, diameter / 2)
+        distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
         return None
     return frozenset(
@@ -206,7 +207,7 @@ def _near(
     )
 
 
-def _distance(
+def _compute_distance(
     kind: str, coordinates: Reals, points: Reals, radius: float
 ) -> Reals | None:
     """Return the distance of nodes (n, 3) in front of a wall; None if its geometry is incomplete."""
@@ -232,8 +233,8 @@ def _distance(
 # Initial velocities.
 
 
-def _of_velocities(
-    run: Run, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
+def _check_velocities(
+    run: RadiossRun, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
     """Yield flaws of bodies with moving nodes whose main node is in no /INIVEL.
 
@@ -241,10 +242,10 @@ def _of_velocities(
     """
     velocities: list[tuple[Card, int, frozenset[int]]] = []
     for card in starter.named("INIVEL"):
-        group, nodes = _moved(card)
+        group, nodes = _read_moved_nodes(card)
         members = nodes or groups.members(group)
         if members is None:
-            yield _unknown(group, f"/{card.name}", card.here)
+            yield _make_unknown(group, f"/{card.name}", card.here)
             return
         velocities.append((card, group, members))
     started = run.legs[0].starts if run.legs else []
@@ -253,13 +254,16 @@ def _of_velocities(
     resting = [
         body
         for body in resting
-        if not any(_reached(start, groups, _within(body, groups)) for start in started)
+        if not any(
+            _find_moved_nodes(start, groups, _get_body_nodes(body, groups))
+            for start in started
+        )
     ]
     for card, group, nodes in velocities:
-        held = [body for body in resting if nodes & _within(body, groups)]
+        held = [body for body in resting if nodes & _get_body_nodes(body, groups)]
         if held:
-            mains = ", ".join(in_rows(body.node.value for body in held))
-            problem = f"/{card.name} moves nodes of {_numbered(held)}, but no /INIVEL moves the main node ({mains})"
+            mains = ", ".join(format_ranges(body.node.value for body in held))
+            problem = f"/{card.name} moves nodes of {_name_bodies(held)}, but no /INIVEL moves the main node ({mains})"
             why = "the starter gives all nodes of a body the velocity of its main node, even if it is off, so they rest"
             yield Flaw(
                 AT_REST,
@@ -269,7 +273,7 @@ def _of_velocities(
             )
 
 
-def _moved(card: Card) -> tuple[int, frozenset[int]]:
+def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
     """Return the node group of an /INIVEL, or the nodes that it lists; neither if it moves nothing at the start."""
     kind = "".join(card.name.split("/")[1:2])
     rows = card.rows[1:]
@@ -280,16 +284,18 @@ def _moved(card: Card) -> tuple[int, frozenset[int]]:
     axis = kind == "AXIS"
     if kind == "FVM" or len(rows) < 1 + axis:
         return 0, frozenset()
-    speeds = reals(rows[axis], 3 + axis)
+    speeds = read_reals(rows[axis], 3 + axis)
     later = rows[1 + axis : 2 + axis]
     if not any(speeds) or any(
-        reals(row, 1)[0] or card.integer(row, 2).value for row in later
+        read_reals(row, 1)[0] or card.integer(row, 2).value for row in later
     ):
         return 0, frozenset()
     return card.integer(rows[0], 2 if axis else 6).value, frozenset()
 
 
-def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator[Flaw]:
+def _check_starts(
+    run: RadiossRun, groups: NodeGroups, bodies: Sequence[Body]
+) -> Iterator[Flaw]:
     """Yield flaws of bodies that are on in a leg whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
@@ -298,18 +304,20 @@ def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator
             on = on | leg_nodes if rigid else on - leg_nodes
         mains = frozenset(body.node.value for body in bodies if body.node.value in on)
         resting = mains - frozenset().union(
-            *(_reached(start, groups, mains) for start in leg.starts)
+            *(_find_moved_nodes(start, groups, mains) for start in leg.starts)
         )
         for start in leg.starts:
             if groups.members(start.group) is None:
-                yield _unknown(start.group, f"/{start.card.name}", start.card.here)
+                yield _make_unknown(start.group, f"/{start.card.name}", start.card.here)
             held = [body for body in bodies if body.node.value in resting]
             held = [
-                body for body in held if _reached(start, groups, _within(body, groups))
+                body
+                for body in held
+                if _find_moved_nodes(start, groups, _get_body_nodes(body, groups))
             ]
             if held:
                 problem = (
-                    f"/{start.card.name} moves nodes of {_numbered(held)}, which is on in engine file {leg.number}, "
+                    f"/{start.card.name} moves nodes of {_name_bodies(held)}, which is on in engine file {leg.number}, "
                     f"but not the main node"
                 )
                 why = "a body that is on has the velocity of its main node, so it does not move"
@@ -320,7 +328,9 @@ def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator
                 )
 
 
-def _reached(start: Start, groups: NodeGroups, nodes: frozenset[int]) -> frozenset[int]:
+def _find_moved_nodes(
+    start: InitialVelocity, groups: NodeGroups, nodes: frozenset[int]
+) -> frozenset[int]:
     """Return the nodes among ``nodes`` that an /INIV moves."""
     listed = (
         node

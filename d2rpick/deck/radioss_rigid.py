@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.graph import reached
+from d2rpick.base.graph import find_reachable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -103,7 +103,7 @@ def make_rigid_bodies(
             )
 
     def find_top(node: int) -> int:
-        return reached(
+        return find_reachable(
             [node],
             lambda node_above: [mains[node_above]] if node_above in mains else [],
         )[-1]
@@ -119,7 +119,7 @@ def make_rigid_bodies(
     for body in bodies:
         node = body.node.value
         if node not in mains:
-            by_node[node] = body._replace(group=_unite(members[node], groups))
+            by_node[node] = body._replace(group=_join_groups(members[node], groups))
     joined_to = {
         node: by_node[find_top(node)] for node in mains if find_top(node) in by_node
     }
@@ -149,7 +149,7 @@ def _add_main_nodes(
         )
 
 
-def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:
+def _join_groups(members: Sequence[Group], groups: dict[int, Group]) -> int:
     """Return the id of a node group that contains all members, and add it to ``groups``."""
     if not members:
         return 0
@@ -158,13 +158,13 @@ def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:
     ids: list[int] = []
     for kind, numbers in members:
         if kind == "NODE":
-            ids.append(_add((kind, numbers), groups))
+            ids.append(_add_group((kind, numbers), groups))
         else:
             ids += numbers
-    return _add(("GRNOD", tuple(ids)), groups)
+    return _add_group(("GRNOD", tuple(ids)), groups)
 
 
-def _add(group: Group, groups: dict[int, Group]) -> int:
+def _add_group(group: Group, groups: dict[int, Group]) -> int:
     """Add a node group under an unused id and return the id; ids of groups of parts are below twice `MADE_HERE`."""
     number = 2 * MADE_HERE + len(groups)
     groups[number] = group

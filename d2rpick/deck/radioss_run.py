@@ -14,29 +14,34 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.deck.card import Field, Value
+from d2rpick.base.errors import DeckError, choose_verb, format_ranges, name_units
+from d2rpick.deck.card import CardField, Value
 from d2rpick.deck.radioss_deck import (
-    Leg,
+    RadiossLeg,
     Starter,
-    blocks,
-    card_of,
-    kept_off,
-    keyword,
+    find_bodies_kept_off,
+    make_card,
+    read_blocks,
     read_legs,
+    split_keyword,
 )
-from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
-from d2rpick.deck.radioss_sensors import Course, active_spans, inactive, only_force
-from d2rpick.deck.reader import Deck, Unread, why_unread
+from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, is_radioss, list_run_files
+from d2rpick.deck.radioss_sensors import (
+    Course,
+    find_active_spans,
+    has_only_one_force,
+    invert_spans,
+)
+from d2rpick.deck.reader import Deck, Unread, explain_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import (
-    Event,
     Switched,
+    SwitchEvent,
     SwitchSet,
+    SwitchWindow,
     Unit,
-    Window,
     Windows,
-    follow,
+    follow_unit,
 )
 
 if TYPE_CHECKING:
@@ -50,7 +55,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(eq=False, repr=False)
-class Run:
+class RadiossRun:
     """A Radioss run: its starter deck (if found) and its legs in the order of their numbers.
 
     ``deck`` lists its files.
@@ -58,7 +63,7 @@ class Run:
 
     deck: Deck
     starter: Starter | None = None
-    legs: list[Leg] = field(default_factory=list)
+    legs: list[RadiossLeg] = field(default_factory=list)
     # Includes by path: a file that is included twice is read once.
     included: dict[str, SourceFile] = field(default_factory=dict)
 
@@ -90,7 +95,7 @@ class Run:
         )
 
 
-def read_run(path: str, content: bytes | None = None) -> Run:
+def read_run(path: str, content: bytes | None = None) -> RadiossRun:
     """Read a run from its files, or from ``content``.
 
     Raises
@@ -98,12 +103,12 @@ def read_run(path: str, content: bytes | None = None) -> Run:
     DeckError
         If a file cannot be read, or is neither a starter deck nor an engine file.
     """
-    run = Run(Deck(path))
-    files = run_files(path) if content is None else []
+    run = RadiossRun(Deck(path))
+    files = list_run_files(path) if content is None else []
     for name in files or [path]:
         source = SourceFile(name, content)
         head = source.read(0, HEAD)
-        if not recognises(head):
+        if not is_radioss(head):
             raise DeckError(
                 f"{name}: no /BEGIN or /RUN was found, expected a file of a Radioss run"
             )
@@ -115,7 +120,7 @@ def read_run(path: str, content: bytes | None = None) -> Run:
             _read_starter(source, run, ())
         else:
             run.deck.ends += [
-                (block, False) for block in blocks(source) if block.end is None
+                (block, False) for block in read_blocks(source) if block.end is None
             ]
     run.legs.sort(key=lambda leg: leg.number)
     run.deck.cards += [leg.run for leg in run.legs]
@@ -123,24 +128,26 @@ def read_run(path: str, content: bytes | None = None) -> Run:
     return run
 
 
-def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -> None:
     """Add a file of the starter deck and its includes."""
     if run.starter is None:
         return
     run.starter.sources.append(source)
-    for block in blocks(source):
-        words = keyword(block)
+    for block in read_blocks(source):
+        words = split_keyword(block)
         if block.end is None:
             run.deck.ends.append((block, not chain))
         if not words:
-            _include(card_of(block), source, run, chain)
+            _read_include(make_card(block), source, run, chain)
         else:
             run.starter.blocks.append(block)
             if words[0] == "RBODY":
-                run.deck.cards.append(card_of(block))
+                run.deck.cards.append(make_card(block))
 
 
-def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+def _read_include(
+    card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
+) -> None:
     """Add the file that an #include names, or record that it was not read."""
     from pathlib import Path  # not above: start-up
 
@@ -150,7 +157,7 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
     paths = (str(folder / name) for folder in folders)
     candidates = (path for path in paths if os.path.isfile(path))  # noqa: PTH113  long names
     path, chain = next(candidates, None), (*chain, os.path.realpath(source.name))
-    if reason := why_unread(path, chain):
+    if reason := explain_unread(path, chain):
         run.deck.unread.append(Unread(card.here._replace(text=name), reason))
     elif path is not None:
         if path not in run.included:
@@ -164,7 +171,7 @@ class LegSwitch(SwitchSet):
     """Bodies that are switched when a leg begins, at time ``at``; ``stop_field`` is the field with that time."""
 
     at: float = 0.0
-    stop_field: Field | None = None
+    stop_field: CardField | None = None
 
     @cached_property
     def time(self) -> float | None:
@@ -172,7 +179,7 @@ class LegSwitch(SwitchSet):
         return self.at
 
     @property
-    def time_field(self) -> Field:
+    def time_field(self) -> CardField:
         """Return the field with the end of the previous leg, or the keyword in the first leg."""
         return self.stop_field or self.card.here
 
@@ -186,7 +193,7 @@ class RunWindows:
     parts: dict[int, set[int]] = field(default_factory=dict)
 
 
-def in_order(legs: list[Leg]) -> bool:
+def is_in_order(legs: list[RadiossLeg]) -> bool:
     """Return True if the legs are complete from the first one on, and each ends at a known time.
 
     No leg may end before the previous one.
@@ -206,7 +213,7 @@ def in_order(legs: list[Leg]) -> bool:
 
 
 def find_run_windows(
-    run: Run, contacts: Contacts | None = None, forces: Forces | None = None
+    run: RadiossRun, contacts: Contacts | None = None, forces: Forces | None = None
 ) -> RunWindows:
     """Return the windows of every body that a leg or a sensor switches.
 
@@ -214,7 +221,7 @@ def find_run_windows(
     For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
     in which an interface or wall has a force; None if no history shows them.
     """
-    sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
+    sets = tuple(_list_switches(run.legs)) if is_in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
     bodies = {body.node.value: body for body in starter.bodies} if starter else {}
     lines = [line.part for leg_switch in sets for line in leg_switch.switched]
@@ -224,14 +231,14 @@ def find_run_windows(
     groups = {
         node: bodies[node].group for node in (*switched, *sensors) if node in bodies
     }
-    parts = rigid_parts(starter, groups) if starter and groups else {}
-    windows: list[Window] = []
+    parts = find_rigid_parts(starter, groups) if starter and groups else {}
+    windows: list[SwitchWindow] = []
     for node in sorted(switched):
         if not bodies or (node in bodies and not bodies[node].sensor):
-            for unit in _units(node, parts):
-                windows += _follow(unit, node, sets, run.legs[0])
+            for unit in _list_units(node, parts):
+                windows += _follow_body(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
-        windows += _by_sensor(
+        windows += _follow_sensor(
             run,
             bodies[node],
             parts,
@@ -239,7 +246,7 @@ def find_run_windows(
         )
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
-            windows.append(_always(body))
+            windows.append(_make_window_of_rigid_part(body))
     windows.sort(key=lambda window: (window.unit, window.tr))
     events = tuple(
         event for window in windows for event in (window.opened, window.closed) if event
@@ -249,9 +256,9 @@ def find_run_windows(
     )
 
 
-def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
+def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
     """Yield the cards of all legs that switch bodies, with their times."""
-    previous: Leg | None = None
+    previous: RadiossLeg | None = None
     for leg in legs:
         if previous:
             time, stop_field = (previous.stop.value, previous.stop.field)
@@ -265,20 +272,25 @@ def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
         previous = leg
 
 
-def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
+def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
     """Return the parts of a body as units, or the body itself."""
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [
         Unit(node, is_body=True)
     ]
 
 
-def _follow(
-    unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg
-) -> list[Window]:
+def _follow_body(
+    unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
+) -> list[SwitchWindow]:
     """Return the windows of a unit of a body, which is on from the start unless the first leg deactivates it."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
-        (0.0, Event(unit, start, Switched(Value(node, first.run.here), False, True)))
+        (
+            0.0,
+            SwitchEvent(
+                unit, start, Switched(Value(node, first.run.here), False, True)
+            ),
+        )
     ]
     for leg_switch in sets:
         for line in [line for line in leg_switch.switched if line.part.value == node][
@@ -290,16 +302,16 @@ def _follow(
                 and events[-1][1].line.to_rigid
             ):
                 events.pop()  # this card repeats the default
-            events.append((leg_switch.at or 0.0, Event(unit, leg_switch, line)))
+            events.append((leg_switch.at or 0.0, SwitchEvent(unit, leg_switch, line)))
     return [
         window
-        for window in follow(unit, events)[0]
+        for window in follow_unit(unit, events)[0]
         if window.td is None or window.td > 0
     ]
 
 
 def find_course(
-    run: Run,
+    run: RadiossRun,
     parts: Collection[int],
     contacts: Contacts | None,
     forces: Forces | None = None,
@@ -309,29 +321,29 @@ def find_course(
         contacts is not None
         and parts
         and run.starter is not None
-        and only_force(run.starter)
+        and has_only_one_force(run.starter)
     )
     spans = contacts(parts) if has_contacts and contacts else None
     return Course(run.resets, spans, forces)
 
 
-def _by_sensor(
-    run: Run, body: Body, parts: dict[int, set[int]], course: Course
-) -> Iterator[Window]:
+def _follow_sensor(
+    run: RadiossRun, body: Body, parts: dict[int, set[int]], course: Course
+) -> Iterator[SwitchWindow]:
     """Yield the windows of a body with a sensor: it is rigid while the sensor is inactive."""
-    active = active_spans(run.starter, body.sensor, course) if run.starter else ""
+    active = find_active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
-    end = run.legs[-1].stop.value if run.legs and in_order(run.legs) else math.inf
+    end = run.legs[-1].stop.value if run.legs and is_in_order(run.legs) else math.inf
     spans = [
         (start, stop if stop < end else math.inf)
-        for start, stop in inactive(active)
+        for start, stop in invert_spans(active)
         if start < end
     ]
-    for unit in _units(body.node.value, parts):
+    for unit in _list_units(body.node.value, parts):
         for span in spans:
             opened, closed = (
-                Event(
+                SwitchEvent(
                     unit,
                     LegSwitch(body.card, "plain", None, (), (), at=at),
                     Switched(body.node, False, rigid),
@@ -339,7 +351,7 @@ def _by_sensor(
                 for at, rigid in zip(span, (True, False), strict=True)
             )
             ends = span[1] < math.inf
-            yield Window(
+            yield SwitchWindow(
                 unit,
                 span[0],
                 span[1] if ends else None,
@@ -348,16 +360,18 @@ def _by_sensor(
             )
 
 
-def _always(body: Body) -> Window:
+def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
     """Return the window of a part that the starter makes rigid (Irigid) and nothing switches."""
     unit = Unit(body.part)
     by = LegSwitch(body.card, "plain", None, (), ())
-    return Window(
-        unit, 0.0, None, Event(unit, by, Switched(body.node, False, True)), None
+    return SwitchWindow(
+        unit, 0.0, None, SwitchEvent(unit, by, Switched(body.node, False, True)), None
     )
 
 
-def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
+def find_rigid_parts(
+    starter: Starter, bodies: Mapping[int, int]
+) -> dict[int, set[int]]:
     """Return the parts that lie completely in the group of each body: named by it, or with all nodes in it.
 
     Parameters
@@ -384,25 +398,25 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
     if incomplete:
-        from d2rpick.deck.mesh import parts_within  # loads numpy
+        from d2rpick.deck.mesh import find_parts_within  # loads numpy
 
-        for node, parts in parts_within(starter, incomplete).items():
+        for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
     return whole_parts
 
 
-def parts_off(run: Run) -> tuple[int, ...]:
+def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
     """Return the parts of the bodies that the first leg deactivates, ascending; empty without a starter deck."""
-    nodes = kept_off(run.legs[:1])
+    nodes = find_bodies_kept_off(run.legs[:1])
     bodies = run.starter.bodies if run.starter else ()
     groups = {
         body.node.value: body.group for body in bodies if body.node.value in nodes
     }
-    held = rigid_parts(run.starter, groups) if run.starter and groups else {}
+    held = find_rigid_parts(run.starter, groups) if run.starter and groups else {}
     return tuple(sorted(set().union(*held.values())))
 
 
-def find_parts_of_fixed_bodies(run: Run) -> set[int]:
+def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
     """Return the parts of the bodies that are on all the time, because no leg and no sensor switches them.
 
     Without engine files all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
@@ -413,7 +427,9 @@ def find_parts_of_fixed_bodies(run: Run) -> set[int]:
         if not body.sensor and body.node.value not in run.named and (run.legs or body.part)
     ]  # fmt: skip
     if run.starter and fixed:
-        held = rigid_parts(run.starter, {body.node.value: body.group for body in fixed})
+        held = find_rigid_parts(
+            run.starter, {body.node.value: body.group for body in fixed}
+        )
     else:
         held = {}
     return set().union(*held.values())
@@ -427,7 +443,7 @@ def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
         if body.sensor and not starter.moved
     }
     if sensors:
-        held = rigid_parts(
+        held = find_rigid_parts(
             starter, {node: body.group for node, body in sensors.items()}
         )
     else:
@@ -441,12 +457,14 @@ class LeftRigid(NamedTuple):
     """Parts that stay rigid in a run that switches others, the place of the cure, the problem and the cure."""
 
     parts: tuple[int, ...]
-    place: Field
+    place: CardField
     found: str
     way_out: str
 
 
-def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
+def find_left_rigid(
+    run: RadiossRun, windows: Sequence[SwitchWindow]
+) -> LeftRigid | None:
     """Return the bodies that no leg names and that contain whole parts, in a run with ``windows``.
 
     None if there are none.
@@ -459,7 +477,7 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
         if not body.sensor and body.node.value not in run.named
     ]
     if bodies:
-        parts = rigid_parts(
+        parts = find_rigid_parts(
             run.starter, {body.node.value: body.group for body in bodies}
         )
     else:
@@ -471,11 +489,9 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
     if not rigid_parts_listed:
         return None
     switch_fields = [card.here for card, _, _ in run.legs[0].switched]
-    mains = in_rows(body.node.value for body in bodies)
-    rigid = f"{name_units(rigid_parts_listed)} {are(rigid_parts_listed)} rigid"
-    problem = (
-        f"no engine file switches {_names(bodies)}, so {rigid} from time 0 to the end"
-    )
+    mains = format_ranges(body.node.value for body in bodies)
+    rigid = f"{name_units(rigid_parts_listed)} {choose_verb(rigid_parts_listed)} rigid"
+    problem = f"no engine file switches {_list_body_names(bodies)}, so {rigid} from time 0 to the end"
     cure = f"list main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every engine file"
     if new_nodes := [
         body.node.value for body in bodies if body.node.field.text in ("", "0")
@@ -489,11 +505,11 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
     )
 
 
-def _names(bodies: Sequence[Body]) -> str:
+def _list_body_names(bodies: Sequence[Body]) -> str:
     """Return the names of bodies: by their ids, or by the parts of rigid parts."""
     ids = [body.id for body in bodies if body.id]
     parts = sorted(body.part for body in bodies if body.part)
-    names = [f"/RBODY {', '.join(in_rows(ids))}"] * bool(ids)
+    names = [f"/RBODY {', '.join(format_ranges(ids))}"] * bool(ids)
     names += [
         f"the rigid {'bodies' if len(parts) > 1 else 'body'} of {name_units(parts)}"
     ] * bool(parts)

@@ -12,9 +12,9 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.graph import reached
+from d2rpick.base.graph import find_reachable
 from d2rpick.deck.card import Row
-from d2rpick.deck.radioss_deck import Starter, below_title, reals
+from d2rpick.deck.radioss_deck import Starter, get_lines_below_title, read_reals
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -58,7 +58,7 @@ class Course(NamedTuple):
 _UNKNOWN: Final = Course()
 
 
-def active_spans(
+def find_active_spans(
     starter: Starter,
     number: int,
     course: Course = _UNKNOWN,
@@ -72,15 +72,15 @@ def active_spans(
     card = starter.sensors.get(number)
     if card is None or number in above:
         return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows = below_title(card)
+    rows = get_lines_below_title(card)
     kind = card.words[1]
     if kind in _OF_FORCES:
-        return _while_pushed(starter, number, rows, course)
+        return _find_forced_spans(starter, number, rows, course)
     if kind not in ("TIME", "OR", "AND", "NOT"):
         return f"sensor {number} (/SENSOR/{kind}), which is not a time sensor"
     if kind == "TIME":
-        delay = reals(rows[0], 1)[0] if rows else 0.0
-        stop = reals(rows[1], 1)[0] if len(rows) > 1 else 0.0
+        delay = read_reals(rows[0], 1)[0] if rows else 0.0
+        stop = read_reals(rows[1], 1)[0] if len(rows) > 1 else 0.0
         if math.isnan(delay) or math.isnan(stop):
             return f"sensor {number}, whose time is no number"
         stop = min(
@@ -93,7 +93,7 @@ def active_spans(
         card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)
     ]
     spans_of_inputs = [
-        active_spans(starter, sensor_input, course, (*above, number))
+        find_active_spans(starter, sensor_input, course, (*above, number))
         for sensor_input in input_ids
     ]
     for sensor_input in spans_of_inputs:
@@ -105,15 +105,15 @@ def active_spans(
         if not isinstance(sensor_input, str)
     ]
     if kind == "OR":
-        return either(known_spans)
-    return inactive(
-        either([inactive(sensor_input) for sensor_input in known_spans])
+        return join_spans(known_spans)
+    return invert_spans(
+        join_spans([invert_spans(sensor_input) for sensor_input in known_spans])
         if kind == "AND"
         else known_spans[0]
     )
 
 
-def _while_pushed(
+def _find_forced_spans(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
     """Follow a sensor of any force: active from the force on, or Tmin later, to Tdelay after it."""
@@ -125,15 +125,15 @@ def _while_pushed(
     contacts = course.find_contacts(_OF_FORCES[keyword], entity)
     if contacts is None:
         return name
-    lowest, highest, needed = reals(
+    lowest, highest, needed = read_reals(
         Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3
     )
-    wait = reals(rows[0], 1)[0]
+    wait = read_reals(rows[0], 1)[0]
     if not (lowest < 0 and highest == 0) or math.isnan(wait + needed):
         return f"{name} of a size that is not followed"
     if number in course.resets:
         return f"{name} and is reset"
-    return either(
+    return join_spans(
         [
             tuple(
                 (start + needed, (end + wait) * (1 + _SINGLE))
@@ -152,27 +152,35 @@ def find_contacts_of_sensor(
     None if it waits for none, or if no history shows it.
     """
     force_spans = []
-    for sensor in reached([number], lambda asking: _asked(starter, asking)):
+    for sensor in find_reachable(
+        [number], lambda asking: _list_inputs(starter, asking)
+    ):
         card = starter.sensors.get(sensor)
-        rows = below_title(card) if card and card.words[1] in _OF_FORCES else ()
+        rows = (
+            get_lines_below_title(card) if card and card.words[1] in _OF_FORCES else ()
+        )
         if card and len(rows) > 1:
             kind = _OF_FORCES[card.words[1]]
             entity = card.integer(rows[1], 0).value
             force_spans.append(course.find_contacts(kind, entity))
     spans = [contacts for contacts in force_spans if contacts is not None]
-    return either(spans) if spans else None
+    return join_spans(spans) if spans else None
 
 
-def _asked(starter: Starter, number: int) -> Sequence[int]:
+def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
     """Sensors that another one asks for."""
     card = starter.sensors.get(number)
-    rows = below_title(card) if card and card.words[1] in ("OR", "AND", "NOT") else ()
+    rows = (
+        get_lines_below_title(card)
+        if card and card.words[1] in ("OR", "AND", "NOT")
+        else ()
+    )
     if card and len(rows) > 1:
         return [card.integer(rows[1], at).value for at in range(2)]
     return []
 
 
-def only_force(starter: Starter) -> bool:
+def has_only_one_force(starter: Starter) -> bool:
     """Return True if a deck has only one contact or rigid wall, so that the momenta show the force of that one."""
     contacts = [
         card
@@ -182,7 +190,7 @@ def only_force(starter: Starter) -> bool:
     return len(contacts) + len(starter.named("RWALL")) == 1
 
 
-def either(several: Sequence[Spans]) -> Spans:
+def join_spans(several: Sequence[Spans]) -> Spans:
     """Return the spans in which at least one of several sensors is active."""
     joined: list[tuple[float, float]] = []
     for start, stop in sorted(span for spans in several for span in spans):
@@ -193,7 +201,7 @@ def either(several: Sequence[Spans]) -> Spans:
     return tuple(joined)
 
 
-def inactive(spans: Spans) -> Spans:
+def invert_spans(spans: Spans) -> Spans:
     """Return the spans in which a sensor is not active."""
     ends = [0.0, *(end for span in spans for end in span), math.inf]
     pairs = zip(ends[::2], ends[1::2], strict=True)

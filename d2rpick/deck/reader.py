@@ -18,7 +18,7 @@ from d2rpick.deck.card import (
     LONG,
     STANDARD,
     Card,
-    Field,
+    CardField,
     Problem,
     Row,
     Scope,
@@ -100,7 +100,7 @@ _WITH_VALUES: Final = (
 class Unread(NamedTuple):
     """An include that was not read: its name as written, and the reason."""
 
-    name: Field
+    name: CardField
     reason: str
 
 
@@ -108,24 +108,26 @@ class Restart(NamedTuple):
     """The start of a restart [time of the run], and the field with that time."""
 
     at: float
-    stop_field: Field
+    stop_field: CardField
 
 
-def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
+def _read_include_card(
+    card: Card,
+) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
     """Yield for each file of an ``*INCLUDE`` card its name, its transform, and the unreadable fields of the transform.
 
     ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
     """
-    names = _names(card)
+    names = _read_file_names(card)
     if card.name == "INCLUDE":
         yield from ((name, card.transform, ()) for name, _ in names)
     elif first := next(names, None):
         name, rows = first
-        transform, problems = _transform(card, rows)
+        transform, problems = _read_transform(card, rows)
         yield name, transform.inside(card.transform), problems
 
 
-def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
+def _read_file_names(card: Card) -> Iterator[tuple[CardField, list[Row]]]:
     """Yield each file name and the rows after it.
 
     A name that ends with blank and plus continues on the next line; parameters in it are replaced.
@@ -144,7 +146,9 @@ def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
         )
 
 
-def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
+def _read_transform(
+    card: Card, rows: list[Row]
+) -> tuple[Transform, tuple[Problem, ...]]:
     """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank and a factor of 0 mean no change."""
     positions = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
     offsets = [
@@ -176,14 +180,14 @@ def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, .
     ), problems
 
 
-def _folder(file: str) -> Path:
+def _get_folder(file: str) -> Path:
     """Return the folder of a file."""
     from pathlib import Path  # not above: only decks with includes need it
 
     return Path(file).parent
 
 
-def _portable(name: str) -> str:
+def _make_portable(name: str) -> str:
     """Return a file name with forward slashes."""
     return name.replace("\\", "/")
 
@@ -227,7 +231,7 @@ class Deck:
         """Return the cards by name and by each beginning of the name before an ``_``: every rule asks for some."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
-            for name in _stems(card.name):
+            for name in _list_stems(card.name):
                 cards_by_name[name].append(card)
         return cards_by_name
 
@@ -266,7 +270,7 @@ class Deck:
 
 
 @lru_cache(1024)  # decks use the same keywords
-def _stems(name: str) -> tuple[str, ...]:
+def _list_stems(name: str) -> tuple[str, ...]:
     """Return a name and each beginning of it before an ``_``."""
     return tuple(
         name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_")
@@ -341,7 +345,7 @@ class _Reader:
             if block.encrypted:
                 self.deck.encrypted.append(block)
                 continue
-            name, suffix = _keyword(block.head)
+            name, suffix = _parse_keyword(block.head)
             if (
                 name == "KEYWORD"
                 and "=" in block.head
@@ -380,8 +384,8 @@ class _Reader:
             context.scope.define(card.name, card.rows)
         elif card.name in _PATHS:
             self.folders += [
-                _folder(self.deck.path) / _portable(name.text)
-                for name, _ in _names(card)
+                _get_folder(self.deck.path) / _make_portable(name.text)
+                for name, _ in _read_file_names(card)
             ]
         elif card.name.startswith("INCLUDE"):
             self.deck.included.append(card)
@@ -394,11 +398,11 @@ class _Reader:
         if card.name not in _READ_INCLUDES:
             self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
-        for name, transform, problems in _asked_by(card):
+        for name, transform, problems in _read_include_card(card):
             self.deck.problems += problems
             path = self.find(name)
             chain = (*context.chain, os.path.realpath(card.file))
-            if reason := why_unread(path, chain):
+            if reason := explain_unread(path, chain):
                 self.deck.unread.append(Unread(name, reason))
             elif path is not None:
                 if path not in self.sources:
@@ -408,17 +412,21 @@ class _Reader:
                     _Context(Scope(context.scope), width, transform, chain),
                 )
 
-    def find(self, name: Field) -> str | None:
+    def find(self, name: CardField) -> str | None:
         """Return the path of an include as messages should show it, or None.
 
         Programs that read decks disagree whether the folder of the main deck, *INCLUDE_PATH or the folder of the
         including file comes first. All are tried in this order, and the first file found is used.
         """
-        for folder in (_folder(self.deck.path), *self.folders, _folder(name.file)):
+        for folder in (
+            _get_folder(self.deck.path),
+            *self.folders,
+            _get_folder(name.file),
+        ):
             # the last spelling decodes the bytes as the file system does, not as Latin-1
             for spelling in (
                 name.text,
-                _portable(name.text),
+                _make_portable(name.text),
                 os.fsdecode(name.text.encode("latin-1", "replace")),
             ):
                 path = str(folder / spelling)
@@ -427,7 +435,7 @@ class _Reader:
         return None
 
 
-def why_unread(path: str | None, chain: Sequence[str]) -> str:
+def explain_unread(path: str | None, chain: Sequence[str]) -> str:
     """Return why an include is not read, or an empty text.
 
     ``chain`` are the real paths of the files that include it.
@@ -441,16 +449,16 @@ def why_unread(path: str | None, chain: Sequence[str]) -> str:
     return "" if os.access(path, os.R_OK) else "no permission to read it"
 
 
-def _keyword(head: str) -> tuple[str, str]:
+def _parse_keyword(head: str) -> tuple[str, str]:
     """Return the name of a keyword in upper case, and its format suffixes.
 
     Examples
     --------
-    >>> _keyword("*Node%")
+    >>> _parse_keyword("*Node%")
     ('NODE', '%')
-    >>> _keyword("*DEFORMABLE_TO_RIGID + hint text")
+    >>> _parse_keyword("*DEFORMABLE_TO_RIGID + hint text")
     ('DEFORMABLE_TO_RIGID', '+')
-    >>> _keyword("*ELEMENT_SOLID (ten nodes format)")
+    >>> _parse_keyword("*ELEMENT_SOLID (ten nodes format)")
     ('ELEMENT_SOLID', '')
     """
     words = head.removeprefix("*").split(maxsplit=2) if head[1:2].strip() else []
@@ -463,7 +471,7 @@ def _keyword(head: str) -> tuple[str, str]:
     return name.upper(), suffix
 
 
-def cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
+def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
     """Yield the last block of each file that seems to be truncated, and the sign of it.
 
     An include may have no *END. A main file without *END is reported if it ends within a mesh, because the program that
@@ -471,13 +479,13 @@ def cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
     """
     files = set()
     for block, main in deck.ends:
-        sign = _sign_of_cut(block, main=main)
+        sign = _find_sign_of_cut(block, main=main)
         if sign and block.source.name not in files:
             files.add(block.source.name)
             yield block, f"{sign}, so it may be truncated."
 
 
-def cure(block: Block) -> str:
+def describe_cure(block: Block) -> str:
     """Return what to do about a file that ends with this block, which `cuts` has reported."""
     if not block.source.ends_with_line():
         return "use the complete file, or end its last line"
@@ -485,12 +493,12 @@ def cure(block: Block) -> str:
     return f"use the complete file, or add {end_mark}"
 
 
-def holds_mesh(block: Block) -> bool:
+def has_mesh(block: Block) -> bool:
     """Return True if a block contains nodes or elements."""
     return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
-def _is_whole(block: Block) -> bool:
+def _has_whole_end(block: Block) -> bool:
     """Return True if a last line without line end lacks nothing: it is a comment, or a keyword without values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
@@ -503,11 +511,11 @@ def _is_whole(block: Block) -> bool:
     )
 
 
-def _sign_of_cut(block: Block, *, main: bool) -> str:
+def _find_sign_of_cut(block: Block, *, main: bool) -> str:
     """Return the sign that a file is truncated, or an empty text."""
-    mesh = holds_mesh(block)
+    mesh = has_mesh(block)
     radioss = block.head.startswith("/")
-    if not block.source.ends_with_line() and not _is_whole(block):
+    if not block.source.ends_with_line() and not _has_whole_end(block):
         return f"the file ends within a line of {'its mesh' if mesh else block.head.strip()}"
     if main and mesh:
         return f"the {'starter' if radioss else 'main'} deck ends within its mesh, without {'/' if radioss else '*'}END"

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
-from d2rpick.base.files import beyond, bound, long_line
-from d2rpick.deck.stored import HELD_UP_TO, Held, stored
+from d2rpick.base.files import bound, describe_excess, find_long_line
+from d2rpick.deck.stored import HELD_UP_TO, HeldInMemory, open_stored
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
 
-    from d2rpick.deck.stored import OnDisk
+    from d2rpick.deck.stored import DeckOnDisk
 
 
 # Bytes searched together: the buffer is reused and stays in the processor's cache.
@@ -44,7 +44,7 @@ _SILENCE: Final = (
 
 
 def find_marks(
-    file: Held | OnDisk,
+    file: HeldInMemory | DeckOnDisk,
     piece: int = _SEARCHED,
     *,
     alone: int = _ALONE,
@@ -67,7 +67,7 @@ def find_marks(
 class _Search:
     """A search of a file by several threads, each of which takes the next piece."""
 
-    def __init__(self, file: Held | OnDisk, piece: int) -> None:
+    def __init__(self, file: HeldInMemory | DeckOnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
         if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK:
             self._first = len(BYTE_ORDER_MARK)
@@ -75,7 +75,7 @@ class _Search:
             self._first = 0
         self.pieces = range(self._first, file.size, piece)
         self._room: Callable[[Iterable[int]], MutableSequence[int]] = (
-            list if len(self.pieces) == 1 else _compact
+            list if len(self.pieces) == 1 else _make_compact
         )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
@@ -106,7 +106,7 @@ class _Search:
             while (begin := next(self._waiting, None)) is not None:
                 low = max(self._first, begin - _LOOKBACK)
                 size = fill(piece, low, min(begin + self._piece, self._file.size))
-                offsets = _starred(piece, begin - low, size) + _encrypted(
+                offsets = _find_starred(piece, begin - low, size) + _find_encrypted(
                     piece, begin - low, size
                 )
                 if offsets:
@@ -136,7 +136,7 @@ class _Search:
         return marks
 
 
-def _compact(offsets: Iterable[int]) -> MutableSequence[int]:
+def _make_compact(offsets: Iterable[int]) -> MutableSequence[int]:
     """Return offsets as an array of 64-bit integers."""
     from array import (
         array,
@@ -145,7 +145,7 @@ def _compact(offsets: Iterable[int]) -> MutableSequence[int]:
     return array("q", offsets)
 
 
-def _starred(piece: bytearray, first: int, end: int) -> list[int]:
+def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
     """Return the offsets of each ``*`` that begins a line."""
     offsets = []
     at = piece.find(b"*", first, end)
@@ -153,17 +153,17 @@ def _starred(piece: bytearray, first: int, end: int) -> list[int]:
         blanks = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
         if blanks.endswith(b"\n") or (not blanks and at < _LOOKBACK):
             offsets.append(at)
-        at = _below(piece, b"*", at, end)
+        at = _find_below(piece, b"*", at, end)
     return offsets
 
 
-def _below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
+def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
     """Return the next occurrence of a letter below the line of ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
 
-def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
+def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
     # A head that continues in the next piece is found there, because that piece begins with the end of this one.
     """Return the offsets of the heads of encrypted blocks."""
     offsets = []
@@ -177,7 +177,7 @@ def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
             and preceding in (b"", b"\n")
         ):
             offsets.append(start)
-        at = _below(piece, b"G", at, end)
+        at = _find_below(piece, b"G", at, end)
     return offsets
 
 
@@ -197,14 +197,14 @@ class SourceFile:
     def __init__(
         self,
         name: str,
-        content: bytes | Held | OnDisk | None = None,
+        content: bytes | HeldInMemory | DeckOnDisk | None = None,
         piece: int = _PIECE,
     ) -> None:
         self.name, self._piece = name, piece
         if content is None:
-            content = stored(name)
+            content = open_stored(name)
         elif isinstance(content, bytes):
-            content = Held(content)
+            content = HeldInMemory(content)
         self._file = content
         # Offsets and the line numbers at them, ascending.
         self._counted = [(0, 1)]
@@ -262,9 +262,12 @@ class SourceFile:
 
     def _refuse_long_line(self, data: bytes, start: int) -> None:
         """Raise DeckError if a line is longer than the limit."""
-        if len(data) > self._longest and (at := long_line(data, self._longest)) >= 0:
+        if (
+            len(data) > self._longest
+            and (at := find_long_line(data, self._longest)) >= 0
+        ):
             raise DeckError(
-                f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}"
+                f"{self.name}:{self.line_at(start + at)}: the line has {describe_excess('LINE')}"
             )
 
     def sha256(self) -> str:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.base.files import FileState, at_rest
+from d2rpick.base.files import FileState, read_at_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ _WINDOW: Final = 1 << 16
 _KEPT: Final = 8
 
 
-class Held:
+class HeldInMemory:
     """Bytes in memory."""
 
     def __init__(self, data: bytes) -> None:
@@ -52,7 +52,7 @@ class Held:
         return len(data)
 
 
-class OnDisk:
+class DeckOnDisk:
     """Bytes of a file, read on request; DeckError if the file has changed.
 
     At least ``window`` bytes are read at a time.
@@ -86,7 +86,7 @@ class OnDisk:
 
         On leaving the context it is checked that the file is unchanged.
         """
-        with _opened(self._name) as file:
+        with _open_file(self._name) as file:
             yield lambda room, begin, end: self._fill(file, room, begin, end)
             if not FileState.of(file).is_as(self._state):
                 raise self._changed()
@@ -112,7 +112,7 @@ class OnDisk:
         return DeckError(f"{problem}; read it again when it is complete")
 
 
-def stored(name: str) -> Held | OnDisk:
+def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
     """Return the bytes of a file: in memory if it is small or not a regular file.
 
     Raises
@@ -120,12 +120,16 @@ def stored(name: str) -> Held | OnDisk:
     DeckError
         If it cannot be opened, is a device, or keeps changing.
     """
-    with _opened(name) as file:
-        state = at_rest(name, file, DeckError)
+    with _open_file(name) as file:
+        state = read_at_rest(name, file, DeckError)
     if isinstance(state, bytes):
-        return Held(state)
-    on_disk = OnDisk(name, state)
-    return Held(on_disk.read(0, state.size)) if state.size <= HELD_UP_TO else on_disk
+        return HeldInMemory(state)
+    on_disk = DeckOnDisk(name, state)
+    return (
+        HeldInMemory(on_disk.read(0, state.size))
+        if state.size <= HELD_UP_TO
+        else on_disk
+    )
 
 
 def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
@@ -136,7 +140,7 @@ def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
     return file.readinto(room)
 
 
-def _opened(name: str) -> FileIO:
+def _open_file(name: str) -> FileIO:
     """Open a file; DeckError if that fails."""
     try:
         return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back

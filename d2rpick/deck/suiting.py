@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.ls_dyna_parts import (
     Constraint,
-    element_cards,
+    find_element_cards,
     read_constraints,
     read_parts,
 )
-from d2rpick.deck.radioss_files import root_of, run_files
-from d2rpick.deck.radioss_run import Run, in_order, read_run
+from d2rpick.deck.radioss_files import find_root, list_run_files
+from d2rpick.deck.radioss_run import RadiossRun, is_in_order, read_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import read_switching
 
@@ -45,10 +45,10 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
     DeckError
         If the deck cannot be read.
     """
-    if run_files(path):
+    if list_run_files(path):
         run = read_run(path)
         legs = run.legs
-        has_end = bool(legs) and in_order(legs) and not legs[-1].sensor
+        has_end = bool(legs) and is_in_order(legs) and not legs[-1].sensor
         return Suiting(
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
@@ -56,17 +56,17 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
     bodies = [*read_constraints(deck, "nodal rigid body")]
     further = [*read_constraints(deck, "extra nodes", "joint")]
     nodal, by_set = (
-        _lie_on(constraints, parts, deck) for constraints in (bodies, further)
+        _is_on_parts(constraints, parts, deck) for constraints in (bodies, further)
     )
     return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
 
 
-def find_name_of_files(run: Run) -> str | None:
+def find_name_of_files(run: RadiossRun) -> str | None:
     """Return the common beginning of the file names of a run, by which the engine finds its restart.
 
     If the files have no common name, return the name in /RUN.
     """
-    if run.starter and (root := root_of(run.starter.sources[0].name)):
+    if run.starter and (root := find_root(run.starter.sources[0].name)):
         return root
     return run.legs[0].name if run.legs else None
 
@@ -83,18 +83,18 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
     return first, first + 1
 
 
-def _lie_on(
+def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
     """Return True if there are constraints and each lies on these parts alone, so that all of a kind may be deleted."""
     if not constraints:
         return False
-    from d2rpick.deck.ls_dyna_inventory import first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
 
-    cards = element_cards(deck, searched=True)
+    cards = find_element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)
-    nodes_on_parts = first_parts(cards, parts)
-    nodes_elsewhere = first_parts(cards, other_parts)
+    nodes_on_parts = find_first_parts(cards, parts)
+    nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(
         constraint.part in parts
         or (

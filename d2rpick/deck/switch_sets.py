@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.deck.part_sets import NO_SETS, PartSets, name_parts
-from d2rpick.deck.printed_card import shortest
+from d2rpick.deck.printed_card import write_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ _SET_HEAD = (
 _COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
 
 
-def to_rigid(
+def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
     """Yield the D2R lines of some parts or their sets, lead parts first."""
@@ -30,7 +30,9 @@ def to_rigid(
         )
 
 
-def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:
+def write_deformable_lines(
+    ids: Sequence[int], part_sets: PartSets = NO_SETS
+) -> Iterator[str]:
     """Yield the R2D lines of some parts or their set."""
     yield "$#     pid     ptype"
     yield from (f"{name:10d}{kind:>10}" for name, kind in name_parts(ids, part_sets))
@@ -69,7 +71,7 @@ class Waiting(NamedTuple):
     offset: float = 0.0
 
 
-def header(
+def write_header(
     swset: int,
     time: str,
     step_cap: str,
@@ -86,9 +88,9 @@ def header(
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     yield _SET_HEAD
     yield (
-        f"{swset:10d}{waiting.code:10d}{time:>10s}{shortest(waiting.latest):>10s}{shortest(waiting.delay):>10s}"
+        f"{swset:10d}{waiting.code:10d}{time:>10s}{write_number(waiting.latest):>10s}{write_number(waiting.delay):>10s}"
         f"{waiting.contact:10d}{waiting.other:10d}{waiting.paired:10d}"
     )
     yield _COUNT_HEAD
     nrbf, ncsf = constraints
-    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{shortest(waiting.offset):>10s}"
+    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{write_number(waiting.offset):>10s}"

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Field, Row, Value
+from d2rpick.deck.card import CardField, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck, Restart
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Card
-    from d2rpick.deck.ls_dyna_parts import Parts
+    from d2rpick.deck.ls_dyna_parts import DeckParts
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 
@@ -72,7 +72,7 @@ class Switched(NamedTuple):
     lead: Value[int] | None = None  # LRB; a D2R line only
 
 
-class Header(NamedTuple):
+class SwitchHeader(NamedTuple):
     """The two header lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; ``to_rigid`` and ``to_deformable`` are D2R and R2D."""
 
     swset: Value[int]
@@ -101,7 +101,7 @@ class SwitchSet:
 
     card: Card
     kind: Kind
-    header: Header | None
+    header: SwitchHeader | None
     switched: tuple[Switched, ...]
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
@@ -128,7 +128,7 @@ class SwitchSet:
         return header.time1.value * self.card.transform.time
 
     @property
-    def time_field(self) -> Field:
+    def time_field(self) -> CardField:
         """Return the field with the switching time, or the keyword of a card without one.
 
         It is TIME1, or the end of the run before a restart.
@@ -138,7 +138,7 @@ class SwitchSet:
         return self.header.time1.field if self.header else self.card.here
 
     @property
-    def problems(self) -> Iterator[tuple[Field, str]]:
+    def problems(self) -> Iterator[tuple[CardField, str]]:
         """Return the fields that cannot be read, with the reason."""
         return ((value.field, value.problem) for value in self.values if value.problem)
 
@@ -154,15 +154,15 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
     """Return all switching cards of a deck, in reading order."""
     kinds = ((card, _KINDS.get(card.name)) for card in deck.cards)
     return tuple(
-        _automatic(card)
+        _read_automatic(card)
         if kind == "automatic"
-        else _simple(card, kind, deck.restarts.get(card.file))
+        else _read_simple(card, kind, deck.restarts.get(card.file))
         for card, kind in kinds
         if kind is not None
     )
 
 
-def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
+def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
     """Yield cards that resemble switching cards but are none, with the keyword that was probably meant."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
@@ -172,12 +172,14 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
 
 
-def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
+def _read_simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
     """Read a card without header."""
     restart = restart if kind == "restart" else None
     rows = card.lines
     if kind == "inertia":
-        part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
+        part = (
+            [_add_offset(card.integer(rows[0], 0), card.transform.part)] if rows else []
+        )
         reals = [
             card.real(row, at)
             for row, count in zip(rows[1:], _REALS[kind], strict=False)
@@ -197,21 +199,24 @@ def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
         values = [card.real(row, at) for row in rows[:1] for at in range(4)]
         return SwitchSet(card, kind, None, (), tuple(values), restart=restart)
     to_rigid = not card.name.endswith("_R2D")
-    lines = [_line(card, row, to_rigid=to_rigid, ptype=kind == "plain") for row in rows]
-    return replace(_with(card, kind, None, lines), restart=restart)
+    lines = [
+        _read_part_line(card, row, to_rigid=to_rigid, ptype=kind == "plain")
+        for row in rows
+    ]
+    return replace(_make_switch_set(card, kind, None, lines), restart=restart)
 
 
-def _automatic(card: Card) -> SwitchSet:
+def _read_automatic(card: Card) -> SwitchSet:
     """Read a *DEFORMABLE_TO_RIGID_AUTOMATIC."""
     rows = list(card.rows)
     while rows and rows[-1].blank:
         rows.pop()
-    if missing := _missing(rows):
+    if missing := _describe_missing(rows):
         return SwitchSet(card, "automatic", None, (), (), missing)
-    header = _header(card, rows[0], rows[1])
+    header = _read_header(card, rows[0], rows[1])
     lines = rows[_HEADER_ROWS:]
     if header.to_rigid.problem or header.to_deformable.problem:
-        return _with(card, "automatic", header, [])
+        return _make_switch_set(card, "automatic", header, [])
     rigid = header.to_rigid.value
     deformable = header.to_deformable.value
     problem = ""
@@ -220,7 +225,9 @@ def _automatic(card: Card) -> SwitchSet:
             f"D2R is {rigid} and R2D is {deformable}, expected counts of 0 or more"
         )
     elif len(lines) != rigid + deformable:
-        problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))}"
+        problem = (
+            f"D2R is {rigid} and R2D is {deformable}, but {_count_lines(len(lines))}"
+        )
         problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
         short = (
@@ -234,44 +241,46 @@ def _automatic(card: Card) -> SwitchSet:
     rigid = max(rigid, 0)
     deformable = max(deformable, 0)
     switched = [
-        _line(card, row, to_rigid=True, ptype=True)
+        _read_part_line(card, row, to_rigid=True, ptype=True)
         for row in lines[:rigid]
         if not row.blank
     ]
     back = lines[rigid : rigid + deformable]
     switched += [
-        _line(card, row, to_rigid=False, ptype=True) for row in back if not row.blank
+        _read_part_line(card, row, to_rigid=False, ptype=True)
+        for row in back
+        if not row.blank
     ]
-    return _with(card, "automatic", header, switched, problem)
+    return _make_switch_set(card, "automatic", header, switched, problem)
 
 
-def _missing(rows: Sequence[Row]) -> str:
+def _describe_missing(rows: Sequence[Row]) -> str:
     """Return which of the two header lines are missing, also if a part line takes their place; empty if none is."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
     if not rows:
         return both_missing
-    if _is_of_part(rows[0]):
+    if _is_part_line(rows[0]):
         return f"{both_missing}, {rows[0].text.strip()!r} stands in their place"
     if len(rows) < _HEADER_ROWS:
         return "the second line (NRBF to OFFSET) is missing"
-    if _is_of_part(rows[1]):
+    if _is_part_line(rows[1]):
         return f"the second line (NRBF to OFFSET) is missing, {rows[1].text.strip()!r} stands in its place"
     return ""
 
 
-def _is_of_part(row: Row) -> bool:
+def _is_part_line(row: Row) -> bool:
     """Return True if a line has PTYPE in one of its columns."""
     return row.cell(1).upper() in _PTYPES or row.cell(2).upper() in _PTYPES
 
 
-def _lines(count: int) -> str:
+def _count_lines(count: int) -> str:
     """Return how many part lines follow, as text."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
-def _header(card: Card, first: Row, second: Row) -> Header:
+def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
     """Read the two header lines."""
     values = card.numbers(first, _FIRST_LINE) + card.numbers(second, _SECOND_LINE)
     swset, code, time1, time2, time3, entno, relsw, *further_values = values
@@ -287,14 +296,16 @@ def _header(card: Card, first: Row, second: Row) -> Header:
             problem=f"SWSET is {swset.value}, expected a positive number",
             parameters=(),
         )
-    if code.value == BY_TIME and not time1.problem and _runs_over(first):
+    if code.value == BY_TIME and not time1.problem and _is_overlong(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
         time1 = replace(time1, problem=problem, parameters=())
-    swset, relsw = (_moved(set_id, card.transform.rest) for set_id in (swset, relsw))
-    return Header(swset, code, time1, time2, time3, entno, relsw, *further_values)
+    swset, relsw = (
+        _add_offset(set_id, card.transform.rest) for set_id in (swset, relsw)
+    )
+    return SwitchHeader(swset, code, time1, time2, time3, entno, relsw, *further_values)
 
 
-def _runs_over(row: Row) -> bool:
+def _is_overlong(row: Row) -> bool:
     """Return True if the digits of TIME1 continue in the columns of TIME2, which is then not a number of its own."""
     border = 3 * row.width
     next_field = row.text[border : border + row.width].strip()
@@ -313,7 +324,7 @@ def _runs_over(row: Row) -> bool:
 _Line = tuple[Switched, Value[str]]
 
 
-def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
+def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
     """Read a part line: part, LRB on a D2R line, and PTYPE (column 21 of a D2R line, column 11 of an R2D line)."""
     if ptype:
         kind = card.word(row, 2 if to_rigid else 1, "PART")
@@ -326,7 +337,7 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
             f"PTYPE is {kind.field.text!r}, PART or PSET was expected",
         )
     by_set = kind.value == "PSET"
-    part = _moved(
+    part = _add_offset(
         card.integer(row, 0), card.transform.set_ if by_set else card.transform.part
     )
     if not part.problem and part.value <= 0:
@@ -335,21 +346,21 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
             part.field,
             f"{part.field.text!r} is not a part id; a positive number was expected",
         )
-    lead = _moved(card.integer(row, 1), card.transform.part) if to_rigid else None
+    lead = _add_offset(card.integer(row, 1), card.transform.part) if to_rigid else None
     return Switched(part, by_set, to_rigid, lead), kind
 
 
-def _moved(value: Value[int], offset: int) -> Value[int]:
+def _add_offset(value: Value[int], offset: int) -> Value[int]:
     """Add the offset of the include to an id; 0 stays 0."""
     if value.problem or not value.value or not offset:
         return value
     return replace(value, value=value.value + offset)
 
 
-def _with(
+def _make_switch_set(
     card: Card,
     kind: Kind,
-    header: Header | None,
+    header: SwitchHeader | None,
     lines: Sequence[_Line],
     count_problem: str = "",
 ) -> SwitchSet:
@@ -394,7 +405,7 @@ class Unit(NamedTuple):
         return None if self.is_set or self.is_body else self.id
 
 
-class Event(NamedTuple):
+class SwitchEvent(NamedTuple):
     """A switch of one unit by a line of a card."""
 
     unit: Unit
@@ -402,7 +413,7 @@ class Event(NamedTuple):
     line: Switched
 
 
-class Window(NamedTuple):
+class SwitchWindow(NamedTuple):
     """A rigid window of a unit from ``tr`` to ``td`` [time of the deck]; ``td`` is None if the unit stays rigid.
 
     ``td`` may be earlier than ``tr`` if the cards say so, which a rule reports.
@@ -411,8 +422,8 @@ class Window(NamedTuple):
     unit: Unit
     tr: float
     td: float | None
-    opened: Event
-    closed: Event | None
+    opened: SwitchEvent
+    closed: SwitchEvent | None
 
     @property
     def part(self) -> int | None:
@@ -426,17 +437,17 @@ class Windows(NamedTuple):
     ``other_rigid`` and ``other_deformable`` are units that are switched at unknown times (CODE 1-5, restarts).
     """
 
-    windows: tuple[Window, ...]
-    orphans: tuple[Event, ...]
-    events: tuple[Event, ...]
+    windows: tuple[SwitchWindow, ...]
+    orphans: tuple[SwitchEvent, ...]
+    events: tuple[SwitchEvent, ...]
     other_rigid: frozenset[Unit]
     other_deformable: frozenset[Unit]
 
 
 def find_windows(
     sets: Iterable[SwitchSet],
-    parts: Parts,
-    by_sensor: Iterable[tuple[float, Event]] = (),
+    parts: DeckParts,
+    by_sensor: Iterable[tuple[float, SwitchEvent]] = (),
 ) -> Windows:
     """Return the windows of every part, from the cards in the order of their times.
 
@@ -445,18 +456,18 @@ def find_windows(
     Part sets are replaced by their parts. A part that is made rigid while it is rigid (a new lead) stays in its window.
     If a part is switched back first and made rigid later, and nothing else matches, the two form one inverted window.
     """
-    events = tuple(event for card in sets for event in _events(card, parts))
-    timed: dict[Unit, list[tuple[float, Event]]] = defaultdict(list)
+    events = tuple(event for card in sets for event in _list_events(card, parts))
+    timed: dict[Unit, list[tuple[float, SwitchEvent]]] = defaultdict(list)
     for event in events:
         if event.by.time is not None:
             timed[event.unit].append((event.by.time, event))
     for time, event in by_sensor:
         timed[event.unit].append((time, event))
-    windows: list[Window] = []
-    orphans: list[Event] = []
+    windows: list[SwitchWindow] = []
+    orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
         # at equal times the switch back comes first: both at once give no window
-        unit_windows, unit_orphans = follow(
+        unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
         )
@@ -473,33 +484,33 @@ def find_windows(
     return Windows(tuple(windows), tuple(orphans), events, rigid, back)
 
 
-def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
+def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
     """Yield the events of a card, one for each part."""
     for line in card.switched:
         if line.part.problem:
             continue
         members = parts.members(line.part.value) if line.by_set else (line.part.value,)
         if members is None:
-            yield Event(Unit(line.part.value, is_set=True), card, line)
+            yield SwitchEvent(Unit(line.part.value, is_set=True), card, line)
         else:
-            yield from (Event(Unit(part), card, line) for part in members)
+            yield from (SwitchEvent(Unit(part), card, line) for part in members)
 
 
-def follow(
-    unit: Unit, events: Iterable[tuple[float, Event]]
-) -> tuple[list[Window], list[tuple[float, Event]]]:
+def follow_unit(
+    unit: Unit, events: Iterable[tuple[float, SwitchEvent]]
+) -> tuple[list[SwitchWindow], list[tuple[float, SwitchEvent]]]:
     """Return the windows of a unit from its events in order, and the events that find it deformable already."""
-    windows: list[Window] = []
-    orphans: list[tuple[float, Event]] = []
-    opened: tuple[float, Event] | None = None
+    windows: list[SwitchWindow] = []
+    orphans: list[tuple[float, SwitchEvent]] = []
+    opened: tuple[float, SwitchEvent] | None = None
     for time, event in events:
         if event.line.to_rigid:
             opened = opened or (time, event)
         elif opened:
-            windows.append(Window(unit, opened[0], time, opened[1], event))
+            windows.append(SwitchWindow(unit, opened[0], time, opened[1], event))
             opened = None
         else:
             orphans.append((time, event))
     if opened:
-        windows.append(Window(unit, opened[0], None, opened[1], None))
+        windows.append(SwitchWindow(unit, opened[0], None, opened[1], None))
     return windows, orphans

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.ls_dyna_parts import Parts, material_of, read_sections
+from d2rpick.deck.ls_dyna_parts import DeckParts, name_material, read_sections
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,11 +62,13 @@ class Unswitchable(NamedTuple):
     reason: str
 
 
-def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
+def find_unswitchable_in_ls_dyna(
+    deck: Deck, parts: DeckParts
+) -> dict[int, Unswitchable]:
     """Return the parts of an LS-DYNA deck that must not be switched, by part id, from their sections and materials."""
     sections = read_sections(deck)
     laws = {
-        material_of(card, card.data[0], 0): card.name
+        name_material(card, card.data[0], 0): card.name
         for card in deck.named("MAT")
         if card.data
     }
@@ -75,45 +77,47 @@ def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitch
         section = sections.get(parts.sections.get(part, 0))
         law = laws.get(material, "").removesuffix("_TITLE")
         if section and section.kind == "SOLID" and section.elform in _FLOWING:
-            reasons[part] = _flowing(
+            reasons[part] = _make_flowing(
                 f"{_FLOWING[section.elform]}, ELFORM {section.elform}"
             )
         elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
-            reasons[part] = _with_reference(f"*{law}")
+            reasons[part] = _make_with_reference(f"*{law}")
     return reasons
 
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
     from d2rpick.deck.radioss_deck import (
-        number_of,
+        get_number,
     )  # not above: only Radioss decks need it
 
     flowing = {
-        number_of(card, 2): card.words[0]
+        get_number(card, 2): card.words[0]
         for card in starter.named("ALE", "EULER")
         if card.words[1:2] == ("MAT",)
     }
     laws = {
-        number_of(card, 2): card.words[1]
+        get_number(card, 2): card.words[1]
         for card in starter.named("MAT")
         if card.words[2:]
     }
-    strains = _strains(starter)
+    strains = _read_strain_flags(starter)
     reasons: dict[int, Unswitchable] = {}
     for part, line in starter.parts.items():
         if line.material in flowing:
-            reasons[part] = _flowing(f"/{flowing[line.material]}/MAT/{line.material}")
+            reasons[part] = _make_flowing(
+                f"/{flowing[line.material]}/MAT/{line.material}"
+            )
         elif laws.get(line.material) in _LAWS_WITH_REFERENCE:
-            reasons[part] = _with_reference(f"/MAT/{laws[line.material]}")
+            reasons[part] = _make_with_reference(f"/MAT/{laws[line.material]}")
         elif strains.get(line.prop, 0) in _TOTAL_STRAIN:
-            reasons[part] = _with_reference(f"Ismstr {strains[line.prop]}")
+            reasons[part] = _make_with_reference(f"Ismstr {strains[line.prop]}")
     return reasons
 
 
-def _strains(starter: Starter) -> Mapping[int, int]:
+def _read_strain_flags(starter: Starter) -> Mapping[int, int]:
     """Return the Ismstr of the properties of solids, by property id."""
-    from d2rpick.deck.radioss_deck import SOLIDS, below_title, number_of
+    from d2rpick.deck.radioss_deck import SOLIDS, get_lines_below_title, get_number
 
     solids = [
         card
@@ -121,18 +125,18 @@ def _strains(starter: Starter) -> Mapping[int, int]:
         if card.words[2:] and card.words[1] in SOLIDS
     ]
     return {
-        number_of(card, 2): card.integer(row, _ISMSTR).value
+        get_number(card, 2): card.integer(row, _ISMSTR).value
         for card in solids
-        for row in below_title(card)[:1]
+        for row in get_lines_below_title(card)[:1]
     }
 
 
-def _flowing(how: str) -> Unswitchable:
+def _make_flowing(how: str) -> Unswitchable:
     """Return the reason for a part whose material flows."""
     return Unswitchable(True, f"its material flows through the mesh ({how})")
 
 
-def _with_reference(how: str) -> Unswitchable:
+def _make_with_reference(how: str) -> Unswitchable:
     """Return the reason for a part whose law keeps a reference."""
     return Unswitchable(
         False, f"its law keeps a stress-free reference ({how}), {_GAINS}"

@@ -10,26 +10,31 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, name_units
-from d2rpick.base.files import write_whole
-from d2rpick.deck.engine_files import EngineFile, engine_lines, listed, off
-from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.radioss_bodies import replaced
-from d2rpick.deck.radioss_deck import (
-    Leg,
-    Starter,
-    below_title,
-    blocks,
-    card_of,
-    kept_off,
-    keyword,
-    number_of,
-    numbers,
-    read_legs,
+from d2rpick.base.files import write_as_a_whole
+from d2rpick.deck.engine_files import (
+    EngineFile,
+    write_bodies_off,
+    write_engine_lines,
+    write_numbers,
 )
-from d2rpick.deck.radioss_files import root_of, run_files
-from d2rpick.deck.radioss_run import Run, parts_off, read_run
+from d2rpick.deck.ls_dyna_parts import read_parts
+from d2rpick.deck.radioss_bodies import find_replaced_bodies
+from d2rpick.deck.radioss_deck import (
+    RadiossLeg,
+    Starter,
+    find_bodies_kept_off,
+    get_lines_below_title,
+    get_number,
+    make_card,
+    read_blocks,
+    read_legs,
+    read_numbers,
+    split_keyword,
+)
+from d2rpick.deck.radioss_files import find_root, list_run_files
+from d2rpick.deck.radioss_run import RadiossRun, find_parts_off, read_run
 from d2rpick.deck.radioss_sensors import STOPS_SINCE
-from d2rpick.deck.reader import Deck, cure, cuts, read_deck
+from d2rpick.deck.reader import Deck, describe_cure, find_cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
 
@@ -62,7 +67,7 @@ def write_deck(
     main : str
         The main deck, or a file of the Radioss reference run.
     card : PrintedCard
-        Result of `d2rpick.deck.printing.cards` for its solver.
+        Result of `d2rpick.deck.printing.print_cards` for its solver.
     folder : str
         A folder other than that of the deck; it is created if necessary.
     overwrite : bool
@@ -80,7 +85,11 @@ def write_deck(
         found from ``folder``, or has a main file that seems to be truncated; if a file exists; if the card is for
         another solver.
     """
-    files = dict(_radioss(main, card) if run_files(main) else _ls_dyna(main, card))
+    files = dict(
+        _write_radioss(main, card)
+        if list_run_files(main)
+        else _write_ls_dyna(main, card)
+    )
     target = Path(folder)
     try:
         target.mkdir(parents=True, exist_ok=True)
@@ -101,7 +110,7 @@ def write_deck(
                 )
         for name, content in files.items():
             (target / name).parent.mkdir(parents=True, exist_ok=True)
-            write_whole(target / name, content)
+            write_as_a_whole(target / name, content)
     except OSError as error:
         raise DeckError(
             f"{error.filename or folder}: cannot be written ({error.strerror})"
@@ -109,7 +118,7 @@ def write_deck(
     return [str(target / name) for name in files]
 
 
-def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
+def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of an LS-DYNA deck with cards."""
     deck = read_deck(main)
     source = SourceFile("the card", card.text.encode())
@@ -121,12 +130,12 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         raise DeckError(
             f"{main}: an LS-DYNA deck, but the cards are for another solver"
         )
-    for block, sign in cuts(
+    for block, sign in find_cuts(
         deck
     ):  # the added lines would hide it, and complete a truncated number
         if block.source is deck.sources[0]:
             raise DeckError(
-                f"{deck.path}: {sign} The added cards would hide this: {cure(block)}"
+                f"{deck.path}: {sign} The added cards would hide this: {describe_cure(block)}"
             )
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
@@ -135,10 +144,10 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
     yield (
         Path(main).name,
-        with_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks()),
+        insert_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks()),
     )
     yield name, text.encode()
-    yield from copies(deck.sources[1:], main, {name, Path(main).name})
+    yield from copy_files(deck.sources[1:], main, {name, Path(main).name})
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
@@ -167,7 +176,7 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
             raise DeckError(f"{problem}; print them with other ids")
 
 
-def with_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
+def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
     """Insert cards into the bytes of a main file, before its end mark or at its end; ``file_blocks`` are its blocks."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
@@ -176,7 +185,7 @@ def with_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> byt
     return content[:at] + text.encode().replace(b"\n", newline) + content[at:]
 
 
-def copies(
+def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
@@ -195,7 +204,7 @@ def copies(
             )
 
 
-def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
+def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of a Radioss run with cards."""
     run = read_run(main)
     printed = [
@@ -214,64 +223,76 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_unlike(run.legs)
     starter = run.starter.sources[0].name
     # The engine looks for a restart file whose name begins like its own.
-    root = root_of(starter) or leg.name
+    root = find_root(starter) or leg.name
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
-    left_out = {body.id: body.node.value for body in replaced(run, card.starter)}
-    main_text = with_cards(
-        run.starter.sources[0], card.starter, blocks(run.starter.sources[0])
+    left_out = {
+        body.id: body.node.value for body in find_replaced_bodies(run, card.starter)
+    }
+    main_text = insert_cards(
+        run.starter.sources[0], card.starter, read_blocks(run.starter.sources[0])
     )
     main_name = f"{root}_0000.rad"
-    yield main_name, _edited(starter, main_text, card.sensors, left_out)
-    further = list(blocks(leg.run.block.source))
+    yield main_name, _edit_file(starter, main_text, card.sensors, left_out)
+    further = list(read_blocks(leg.run.block.source))
     names = [f"{root}_{printed_leg.number:04d}.rad" for printed_leg in printed]
     for name, text, printed_leg in zip(
         names, card.files.values(), printed, strict=True
     ):
         repeated_blocks = (
-            text_of(block) for block in further if repeated(keyword(block), printed_leg)
+            read_block(block)
+            for block in further
+            if is_repeated(split_keyword(block), printed_leg)
         )
         switched_nodes = {
             node.value for _, _, ids in printed_leg.switched for node in ids
         } | card.sensors.keys()
         switched_nodes.update(left_out.values())
         off_nodes = [
-            node for node in kept_off(run.legs) if node not in switched_nodes
+            node
+            for node in find_bodies_kept_off(run.legs)
+            if node not in switched_nodes
         ]  # otherwise they would be rigid from time 0
         # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
-        lines = listed(off_nodes) if printed_leg.cap is None else off(off_nodes)
+        lines = (
+            write_numbers(off_nodes)
+            if printed_leg.cap is None
+            else write_bodies_off(off_nodes)
+        )
         yield (
             name,
             (text + "".join(f"{line}\n" for line in lines)).encode()
             + b"".join(repeated_blocks),
         )
-    for name, content in copies(run.starter.sources[1:], starter, {main_name, *names}):
-        yield name, _edited(name, content, card.sensors, left_out)
+    for name, content in copy_files(
+        run.starter.sources[1:], starter, {main_name, *names}
+    ):
+        yield name, _edit_file(name, content, card.sensors, left_out)
 
 
-def _edited(
+def _edit_file(
     name: str, content: bytes, sensors: Mapping[int, int], left_out: Collection[int]
 ) -> bytes:
     """Return a file of the starter deck with sensors and without the rigid bodies ``left_out`` (by id)."""
-    return _with_sensors(
-        SourceFile(name, _without(SourceFile(name, content), left_out)), sensors
+    return _add_sensors(
+        SourceFile(name, _remove_bodies(SourceFile(name, content), left_out)), sensors
     )
 
 
-def _without(source: SourceFile, bodies: Collection[int]) -> bytes:
+def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
     """Return a file of the starter deck without some rigid bodies, by their ids."""
     content = source.read(0)
-    for block in reversed([*blocks(source)]):
+    for block in reversed([*read_blocks(source)]):
         if (
             bodies
-            and keyword(block)[:1] == ("RBODY",)
-            and number_of(card_of(block)) in bodies
+            and split_keyword(block)[:1] == ("RBODY",)
+            and get_number(make_card(block)) in bodies
         ):
             content = content[: block.start] + content[block.end :]
     return content
 
 
-def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
+def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
     """Return a file of the starter deck in which sensors switch bodies; ``sensors`` by main node.
 
     Its /BEGIN gets a version in which time sensors have an end.
@@ -283,21 +304,21 @@ def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
     """
     content = source.read(0)
     edits = dict[int, tuple[int, bytes]]()
-    for block in blocks(source) if sensors else ():
-        if keyword(block)[:1] in {("BEGIN",), ("RBODY",)}:
-            edits.update(_edit(block, sensors))
+    for block in read_blocks(source) if sensors else ():
+        if split_keyword(block)[:1] in {("BEGIN",), ("RBODY",)}:
+            edits.update(_edit_lines(block, sensors))
     for at in sorted(edits, reverse=True):
         end, text = edits[at]
         content = content[:at] + text + content[end:]
     return content
 
 
-def _edit(
+def _edit_lines(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
     """Yield the changed line as its offset, its end and its new bytes."""
-    card = card_of(block)
-    for row in below_title(card)[:1]:
+    card = make_card(block)
+    for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
         at = block.start + sum(len(line) + 1 for line in lines[: row.distance])
         text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
@@ -317,7 +338,9 @@ def _edit(
 
 def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
     """Raise DeckError if the deck has a sensor with an id of the card, or lacks a body for a sensor."""
-    added = Starter(blocks=[*blocks(SourceFile("the card", card.starter.encode()))])
+    added = Starter(
+        blocks=[*read_blocks(SourceFile("the card", card.starter.encode()))]
+    )
     for number in sorted(added.sensors.keys() & starter.sensors.keys()):
         raise DeckError(
             f"{starter.sensors[number].at}: the deck has sensor {number} of the cards already; rename it"
@@ -329,16 +352,16 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
         )
 
 
-def _refuse_unlike(legs: Sequence[Leg]) -> None:
+def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
     """Raise DeckError if a later leg has keywords that the first leg lacks, so that no leg can represent both."""
-    first = {text_of(block) for block in blocks(legs[0].run.block.source)}
+    first = {read_block(block) for block in read_blocks(legs[0].run.block.source)}
     for leg in legs[1:]:
-        for block in blocks(leg.run.block.source):
-            words = keyword(block)
+        for block in read_blocks(leg.run.block.source):
+            words = split_keyword(block)
             if (
                 words[:1] != ("RUN",)
                 and words[:1] != ("END",)
-                and text_of(block) not in first
+                and read_block(block) not in first
             ):
                 problem = f"{leg.run.block.source.name}: /{'/'.join(words)} is not in the first engine file"
                 raise DeckError(
@@ -346,7 +369,9 @@ def _refuse_unlike(legs: Sequence[Leg]) -> None:
                 )
 
 
-def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:
+def _refuse_other_run(
+    leg: RadiossLeg, root: str, printed: Sequence[RadiossLeg]
+) -> None:
     """Raise DeckError if the cards are for another run, or the run switches their bodies already."""
     if printed[0].name not in (leg.name, root):
         raise DeckError(
@@ -364,7 +389,7 @@ def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:
             raise DeckError(f"{problem}; remove it from this /RBODY/ON first")
 
 
-def repeated(words: tuple[str, ...], leg: Leg | EngineFile) -> bool:
+def is_repeated(words: tuple[str, ...], leg: RadiossLeg | EngineFile) -> bool:
     """Return True if a leg repeats a keyword of the engine file of the run."""
     if (
         not words
@@ -377,7 +402,7 @@ def repeated(words: tuple[str, ...], leg: Leg | EngineFile) -> bool:
     return leg.number == 1 or words[0] not in _ONCE
 
 
-def text_of(block: Block) -> bytes:
+def read_block(block: Block) -> bytes:
     """Return the lines of a block, with a line end after each."""
     content = block.source.read(block.start, block.end)
     return content if content.endswith(b"\n") else content + b"\n"
@@ -414,8 +439,12 @@ class DrivenDeck(NamedTuple):
         twice.
         """
         file = EngineFile(number, until, cap)
-        lines = engine_lines(file, self.name, () if frozen else self.nodes, self.others)
-        repeated_texts = [text for words, text in self.further if repeated(words, file)]
+        lines = write_engine_lines(
+            file, self.name, () if frozen else self.nodes, self.others
+        )
+        repeated_texts = [
+            text for words, text in self.further if is_repeated(words, file)
+        ]
         added_lines = ["/MON/ON"] * (
             not any(words[0] == "MON" for words, _ in self.further)
         )
@@ -424,7 +453,7 @@ class DrivenDeck(NamedTuple):
         ).encode() + b"".join(repeated_texts)
 
 
-def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
+def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     """Read a run that is to be driven.
 
     Parameters
@@ -440,7 +469,7 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import bodies_for  # not above: loads numpy
+    from d2rpick.deck.radioss_bodies import find_bodies  # not above: loads numpy
 
     run = read_run(path)
     if run.starter is None or not run.legs:
@@ -449,32 +478,42 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
             f"{path}: the run has no {missing}, expected a starter deck and an engine file"
         )
     leg = run.legs[0]
-    chosen = tuple(sorted(parts)) or parts_off(run)
+    chosen = tuple(sorted(parts)) or find_parts_off(run)
     if not chosen:
         raise DeckError(
             f"{path}: the engine file deactivates no rigid body; give the parts to switch with --part"
         )
-    bodies = bodies_for(path, chosen)
-    off_nodes = tuple(node for node in kept_off([leg]) if node not in bodies.nodes)
+    bodies = find_bodies(path, chosen)
+    off_nodes = tuple(
+        node for node in find_bodies_kept_off([leg]) if node not in bodies.nodes
+    )
     source = run.starter.sources[0]
     main = f"{leg.name}_0000.rad"
-    content = with_cards(source, bodies.cards, blocks(source))
+    content = insert_cards(source, bodies.cards, read_blocks(source))
     files = {
         main: content,
-        **dict(copies(run.starter.sources[1:], source.name, {main})),
+        **dict(copy_files(run.starter.sources[1:], source.name, {main})),
     }
     further = tuple(
-        (words, text_of(block))
-        for block in blocks(leg.run.block.source)
-        if (words := keyword(block)) and words[0] not in _NOT_REPEATED
+        (words, read_block(block))
+        for block in read_blocks(leg.run.block.source)
+        if (words := split_keyword(block)) and words[0] not in _NOT_REPEATED
     )
     return DrivenDeck(
-        leg.name, _end(run.legs[-1]), chosen, bodies.nodes, off_nodes, _interval(leg), _second(run), files, further,
+        leg.name,
+        _read_end(run.legs[-1]),
+        chosen,
+        bodies.nodes,
+        off_nodes,
+        _read_interval(leg),
+        _find_second(run),
+        files,
+        further,
         bodies.notes,
-    )  # fmt: skip
+    )
 
 
-def _end(leg: Leg) -> float:
+def _read_end(leg: RadiossLeg) -> float:
     """Return the end of the run [time]."""
     if leg.stop.problem or not leg.stop.value > 0:
         raise DeckError(
@@ -483,13 +522,13 @@ def _end(leg: Leg) -> float:
     return leg.stop.value
 
 
-def _interval(leg: Leg) -> float:
+def _read_interval(leg: RadiossLeg) -> float:
     """Return the output interval of the time history, which has to show contacts [time]."""
-    for block in blocks(leg.run.block.source):
-        card = card_of(block)
+    for block in read_blocks(leg.run.block.source):
+        card = make_card(block)
         if (
             card.words[0] == "TFILE"
-            and (values := [*numbers(card)])
+            and (values := [*read_numbers(card)])
             and values[0].value > 0
         ):
             return values[0].value
@@ -498,7 +537,7 @@ def _interval(leg: Leg) -> float:
     )
 
 
-def _second(run: Run) -> float | None:
+def _find_second(run: RadiossRun) -> float | None:
     """Return the length of a second in the time unit of the deck [time]; None if it names none."""
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())

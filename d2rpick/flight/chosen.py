@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.flight.flight import BY_ENERGIES, MOST_WORK, Flight, same_within, spoken
-from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time
+from d2rpick.flight.flight import (
+    BY_ENERGIES,
+    MOST_WORK,
+    Flight,
+    get_agreement_limit,
+    name_source,
+)
+from d2rpick.flight.internal_energy import (
+    find_landing_after,
+    find_quiet_time,
+    has_whole_motion,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,7 +56,9 @@ def find_flight(
     if seen.flight:
         first, last, parts, end_seen, damping, gravity = seen.flight
         if described and seen.source in BY_ENERGIES and isnan(gravity):
-            gravity = _load_beside(history, described._replace(start=first, end=last))
+            gravity = _detect_load_in_window(
+                history, described._replace(start=first, end=last)
+            )
         end = last if end_seen else None
         by_oscillator = described is not None
         return Flight(
@@ -63,32 +75,36 @@ def find_flight(
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
     if described:
-        refusal = _fed(history, described.start, described.end)
+        refusal = _explain_why_fed(history, described.start, described.end)
         if refusal:
             return Flight(refusal=refusal)
-        load = _load_beside(history, described)
+        load = _detect_load_in_window(history, described)
         return Flight(
             described.start,
-            _end_of(history, described),
+            _find_end_of_window(history, described),
             "oscillator",
             gravity=load,
             described=True,
         )
-    quiet = quiet_time(history, td)
+    quiet = find_quiet_time(history, td)
     if quiet is None:
         return Flight()
-    if refusal := _fed(history, quiet.start, td):
+    if refusal := _explain_why_fed(history, quiet.start, td):
         return Flight(refusal=refusal)
     end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
-    known = (
+    has_energies = (
         history.balance is not None and history.balance.kinetic_and_internal is not None
     )
     return Flight(
-        quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0
+        quiet.start,
+        end,
+        "energy",
+        settled=quiet.settled,
+        gravity=nan if has_energies else 0.0,
     )
 
 
-def begun_at(
+def start_flight_at(
     history: History,
     flight: Flight,
     td: float,
@@ -103,37 +119,39 @@ def begun_at(
     if (
         flight.start is None
         or flight.source == "energy"
-        or _lies_elsewhere(flight, td, after)
+        or _is_elsewhere(flight, td, after)
     ):
         if described is None:  # many td share this landing
             end = history.known.once(
-                ("landing", after), lambda: landing_after(history, after)
+                ("landing", after), lambda: find_landing_after(history, after)
             )
         else:
-            end = _end_of(history, described)
+            end = _find_end_of_window(history, described)
         return Flight(
             after,
             end,
             "given",
-            doubts=_with_refusal(flight),
+            doubts=_add_refusal_to_doubts(flight),
             described=described is not None,
         )
     if flight.end is not None and after >= flight.end:
-        ended = f"the {spoken(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
+        ended = f"the {name_source(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
     )  # an oscillator is searched from `after` on, so its start shows nothing
-    if shows_start and after < flight.start - same_within(
+    if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):
-        shown = f"the {spoken(flight.source)} shows that the flight begins at {flight.start:.6g}"
-        doubts = (*doubts, f"{shown}, after `after` {after:.6g}, which is used")
+        evidence = f"the {name_source(flight.source)} shows that the flight begins at {flight.start:.6g}"
+        doubts = (*doubts, f"{evidence}, after `after` {after:.6g}, which is used")
     return flight._replace(start=after, source="given", doubts=doubts)
 
 
-def landed_at(history: History, flight: Flight, td: float, landing: float) -> Flight:
+def end_flight_at(
+    history: History, flight: Flight, td: float, landing: float
+) -> Flight:
     """End the flight around ``td`` at the time ``landing`` [time] of the next contact that the user gives.
 
     Evidence against this becomes a doubt.
@@ -142,29 +160,32 @@ def landed_at(history: History, flight: Flight, td: float, landing: float) -> Fl
         return flight
     if flight.refusal and flight.end is not None and flight.end <= td <= landing:
         return flight._replace(
-            end=landing, refusal=None, source="given", doubts=_with_refusal(flight)
+            end=landing,
+            refusal=None,
+            source="given",
+            doubts=_add_refusal_to_doubts(flight),
         )
     doubts = flight.doubts
-    room = same_within(history, *flight.within(history.time))
+    room = get_agreement_limit(history, *flight.within(history.time))
     if (
         flight.end is not None
         and flight.end < landing - room
         and flight.source not in ("energy", "given")
     ):
-        shown = f"the {spoken(flight.source)} shows that the flight ends at {flight.end:.6g}"
-        doubts = (*doubts, f"{shown}, before `landing` {landing:.6g}, which is used")
+        evidence = f"the {name_source(flight.source)} shows that the flight ends at {flight.end:.6g}"
+        doubts = (*doubts, f"{evidence}, before `landing` {landing:.6g}, which is used")
         flight = flight._replace(source="given")
     return flight._replace(end=landing, doubts=doubts)
 
 
-def _lies_elsewhere(flight: Flight, td: float, after: float) -> bool:
+def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:
     """Return True if nothing flies at td and the nearest flight ends before ``after`` or begins after td."""
     if not flight.refusal or flight.start is None:
         return False
     return flight.start > td or (flight.end is not None and flight.end <= after)
 
 
-def _with_refusal(flight: Flight) -> tuple[str, ...]:
+def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
     """Return the doubts about a flight that the user gives, including the reason why the evidence refuses it."""
     if not flight.refusal:
         return flight.doubts
@@ -174,23 +195,23 @@ def _with_refusal(flight: Flight) -> tuple[str, ...]:
     )
 
 
-def _end_of(history: History, described: Described) -> float | None:
+def _find_end_of_window(history: History, described: Described) -> float | None:
     """Return the end of a described window, None if it is the end of the record."""
     return described.end if described.end < history.time[-1] else None
 
 
-def _load_beside(history: History, described: Described) -> float:
+def _detect_load_in_window(history: History, described: Described) -> float:
     """Return NaN if the energies in a window change by more than the damping of the vibration explains, else 0."""
-    from d2rpick.flight.work import taken_by_damping
+    from d2rpick.flight.work import is_taken_by_damping
 
     if history.balance is None:
         taken = None
     else:
-        taken = taken_by_damping(history.balance, *described)
+        taken = is_taken_by_damping(history.balance, *described)
     return nan if taken is False else 0.0
 
 
-def _fed(history: History, start: float, end: float) -> str | None:
+def _explain_why_fed(history: History, start: float, end: float) -> str | None:
     """Return the reason why energies show that a window is no flight, None if they do not.
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
@@ -205,13 +226,13 @@ def _fed(history: History, start: float, end: float) -> str | None:
         and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy
     ):
         return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
-    from d2rpick.flight.work import change_of_balance
+    from d2rpick.flight.work import compute_change_of_balance
 
-    change = change_of_balance(balance, start, end)
+    change = compute_change_of_balance(balance, start, end)
     if change is not None and change > MOST_WORK * max(energy, 0.0):
-        found = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
-        return f"{found}, at a mean internal energy of {energy:.3g}: a load works there"
-    if not moves_as_a_whole(balance, start, end):
+        change_text = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
+        return f"{change_text}, at a mean internal energy of {energy:.3g}: a load works there"
+    if not has_whole_motion(balance, start, end):
         return (
             f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of "
             "the vibration: it does not fly"

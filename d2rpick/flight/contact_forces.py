@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.window import FEWEST, SHORTEST, FreeFlight
-from d2rpick.histories.samples import union
+from d2rpick.histories.samples import merge_times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,13 +48,13 @@ class Touches(NamedTuple):
         parts.  If the forces were written at different times, the period that all of them cover is used.
         """
         telling = [force for force in forces if force.tells]
-        telling = telling if whole is None else _from_outside(telling, whole)
+        telling = telling if whole is None else _select_outer_forces(telling, whole)
         if not telling:
             return None
         start = max(force.time[0] for force in telling)
         end = min(force.time[-1] for force in telling)
-        every = union(*(force.time for force in telling))
-        time = every[(every >= start) & (every <= end)]
+        all_times = merge_times(*(force.time for force in telling))
+        time = all_times[(all_times >= start) & (all_times <= end)]
         if time.size < FEWEST:
             return None
         acts = np.zeros(time.size, np.bool_)
@@ -71,13 +71,17 @@ class Touches(NamedTuple):
         time = self.time
         if not time[0] <= td <= time[-1]:
             return None
-        after = min(max(int(np.searchsorted(time, td)), 1), time.size - 1)
-        if self.acts[after]:
+        next_state = min(max(int(np.searchsorted(time, td)), 1), time.size - 1)
+        if self.acts[next_state]:
             return None
         acting = np.flatnonzero(self.acts)
-        place = int(np.searchsorted(acting, after))
-        first = int(acting[place - 1]) if place else 0
-        last = int(acting[place]) - 1 if place < acting.size else time.size - 1
+        next_contact = int(np.searchsorted(acting, next_state))
+        first = int(acting[next_contact - 1]) if next_contact else 0
+        last = (
+            int(acting[next_contact]) - 1
+            if next_contact < acting.size
+            else time.size - 1
+        )
         long_enough = float(time[last] - time[first]) >= SHORTEST * float(
             time[-1] - time[0]
         )
@@ -86,37 +90,46 @@ class Touches(NamedTuple):
         return FreeFlight.of(time, (first, last), gravity=float("nan"))
 
 
-def _from_outside(forces: Sequence[ContactForce], whole: Momenta) -> list[ContactForce]:
+def _select_outer_forces(
+    forces: Sequence[ContactForce], whole: Momenta
+) -> list[ContactForce]:
     """Return the forces whose impulses appear in the model's momentum, in addition to a constant gravity.
 
     An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
     side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces
     whose impulses are unknown are kept.
     """
-    known = [force for force in forces if np.isfinite(force.impulses).all()]
-    if not known or whole.time.size <= len(known) + 1:
+    complete_forces = [force for force in forces if np.isfinite(force.impulses).all()]
+    if not complete_forces or whole.time.size <= len(complete_forces) + 1:
         return list(forces)
     steps = np.diff(whole.time)
     changes = np.diff(whole.of(range(whole.values.shape[1])), axis=0).ravel()
     by_gravity = [np.outer(steps, axis).ravel() for axis in np.eye(3)]
     columns = np.stack(
-        [*(_between(force, whole.time).ravel() for force in known), *by_gravity], axis=1
+        [
+            *(
+                _sum_impulses_between(force, whole.time).ravel()
+                for force in complete_forces
+            ),
+            *by_gravity,
+        ],
+        axis=1,
     )
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0] = 1.0
     shares = np.abs(np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes)[
-        : len(known)
+        : len(complete_forces)
     ]
     whole_share = float(shares.max()) if whole.velocity else 1.0
     inner = {
         id(force)
-        for force, share in zip(known, shares.tolist(), strict=True)
+        for force, share in zip(complete_forces, shares.tolist(), strict=True)
         if share < _INNER * whole_share
     }
     return [force for force in forces if id(force) not in inner]
 
 
-def _between(force: ContactForce, time: Samples) -> Samples:
+def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
     """Return the impulses of a force between other times (m,), shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
     return np.diff(

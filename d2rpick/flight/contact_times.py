@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.flight.momentum import all_flights
-from d2rpick.histories.samples import stretches, window
+from d2rpick.flight.momentum import find_all_flights
+from d2rpick.histories.samples import find_stretches, find_window
 
 if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
@@ -52,14 +52,14 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     ContactTimes or None
         None if no flight shows the effect of gravity, or there are too few states.
     """
-    flights = all_flights(momenta)
+    flights = find_all_flights(momenta)
     if not flights:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start)
     members = _find_members(momenta, longest.parts)
     time = momenta.time
     momentum = momenta.of(members)
-    flight = window(time, longest.start, longest.end)
+    flight = find_window(time, longest.start, longest.end)
     first = flight.start + _EDGE
     last = flight.stop - 1 - _EDGE
     if last - first < _FEWEST:
@@ -67,13 +67,15 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     gravity = (momentum[last] - momentum[first]) / (time[last] - time[first])
     pushes = np.diff(momentum, axis=0) - gravity * np.diff(time)[:, np.newaxis]
     sizes = np.linalg.norm(pushes, axis=1)
-    least = _SEEN * max(2 * momenta.noise(members), float(sizes[first:last].max()))
+    smallest_push = _SEEN * max(
+        2 * momenta.noise(members), float(sizes[first:last].max())
+    )
     room = np.maximum(
-        least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
+        smallest_push, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
     )
     spans = tuple(
         _place_in_intervals(time, part.start, part.stop)
-        for part in stretches(sizes > room)
+        for part in find_stretches(sizes > room)
     )
     mass = momenta.mass(members)
     speed = float(np.linalg.norm(momentum[last])) / mass if mass > 0 else None
@@ -125,7 +127,8 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
         acts = acts.copy()
         acts[1:] &= np.linalg.norm(force.impulses[1:], axis=1) > least * steps
     spans = tuple(
-        _place_in_intervals(time, part.start, part.stop) for part in stretches(acts[1:])
+        _place_in_intervals(time, part.start, part.stop)
+        for part in find_stretches(acts[1:])
     )
     return ContactTimes(spans, float(steps.max()))
 
@@ -148,7 +151,9 @@ def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, fl
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:
     """Return the columns of the flying parts, or of the chosen parts if the momentum is that of the whole model."""
     flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
-    places = tuple(
-        place for place, part in enumerate(momenta.parts or ()) if part.id in flying
+    members = tuple(
+        position
+        for position, part in enumerate(momenta.parts or ())
+        if part.id in flying
     )
-    return places or momenta.chosen
+    return members or momenta.chosen

@@ -11,11 +11,16 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.contact_forces import Touches, is_deformed
 from d2rpick.flight.internal_energy import (
-    moves_as_a_whole,
+    find_settled_time,
+    has_whole_motion,
     rises_as_it_yields,
-    settled_from,
 )
-from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
+from d2rpick.flight.window import (
+    SHORTEST,
+    find_all_windows,
+    limit_to_unheld,
+    list_marks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -128,36 +133,42 @@ class Witness(NamedTuple):
             source,
             time,
             once,
-            cache(partial(all_windows, time, partial(_of_middle, time, once))),
+            cache(
+                partial(
+                    find_all_windows,
+                    time,
+                    partial(_find_flight_from_middle, time, once),
+                )
+            ),
             decisive,
         )
 
     def holding(self, td: float) -> FreeFlight | None:
         """Return the flight around td: found from the first mark whose flight contains td, else from td."""
-        return _holding(self.time, self.around, td)
+        return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
         """Return True if a time at which this source shows no flight has none."""
         return self.decisive or bool(self.flights())
 
 
-def _holding(
+def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
     """Return the flight around ``td`` that a function finds from shared marks, or from td itself."""
-    shared = filter(None, map(around, marks(time, td)))
+    shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
     ) or around(td)
 
 
-def _of_middle(
+def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
     """Return the flight around a time as a td in its middle would get it, so that listed flights equal those in use."""
     flight = around(moment)
     if flight:
-        of_middle = _holding(time, around, (flight.start + flight.end) / 2)
+        of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
     else:
         of_middle = None
     if of_middle and of_middle.start <= moment <= of_middle.end:
@@ -178,7 +189,7 @@ class Seen(NamedTuple):
     held: bool = False
 
 
-def seen_flight(history: History, td: float) -> Seen:
+def find_seen_flight(history: History, td: float) -> Seen:
     """Find the free flight around ``td`` [time] from all evidence except the energy of the parts.
 
     The best source that shows a flight counts.  A better one that shows none at td is never overruled, and neither is
@@ -187,77 +198,90 @@ def seen_flight(history: History, td: float) -> Seen:
     """
     held = history.surroundings.held(history.parts, td)
     if held is None:
-        return _seen(history, td)
-    seen = None if history.parts else _seen(history, td)
-    if seen and seen.flight and seen.flight.parts:
-        return seen
+        return _find_flight_by_evidence(history, td)
+    evidence = None if history.parts else _find_flight_by_evidence(history, td)
+    if evidence and evidence.flight and evidence.flight.parts:
+        return evidence
     return Seen(refusal=held, held=True)
 
 
-def _seen(history: History, td: float) -> Seen:
+def _find_flight_by_evidence(history: History, td: float) -> Seen:
     """Find the flight around ``td`` from the sources of evidence, without regard to supports."""
-    found: list[tuple[str, FreeFlight]] = []
-    for witness in witnesses(history):
+    flights: list[tuple[str, FreeFlight]] = []
+    for witness in list_witnesses(history):
         flight = witness.holding(td)
         if flight:
-            found.append((witness.source, flight))
-        elif (not found or _may_deny(witness, found[0][1])) and witness.counts():
-            refusal = _refusal(history, witness, td)
+            flights.append((witness.source, flight))
+        elif (not flights or _can_deny(witness, flights[0][1])) and witness.counts():
+            refusal = _explain_refusal(history, witness, td)
             doubts = tuple(
                 f"the {source} shows a flight there, but {refusal}"
-                for source, _ in found
+                for source, _ in flights
             )
-            return _nearest(witness, td, refusal, doubts)
-    if not found:
+            return _find_nearest(witness, td, refusal, doubts)
+    if not flights:
         return Seen()
     return history.known.once(
-        ("confirmed", *found), lambda: _confirmed(history, found)
+        ("confirmed", *flights), lambda: _join_evidence(history, flights)
     )  # many td share this result
 
 
-def _refusal(history: History, witness: Witness, td: float) -> str:
+def _explain_refusal(history: History, witness: Witness, td: float) -> str:
     """Return the reason why nothing flies at td [time]; the momentum may show a flight and the energy none."""
     if witness.source == "momentum":
-        from d2rpick.flight.momentum import flight_around, to_be_asked
+        from d2rpick.flight.momentum import (
+            find_flight_around,
+            select_momenta_for_flight,
+        )
 
         if any(
-            flight_around(one, td, history.balance)
-            for one in to_be_asked(history.momenta)
+            find_flight_around(momenta, td, history.balance)
+            for momenta in select_momenta_for_flight(history.momenta)
         ):
-            found = f"the momentum is that of free flight at td = {td:.6g}, but the internal energy keeps no level"
-            return f"{found}: parts of the model may touch each other, or energies are wrong"
-    return f"the {spoken(witness.source)} shows no free flight at td = {td:.6g}"
+            contradiction = (
+                f"the momentum is that of free flight at td = {td:.6g}, but the internal "
+                "energy keeps no level"
+            )
+            return f"{contradiction}: parts of the model may touch each other, or energies are wrong"
+    return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
 
 
-def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
+def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Find all flights that the best source shows and no other denies, with their sources, in ascending order."""
-    asked = witnesses(history)
-    for place, witness in enumerate(asked):
-        kept = []
+    sources = list_witnesses(history)
+    for rank, witness in enumerate(sources):
+        confirmed_flights = []
         flights = witness.flights()
         for flight in flights:
             middle = (flight.start + flight.end) / 2
             may_deny = (
-                one
-                for one in asked[place + 1 :]
-                if _may_deny(one, flight) and one.counts()
+                later_witness
+                for later_witness in sources[rank + 1 :]
+                if _can_deny(later_witness, flight) and later_witness.counts()
             )
-            others = [(one.source, one.around(middle)) for one in may_deny]
-            if not all(other for _, other in others):
-                continue
-            found = [
-                (witness.source, flight),
-                *((source, other) for source, other in others if other),
+            other_flights = [
+                (later_witness.source, later_witness.around(middle))
+                for later_witness in may_deny
             ]
-            seen = _confirmed(history, found)
-            if seen.flight and not seen.refusal:
-                kept.append((witness.source, seen.flight))
+            if not all(other_flight for _, other_flight in other_flights):
+                continue
+            agreeing = [
+                (witness.source, flight),
+                *(
+                    (source, other_flight)
+                    for source, other_flight in other_flights
+                    if other_flight
+                ),
+            ]
+            confirmed = _join_evidence(history, agreeing)
+            if confirmed.flight and not confirmed.refusal:
+                confirmed_flights.append((witness.source, confirmed.flight))
         if flights or witness.decisive:
-            return tuple(kept)
+            return tuple(confirmed_flights)
     return ()
 
 
-def _may_deny(witness: Witness, flight: FreeFlight) -> bool:
+def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
     """Return True if a source may deny a flight that a better source shows.
 
     If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
@@ -265,22 +289,24 @@ def _may_deny(witness: Witness, flight: FreeFlight) -> bool:
     return witness.source in _AGREEING and flight.parts is None
 
 
-def witnesses(history: History) -> tuple[Witness, ...]:
+def list_witnesses(history: History) -> tuple[Witness, ...]:
     """Return the history's sources of evidence, best first, made once for all td."""
-    return history.known.once("witnesses", lambda: tuple(_witnesses(history)))
+    return history.known.once("witnesses", lambda: tuple(_make_witnesses(history)))
 
 
-def _witnesses(history: History) -> Iterator[Witness]:
+def _make_witnesses(history: History) -> Iterator[Witness]:
     """Make the history's sources of evidence, best first."""
     if history.momenta:
         from d2rpick.flight import momentum
 
-        momenta = momentum.to_be_asked(history.momenta)
-        around = partial(_first, history, momenta)
-        decisive = any(momentum.tells(one) for one in momenta)
+        momenta = momentum.select_momenta_for_flight(history.momenta)
+        around = partial(_find_flight_by_momentum, history, momenta)
+        decisive = any(momentum.can_deny_flight(candidate) for candidate in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
     forces = history.evidence.forces
-    whole = next((one for one in history.momenta if one.parts is None), None)
+    whole = next(
+        (candidate for candidate in history.momenta if candidate.parts is None), None
+    )
     touches = Touches.of(forces, whole) if forces else None
     balance = history.balance
     is_better_known = bool(history.momenta)
@@ -288,7 +314,7 @@ def _witnesses(history: History) -> Iterator[Witness]:
         by_forces = Witness.of(
             "contact-force",
             touches.time,
-            partial(_by_forces, history, touches),
+            partial(_find_flight_by_forces, history, touches),
             decisive=False,
         )
         is_better_known = is_better_known or bool(by_forces.flights())
@@ -297,34 +323,39 @@ def _witnesses(history: History) -> Iterator[Witness]:
         return
     from d2rpick.flight import work
 
-    if work.shows_contacts(balance):
+    if work.has_visible_contacts(balance):
         around = partial(
-            _by_energies, history, work.plateau_around, level=not is_better_known
+            _find_flight_by_energies,
+            history,
+            work.find_plateau,
+            level=not is_better_known,
         )
         yield Witness.of("contact-energy", balance.time, around, decisive=False)
-    if work.can_tell(balance):
-        around = partial(_by_energies, history, work.balanced_around, level=True)
+    if work.has_laws(balance):
+        around = partial(
+            _find_flight_by_energies, history, work.find_balanced_window, level=True
+        )
         yield Witness.of(
             "energy-balance", balance.time, around, decisive=balance.worked is not None
         )
 
 
-def _first(
+def _find_flight_by_momentum(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> FreeFlight | None:
     """Return the flight around ``td`` from the momentum of the parts, or else of the whole model."""
-    from d2rpick.flight.momentum import flight_around
+    from d2rpick.flight.momentum import find_flight_around
 
-    for one in momenta:
-        found = flight_around(one, td, history.balance)
-        if found:
-            if one.parts is not None or one.flying:
-                return found
-            return _keeping_level(history, found, td, one)
+    for candidate in momenta:
+        flight = find_flight_around(candidate, td, history.balance)
+        if flight:
+            if candidate.parts is not None or candidate.flying:
+                return flight
+            return _limit_to_level(history, flight, td, candidate)
     return None
 
 
-def _by_energies(
+def _find_flight_by_energies(
     history: History,
     look: Callable[[Balance, float], FreeFlight | None],
     td: float,
@@ -336,41 +367,43 @@ def _by_energies(
     Energies alone do not see a fixed wall, which does no work.
     """
     assert history.balance
-    found = look(history.balance, td)
+    flight = look(history.balance, td)
     if level:
-        found = _keeping_level(history, found, td)
+        flight = _limit_to_level(history, flight, td)
         if (
-            found
-            and isinf(found.gravity)
+            flight
+            and isinf(flight.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
             return None  # without gravity nothing feeds the energies
-        if not (found and moves_as_a_whole(history.balance, found.start, found.end)):
-            found = None
-    return unheld(history.surroundings, found, history.parts, td)
+        if not (flight and has_whole_motion(history.balance, flight.start, flight.end)):
+            flight = None
+    return limit_to_unheld(history.surroundings, flight, history.parts, td)
 
 
-def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | None:
+def _find_flight_by_forces(
+    history: History, touches: Touches, td: float
+) -> FreeFlight | None:
     """Return the flight around td from contact forces; if the energy rises in it, only what keeps its level.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
-    found = touches.flight_around(td)
+    flight = touches.flight_around(td)
     balance = history.balance
     if (
-        found
-        and found.start <= touches.time[0]
+        flight
+        and flight.start <= touches.time[0]
         and (balance is None or balance.external_work is None)
     ):
         return None
-    if found and is_deformed(history, found):
-        found = _keeping_level(history, found, td)
-    if found and balance and not moves_as_a_whole(balance, found.start, found.end):
+    if flight and is_deformed(history, flight):
+        flight = _limit_to_level(history, flight, td)
+    if flight and balance and not has_whole_motion(balance, flight.start, flight.end):
         return None
-    return unheld(history.surroundings, found, history.parts, td)
+    return limit_to_unheld(history.surroundings, flight, history.parts, td)
 
 
-def _keeping_level(
+def _limit_to_level(
     history: History,
     flight: FreeFlight | None,
     td: float,
@@ -392,16 +425,18 @@ def _keeping_level(
         and balance.kinetic_and_internal is not None
         and balance.internal is not None
     ):
-        from d2rpick.flight.work import lowered_by_damping
+        from d2rpick.flight.work import list_damped_energies
 
-        sums, unseen = lowered_by_damping(balance, flight, momenta)
+        sums, unseen = list_damped_energies(balance, flight, momenta)
         if sums:
-            damped = np.stack([np.interp(time, balance.time, one) for one in sums])
+            damped = np.stack(
+                [np.interp(time, balance.time, energy_sum) for energy_sum in sums]
+            )
         else:
             damped = None
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
-    start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
+    start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
     if start is not None and start > flight.start and momenta is not None:
         # without gravity the sum itself; with it the last one, less the work of gravity
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
@@ -420,42 +455,46 @@ def _keeping_level(
     return flight._replace(start=start)
 
 
-def _nearest(
+def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
     """Return the last flight before ``td``, or else the first one after it, for a td at which nothing flies."""
     flights = witness.flights()
-    before = [one for one in flights if one.end < td]
-    nearest = before[-1] if before else flights[0] if flights else None
+    earlier_flights = [flight for flight in flights if flight.end < td]
+    nearest = (
+        earlier_flights[-1] if earlier_flights else flights[0] if flights else None
+    )
     return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 
-def spoken(source: str | None) -> str:
+def name_source(source: str | None) -> str:
     """Return the name of a source in words."""
     return str(source).replace("-", " ")
 
 
-def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> Seen:
+def _join_evidence(
+    history: History, shown_flights: Sequence[tuple[str, FreeFlight]]
+) -> Seen:
     """Join the flights of the best source and of those that should agree with it, and note disagreements."""
-    source, best = found[0]
-    refusal = _driven(history, source, best)
+    source, best = shown_flights[0]
+    refusal = _explain_why_driven(history, source, best)
     if refusal:
         return Seen(refusal=refusal)
     start = best.start
     end = best.end
     end_seen = best.end_seen
     doubts = []
-    room = same_within(history, start, end)
-    for other, flight in found[1:]:
-        if other not in _AGREEING or best.parts is not None:
+    room = get_agreement_limit(history, start, end)
+    for other_source, flight in shown_flights[1:]:
+        if other_source not in _AGREEING or best.parts is not None:
             continue
         if abs(flight.start - best.start) > room or abs(flight.end - best.end) > room:
-            one, two = (
-                f"{f.start:.6g} to {f.end:.6g} by the {spoken(n)}"
-                for n, f in (found[0], (other, flight))
+            first_text, second_text = (
+                f"{f.start:.6g} to {f.end:.6g} by the {name_source(n)}"
+                for n, f in (shown_flights[0], (other_source, flight))
             )
             doubts.append(
-                f"the flight lasts from {one}, from {two}; the later start and the earlier end count"
+                f"the flight lasts from {first_text}, from {second_text}; the later start and the earlier end count"
             )
         if flight.end < end:
             end = flight.end
@@ -468,37 +507,42 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
     )
 
 
-def same_within(history: History, start: float, end: float) -> float:
+def get_agreement_limit(history: History, start: float, end: float) -> float:
     """Return by how much two sources may differ about the ends of the same flight [time]."""
     return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 
-def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
+def _explain_why_driven(
+    history: History, source: str, flight: FreeFlight
+) -> str | None:
     """Return the reason why a flight is driven by a load, None if no load works or it may work on other parts."""
-    from d2rpick.flight.work import work_beyond_gravity
+    from d2rpick.flight.work import compute_work_beyond_gravity
 
     balance = history.balance
     if balance is None or (source == "momentum" and _is_subset(history, flight)):
         return None
-    work = work_beyond_gravity(balance, flight.start, flight.end)
+    work = compute_work_beyond_gravity(balance, flight.start, flight.end)
     energy = history.mean_energy(flight.start, flight.end)
     if work is None or energy is None or work <= MOST_WORK * max(energy, 0.0):
         return None
     return (
-        f"the {spoken(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
+        f"the {name_source(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
         f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: it is driven"
     )
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
     """Return True if other parts than the flying ones move as well."""
-    momenta = next((one for one in history.momenta if one.parts is not None), None)
+    momenta = next(
+        (candidate for candidate in history.momenta if candidate.parts is not None),
+        None,
+    )
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False
     members = {part.id for part in flight.parts}
     moves = np.ptp(momenta.values, axis=0).any(axis=1)
     return any(
         part.id not in members
-        for part, one in zip(momenta.parts, moves, strict=True)
-        if one
+        for part, is_moving in zip(momenta.parts, moves, strict=True)
+        if is_moving
     )

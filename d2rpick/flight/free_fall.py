@@ -17,11 +17,11 @@ from d2rpick.flight.window import (
     TOLERANCE,
     Constant,
     Law,
-    lasting_window,
-    longest_window,
-    moments,
+    find_lasting_window,
+    find_longest_window,
+    list_moments,
 )
-from d2rpick.histories.samples import bent, integral, window
+from d2rpick.histories.samples import find_window, integrate_by_trapezia, remove_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,7 +117,7 @@ class Laws:
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
         """Return the states around ``td`` that obey a law and go on doing so as its limit is lowered."""
-        return lasting_window(
+        return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
 
@@ -131,19 +131,20 @@ class Laws:
         if self.gravities is None:
             return is_gravity(acceleration, error)
         return any(
-            one > 0 and abs(acceleration - one) <= error * one for one in self.gravities
+            gravity > 0 and abs(acceleration - gravity) <= error * gravity
+            for gravity in self.gravities
         )
 
     def _braked(self, first: int, last: int) -> bool:
         """Return True if apparent damping is a brake: faster than the states show, or almost nothing is left."""
-        largest, left = (
+        largest, final_size = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
         )
         length = float(self.fit.time[last] - self.fit.time[first])
         damping = self.fit.damping(first, last)
         return damping * length > max(_DAMPED, _SHOWN * (last - first)) or (
-            left < _LEFT * largest and damping * length > _DAMPED
+            final_size < _LEFT * largest and damping * length > _DAMPED
         )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
@@ -153,7 +154,7 @@ class Laws:
         first, last = self._around(td)
         if last - first < FEWEST or not self.mass > 0:
             return None, None
-        found = []
+        window_by_gravity = []
         across = list(self._weights_across(first, last))
         for weight in across or self._weights_near(first, last):
             key = tuple(weight.tolist())
@@ -169,18 +170,20 @@ class Laws:
                     window = None
             if window and self._slowed(window, weight):
                 return None, None
-            found.append((window, float(np.linalg.norm(weight)) / self.mass))
-        windows = [(one, gravity) for one, gravity in found if one]
+            window_by_gravity.append(
+                (window, float(np.linalg.norm(weight)) / self.mass)
+            )
+        windows = [(states, gravity) for states, gravity in window_by_gravity if states]
         return max(
             windows,
-            key=lambda one: float(np.ptp(time[[*one[0]]])),
+            key=lambda pair: float(np.ptp(time[[*pair[0]]])),
             default=(None, None),
         )
 
     def _around(self, td: float) -> tuple[int, int]:
         """Return the states around ``td`` in which a fading or constant load bends the momentum only a little."""
         at = min(int(np.searchsorted(self.fit.time, td)), self.fit.time.size - 1)
-        return longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
+        return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
         """Yield weights (3,) along an axis that show across a load of one direction, which bends only along it."""
@@ -188,20 +191,20 @@ class Laws:
             return
         time = self.fit.time[first : last + 1]
         momentum = self.fit.momentum[first : last + 1]
-        rest = bent(time, momentum)
-        along = np.linalg.svd(rest, full_matrices=False)[2][0]
+        deviation = remove_line(time, momentum)
+        along = np.linalg.svd(deviation, full_matrices=False)[2][0]
         across = np.eye(along.size) - np.outer(along, along)
         room = _REACH_OF_NOISE * max(self.noise, ROUND_OFF * self.extent)
         if (
-            np.abs(rest @ across).max() > room
-            or np.abs(rest @ along).max() < _CLEARLY * room
+            np.abs(deviation @ across).max() > room
+            or np.abs(deviation @ along).max() < _CLEARLY * room
         ):
             return
         slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
-        for axis, seen in zip(np.eye(along.size), across, strict=True):
-            if seen @ seen > _SEEN**2:
-                size = float(slope @ seen) / float(seen @ seen)
-                if np.linalg.norm(slope - size * seen) <= _ALIKE * abs(
+        for axis, is_seen in zip(np.eye(along.size), across, strict=True):
+            if is_seen @ is_seen > _SEEN**2:
+                size = float(slope @ is_seen) / float(is_seen @ is_seen)
+                if np.linalg.norm(slope - size * is_seen) <= _ALIKE * abs(
                     size
                 ) and self._is_gravity(abs(size) / self.mass):
                     yield size * axis
@@ -221,7 +224,7 @@ class Laws:
                 direction = slope / size
             yield from (
                 direction * (self.mass * gravity)
-                for gravity in _gravities_near(size, self.gravities)
+                for gravity in _list_gravities_near(size, self.gravities)
             )
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
@@ -229,11 +232,11 @@ class Laws:
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
-        beside = (
+        remaining_force = (
             np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis]
             - weight
         )
-        first, _, last = np.linalg.norm(beside, axis=1)
+        first, _, last = np.linalg.norm(remaining_force, axis=1)
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
@@ -254,19 +257,19 @@ class Laws:
             return None if self._slowed(window, vector) else force / mass
         if self.velocity:  # velocities change by an acceleration
             return None
-        found = None
+        gravity = None
         if self.balance is not None:
-            found = acceleration_by_work(
+            gravity = find_acceleration_by_work(
                 self.balance,
                 self.fit.time,
                 self.fit.momentum @ (vector / force),
                 start,
                 end,
             )
-        if found is None:
+        if gravity is None:
             return float("nan") if self._may_fall and np.isnan(mass) else None
-        if self._is_gravity(found):
-            return found
+        if self._is_gravity(gravity):
+            return gravity
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
@@ -292,11 +295,12 @@ class Laws:
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
             return False  # the mass is written
-        swing = float(np.ptp(balance.internal[window(balance.time, start, end)]))
+        swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
         largest = force / self.mass
-        least = largest * (1 - swing / float(kinetic[best]))
+        lightest = largest * (1 - swing / float(kinetic[best]))
         return any(
-            least <= one <= largest for one in _gravities_near(largest, self.gravities)
+            lightest <= gravity <= largest
+            for gravity in _list_gravities_near(largest, self.gravities)
         )
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
@@ -329,11 +333,11 @@ class Laws:
         self.fall = False  # `fall` is read while it is computed
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
-        windows = (self._lasting(self.fit, td) for td in moments(self.fit.time))
+        windows = (self._lasting(self.fit, td) for td in list_moments(self.fit.time))
         return any(
-            (self._gravity(one) or 0.0) > 0
-            for one in windows
-            if one and not self._braked(*one)
+            (self._gravity(states) or 0.0) > 0
+            for states in windows
+            if states and not self._braked(*states)
         )
 
     @cached_property
@@ -342,16 +346,20 @@ class Laws:
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
-            for td in moments(self.fit.time)
+            for td in list_moments(self.fit.time)
         )
 
 
-def _gravities_near(
+def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
     """Yield values of gravity about as large as an acceleration: ``known`` ones, or those usual in decks."""
     if known is not None:
-        yield from (one for one in known if abs(acceleration - one) < _ROUGHLY * one)
+        yield from (
+            gravity
+            for gravity in known
+            if abs(acceleration - gravity) < _ROUGHLY * gravity
+        )
         return
     for value in _OF_DECKS if acceleration > 0 else ():
         gravity = float(value * 10.0 ** np.round(np.log10(acceleration / value)))
@@ -378,7 +386,7 @@ def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> 
     )
 
 
-def acceleration_by_work(
+def find_acceleration_by_work(
     balance: Balance, time: Samples, momentum: Samples, start: float, end: float
 ) -> float | None:
     """Return the acceleration at which the work on a momentum grows [length/time^2].
@@ -401,19 +409,23 @@ def acceleration_by_work(
         None if no such energy is written, 0 if they do not follow the momentum.
     """
     work = balance.kinetic_and_internal if balance.worked is None else balance.worked
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     if work is None or balance.time[inside].size < _LEAST_STATES:
         return None
-    impulse = integral(
+    impulse = integrate_by_trapezia(
         balance.time[inside], np.interp(balance.time[inside], time, momentum)
     )
     columns = [np.ones_like(impulse), impulse]
     if balance.kinetic is not None:
-        columns.append(integral(balance.time[inside], balance.kinetic[inside]))
+        columns.append(
+            integrate_by_trapezia(balance.time[inside], balance.kinetic[inside])
+        )
     table = np.stack(columns, axis=1)
     factors, *_ = np.linalg.lstsq(table, work[inside], rcond=None)
-    rest = float(np.abs(work[inside] - table @ factors).max())
-    return float(factors[1]) if rest <= _OF_WORK * float(np.ptp(work[inside])) else 0.0
+    misfit = float(np.abs(work[inside] - table @ factors).max())
+    return (
+        float(factors[1]) if misfit <= _OF_WORK * float(np.ptp(work[inside])) else 0.0
+    )
 
 
 class FreeFall(Law):
@@ -422,7 +434,7 @@ class FreeFall(Law):
     def __init__(self, time: Samples, momentum: Samples) -> None:
         super().__init__(time)
         self.momentum = momentum
-        self.integral = integral(time, momentum)
+        self.integral = integrate_by_trapezia(time, momentum)
         self._both = np.asfortranarray(
             np.hstack([momentum, self.integral])
         )  # contiguous columns, since windows are long
@@ -451,10 +463,10 @@ class FreeFall(Law):
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """Return the deviations of momentum and impulse from straight lines, and the alpha >= 0 that relates them."""
         states = slice(first, last + 1)
-        rest = bent(self.time[states], self._both[states])
+        deviation = remove_line(self.time[states], self._both[states])
         half = self.momentum.shape[1]
-        p = rest[:, :half]
-        impulse = rest[:, half:]
+        p = deviation[:, :half]
+        impulse = deviation[:, half:]
         power = float((impulse * impulse).sum())
         return (
             p,

@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.window import FEWEST, SHORTEST
-from d2rpick.histories.samples import find_crossings, window
+from d2rpick.histories.samples import find_crossings, find_window
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
@@ -71,29 +71,29 @@ class QuietTime(NamedTuple):
     settled: float
 
 
-def quiet_time(history: History, td: float) -> QuietTime | None:
+def find_quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
     start = float(history.time[0])
-    least = round_off(history)
-    before = history.between(start, td)[1]
+    rounding = round_off(history)
+    energy_before = history.between(start, td)[1]
     fallen = (
-        least > 0
-        and before.size >= FEWEST
-        and max(before.max(), -before.min()) <= least
+        rounding > 0
+        and energy_before.size >= FEWEST
+        and max(energy_before.max(), -energy_before.min()) <= rounding
     )
     if fallen and td - start >= SHORTEST * (
         history.time[-1] - start
     ):  # nothing has happened since the start
-        return QuietTime(start, _burst(history, start, td), start)
-    settled = end_of_load(history, td)
+        return QuietTime(start, _find_burst(history, start, td), start)
+    settled = find_end_of_load(history, td)
     if settled is None:
         return None
-    settled = _last_push(history, _last_excursion(history, settled, td), td)
+    settled = _find_last_push(history, _find_last_excursion(history, settled, td), td)
     changes = [
         time
         for time in (
-            _burst(history, settled, td),
-            _change_of_level(history, settled, td),
+            _find_burst(history, settled, td),
+            _find_change_of_level(history, settled, td),
         )
         if time
     ]
@@ -102,7 +102,7 @@ def quiet_time(history: History, td: float) -> QuietTime | None:
     )
 
 
-def landing_after(history: History, start: float) -> float | None:
+def find_landing_after(history: History, start: float) -> float | None:
     """Return the first time after ``start`` [time] at which the energy bursts out of its former range, or None.
 
     It is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's width: no
@@ -111,10 +111,12 @@ def landing_after(history: History, start: float) -> float | None:
     time, energy = history.between(start, np.inf)
     if time.size < FEWEST:
         return None
-    known = np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
-    top = np.maximum.accumulate(energy)[known]
-    bottom = np.minimum.accumulate(energy)[known]
-    turns = np.searchsorted(history.turns, time[known]) - np.searchsorted(
+    last_known = (
+        np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
+    )
+    top = np.maximum.accumulate(energy)[last_known]
+    bottom = np.minimum.accumulate(energy)[last_known]
+    turns = np.searchsorted(history.turns, time[last_known]) - np.searchsorted(
         history.turns, start
     )
     long_enough = (turns >= _TURNED) & (
@@ -130,7 +132,7 @@ def landing_after(history: History, start: float) -> float | None:
     return float(time[rising[-1] + 1])
 
 
-def end_of_load(history: History, td: float) -> float | None:
+def find_end_of_load(history: History, td: float) -> float | None:
     """Return the last time before td at which the energy falls into its band: the end of the load [time].
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
@@ -155,19 +157,19 @@ def end_of_load(history: History, td: float) -> float | None:
     return float(find_crossings(time[last], energy[last], level)[0][0])
 
 
-def _last_excursion(history: History, start: float, td: float) -> float:
+def _find_last_excursion(history: History, start: float, td: float) -> float:
     """Return the last time from ``start`` to td at which the energy is far from where it stays most of the time."""
     time, energy = history.between(start, td)
     if time.size < FEWEST:
         return start
-    low, high = _widened(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
+    low, high = _widen_band(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
     far = np.flatnonzero((energy < low) | (energy > high))
     return float(time[far[-1]]) if far.size else start
 
 
-def _last_push(history: History, start: float, td: float) -> float:
+def _find_last_push(history: History, start: float, td: float) -> float:
     """Return the last time from ``start`` to td at which the energy changes much faster than just before td."""
-    inside = window(history.time, start, td)
+    inside = find_window(history.time, start, td)
     time = history.time[inside]
     if time.size < FEWEST:
         return start
@@ -180,17 +182,17 @@ def _last_push(history: History, start: float, td: float) -> float:
     return float(time[fast[-1] + 1]) if fast.size else start
 
 
-def _burst(history: History, start: float, td: float) -> float | None:
+def _find_burst(history: History, start: float, td: float) -> float | None:
     """Return the first time after ``td`` at which the energy rises above its band from ``start`` to td, or None."""
-    top = _widened(history.between(start, td)[1], _BAND_RESERVE)[1]
+    top = _widen_band(history.between(start, td)[1], _BAND_RESERVE)[1]
     time, energy = history.between(np.nextafter(td, np.inf), np.inf)
     above = np.flatnonzero(energy > top)
     return float(time[above[0]]) if above.size else None
 
 
-def _change_of_level(history: History, start: float, td: float) -> float | None:
+def _find_change_of_level(history: History, start: float, td: float) -> float | None:
     """Return the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
-    inside = window(history.time, start, td)
+    inside = find_window(history.time, start, td)
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:
         return None
@@ -198,15 +200,17 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
         "sums", lambda: np.append(0.0, np.cumsum(history.energy))
     )[inside.start :]
     means = (sums[width:] - sums[:-width]) / width
-    after = inside.stop - inside.start  # the first mean whose states all lie after td
-    low, high = _widened(means[: after - width + 1], 1.0)
-    off = np.flatnonzero((means[after:] < low) | (means[after:] > high))
-    if off.size:
-        return float(history.time[inside.stop + int(off[0]) + width // 2])
+    first_after = (
+        inside.stop - inside.start
+    )  # the first mean whose states all lie after td
+    low, high = _widen_band(means[: first_after - width + 1], 1.0)
+    outside = np.flatnonzero((means[first_after:] < low) | (means[first_after:] > high))
+    if outside.size:
+        return float(history.time[inside.stop + int(outside[0]) + width // 2])
     return None
 
 
-def _widened(values: Samples, share: float) -> tuple[float, float]:
+def _widen_band(values: Samples, share: float) -> tuple[float, float]:
     """Return the band of some values, widened on both sides by a share of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
@@ -220,11 +224,11 @@ def round_off(history: History) -> float:
         terms += [balance.internal, balance.kinetic]
         terms += [balance.external_work, balance.total]
     return history.known.once(
-        "round-off", lambda: _ROUND_OFF * largest(history.energy, *terms)
+        "round-off", lambda: _ROUND_OFF * find_largest(history.energy, *terms)
     )
 
 
-def largest(*terms: Samples | None) -> float:
+def find_largest(*terms: Samples | None) -> float:
     """Return the largest absolute value of some energies, which may be missing or empty; 0 without any [energy]."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
@@ -232,7 +236,7 @@ def largest(*terms: Samples | None) -> float:
     )
 
 
-def settled_from(
+def find_settled_time(
     time: Samples,
     energy: Samples,
     damped: Samples | None,
@@ -252,19 +256,23 @@ def settled_from(
     unseen : float
         Rounding of these energies: the level may fall by it as well [energy].
     """
-    inside = window(time, start, end)
-    least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
+    inside = find_window(time, start, end)
+    rounding = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
     first = inside.start
     last = inside.stop
     while last - first >= FEWEST:
         if damped is None:
             lost = np.full(last - first, np.inf)
         else:
-            lost = _still_lost(damped[:, first:last]) + unseen
-        states = energy[first:last], lost, least
-        kept = 0 if _swings(*states) else _kept_from(*states)
-        if kept is not None:
-            return start if first + kept == inside.start else float(time[first + kept])
+            lost = _sum_later_losses(damped[:, first:last]) + unseen
+        states = energy[first:last], lost, rounding
+        first_kept = 0 if _has_slow_swings(*states) else _find_first_kept(*states)
+        if first_kept is not None:
+            return (
+                start
+                if first + first_kept == inside.start
+                else float(time[first + first_kept])
+            )
         first += max(1, (last - first) // 4)
     return None
 
@@ -289,8 +297,8 @@ def rises_as_it_yields(
     start, settled, end : float
         Start and end of the flight, and the time in it from which the energy keeps its level [time].
     """
-    rising = window(time, start, settled)
-    level = window(time, settled, end)
+    rising = find_window(time, start, settled)
+    level = find_window(time, settled, end)
     before = energy[rising]
     kept = energy[level]
     if before.size < 2 or not kept.size:
@@ -317,14 +325,14 @@ def rises_as_it_yields(
     return bool(times[last_flat] - times[first_flat] <= _MOST_FLAT * rise_time)
 
 
-def _still_lost(damped: Samples) -> Samples:
+def _sum_later_losses(damped: Samples) -> Samples:
     """Return what damping takes from each state to the mean of the last quarter, in the most damped energy, (n,)."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
 
 
-def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
+def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
     """Return the first state from which an energy keeps the level of its last quarter, None if that drifts.
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
@@ -347,22 +355,22 @@ def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
     return int(outside[-1]) + 1 if outside.size else 0
 
 
-def _swings(energy: Samples, lost: Samples, least: float) -> bool:
+def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
     """Return True if an energy swings slowly about one level: by half of its range, alike in both halves."""
     width = float(np.ptp(energy))
     if width <= least:
         return True
-    one, two = np.array_split(energy, 2)
+    first_half, second_half = np.array_split(energy, 2)
     taken = 0.0 if np.isinf(lost[0]) else float(lost[0] - lost[-1])
-    drift = float(two.mean() - one.mean())
+    drift = float(second_half.mean() - first_half.mean())
     if abs(drift) > _DRIFT * _ALIKE * width + (taken if drift < 0 else 0.0):
         return False
-    if min(np.ptp(one), np.ptp(two)) < _ALIKE * width - taken:
+    if min(np.ptp(first_half), np.ptp(second_half)) < _ALIKE * width - taken:
         return False
-    return _large_swings(energy, width / 2) >= _SWINGS
+    return _count_large_swings(energy, width / 2) >= _SWINGS
 
 
-def _large_swings(energy: Samples, least: float) -> int:
+def _count_large_swings(energy: Samples, least: float) -> int:
     """Count how often an energy turns after a change of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns = 0
@@ -383,9 +391,9 @@ def _large_swings(energy: Samples, least: float) -> int:
     return turns
 
 
-def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:
+def has_whole_motion(balance: Balance, start: float, end: float) -> bool:
     """Return True if more moves in a window than the vibration that the internal energy shows."""
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     if (
         balance.kinetic is None
         or balance.internal is None
@@ -397,7 +405,7 @@ def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:
     top = float(internal.max())
     bottom = float(internal.min())
     if bottom <= _TO_ZERO * top:
-        least = _TO_ZERO * top
+        least_kinetic = _TO_ZERO * top
     else:
-        least = max(top - bottom, _HARDLY * top)
-    return float(kinetic[int(np.argmax(internal))]) > least
+        least_kinetic = max(top - bottom, _HARDLY * top)
+    return float(kinetic[int(np.argmax(internal))]) > least_kinetic

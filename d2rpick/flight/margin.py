@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import window
+from d2rpick.histories.samples import find_window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +43,7 @@ class Margin(NamedTuple):
     grazing: str | None = None
 
 
-def margin_before_contact(
+def compute_margin(
     history: History,
     flight: Flight,
     given: float | None = None,
@@ -67,24 +67,24 @@ def margin_before_contact(
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
     share = SHARE * (flight.end - flight.start)
-    spread = landing_moves(history, flight, place)
+    spread = estimate_landing_spread(history, flight, place)
     if spread is None or spread <= share:
-        kept = Margin(share, "flight", spread)
+        margin = Margin(share, "flight", spread)
     else:
-        kept = Margin(spread, "landing", spread)
-    if grazes(history, flight, kept.time):
+        margin = Margin(spread, "landing", spread)
+    if is_grazing(history, flight, margin.time):
         grazing = "force"
     elif changes_momentum_little(history, flight):
         grazing = "momentum"
     else:
-        return kept
-    earlier = grazing_moves(history, flight, place)
-    if earlier is None or earlier <= kept.time:
-        return kept
+        return margin
+    earlier = estimate_grazing_spread(history, flight, place)
+    if earlier is None or earlier <= margin.time:
+        return margin
     return Margin(earlier, "grazing", earlier, grazing)
 
 
-def landing_moves(
+def estimate_landing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
     """Return how far a switch may move the next landing, from its velocity error and the body's place error [time].
@@ -92,15 +92,15 @@ def landing_moves(
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground.  None if neither error is known.
     """
-    spread = landing_spread(history, flight)
-    speed = _closing_speed(history, flight)
+    spread = estimate_spread_of_vibration(history, flight)
+    speed = _compute_closing_speed(history, flight)
     if place is None or speed is None:
         return spread
     out_of_place = place / speed if speed > 0 else float("inf")
     return out_of_place if spread is None else spread + out_of_place
 
 
-def grazing_moves(
+def estimate_grazing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
     r"""Return how much earlier a grazing contact may come [time]: infinite without gravity, None if no error is known.
@@ -108,8 +108,8 @@ def grazing_moves(
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
     """
-    spread = landing_spread(history, flight)
-    speed = _closing_speed(history, flight)
+    spread = estimate_spread_of_vibration(history, flight)
+    speed = _compute_closing_speed(history, flight)
     if spread is None or speed is None or np.isinf(spread):
         amplitude = None
     else:
@@ -138,7 +138,7 @@ class _Contact(NamedTuple):
 
 def _find_contact(history: History, flight: Flight) -> _Contact | None:
     """Return the forces around the contact that ends a flight; None if the momenta do not show them."""
-    evidence = _of_flight(history, flight)
+    evidence = _select_momenta_of_flight(history, flight)
     if evidence is None or flight.end is None:
         return None
     from d2rpick.flight.free_fall import FreeFall
@@ -146,7 +146,7 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
     momenta, members = evidence
     time = momenta.time
     momentum = momenta.of(members)
-    inside = window(time, *flight.within(time))
+    inside = find_window(time, *flight.within(time))
     begin = int(np.searchsorted(time, flight.end, side="right")) - 1
     if time[inside].size < _FEWEST or begin + _FEWEST >= time.size:
         return None
@@ -156,7 +156,7 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
     return _Contact(time, momentum, force, gravity, begin)
 
 
-def grazes(history: History, flight: Flight, within: float) -> bool:
+def is_grazing(history: History, flight: Flight, within: float) -> bool:
     """Whether the contact that ends a flight stays below 1 % of the largest force for a time ``within`` [time].
 
     False if the record ends before that, or momenta do not show the force.
@@ -164,11 +164,14 @@ def grazes(history: History, flight: Flight, within: float) -> bool:
     contact = _find_contact(history, flight)
     if contact is None or flight.end is None:
         return False
-    after = window(contact.time, flight.end, flight.end + within)
-    if contact.time[after].size < _FEWEST or contact.time[-1] <= flight.end + within:
+    after_contact = find_window(contact.time, flight.end, flight.end + within)
+    if (
+        contact.time[after_contact].size < _FEWEST
+        or contact.time[-1] <= flight.end + within
+    ):
         return False
     limit = _GRAZING_FORCE * contact.force.max()
-    return bool(contact.force[after].max() < limit)
+    return bool(contact.force[after_contact].max() < limit)
 
 
 def changes_momentum_little(history: History, flight: Flight) -> bool:
@@ -178,8 +181,8 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     momentum less gravity.  False if the record ends before that, or momenta do not show the force.
     """
     contact = _find_contact(history, flight)
-    evidence = _of_flight(history, flight)
-    speed = _closing_speed(history, flight)
+    evidence = _select_momenta_of_flight(history, flight)
+    speed = _compute_closing_speed(history, flight)
     if contact is None or evidence is None or speed is None:
         return False
     acts = contact.force[contact.begin :] > _GRAZING_FORCE * contact.force.max()
@@ -203,7 +206,7 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * mass * speed)
 
 
-def landing_spread(history: History, flight: Flight) -> float | None:
+def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
     r"""Return how far the velocity error of a switch may move the next landing.
 
     A switch takes the velocity of the vibration from all parts, and freezes them away from their rest positions, by the
@@ -238,7 +241,7 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     height moves the landing after it by 70 ms.
     """
     balance = history.balance
-    momentum = _momentum(history, flight)
+    momentum = _get_momentum_in_flight(history, flight)
     if (
         balance is None
         or balance.internal is None
@@ -247,14 +250,16 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     ):
         return None
     start, end = flight.within(history.time)
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     energy = balance.internal[inside]
     if energy.size < 2:
         return None
     vibration = float(energy.mean()) - max(0.0, float(energy.min()))
     crossings = int(np.count_nonzero(np.diff(energy > energy.mean())))
     omega = np.pi * crossings / (2 * (end - start))
-    approach = float(balance.kinetic[inside][-1]) * _towards_ground(momentum)
+    approach = float(balance.kinetic[inside][-1]) * _compute_share_towards_ground(
+        momentum
+    )
     if vibration <= 0 or crossings == 0:
         return 0.0
     if approach > 0:
@@ -262,33 +267,39 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     return float("inf")
 
 
-def energy_of_approach(history: History, flight: Flight) -> float | None:
+def compute_energy_of_approach(history: History, flight: Flight) -> float | None:
     """Return the kinetic energy of the motion along gravity at the end of a flight [energy].
 
     None if kinetic energy or momentum are not written, or other parts move as well.
     """
     balance = history.balance
-    momentum = _momentum(history, flight)
+    momentum = _get_momentum_in_flight(history, flight)
     if balance is None or balance.kinetic is None or momentum is None:
         return None
-    kinetic = balance.kinetic[window(balance.time, *flight.within(history.time))]
-    return float(kinetic[-1]) * _towards_ground(momentum) if kinetic.size else None
+    kinetic = balance.kinetic[find_window(balance.time, *flight.within(history.time))]
+    return (
+        float(kinetic[-1]) * _compute_share_towards_ground(momentum)
+        if kinetic.size
+        else None
+    )
 
 
-def _momentum(history: History, flight: Flight) -> Samples | None:
+def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
     """Return the momentum of the flying parts in the flight, shape (k, 3 or 1); None if unknown or others move."""
-    seen = _of_flight(history, flight)
-    if seen is None:
+    momentum_of_body = _select_momenta_of_flight(history, flight)
+    if momentum_of_body is None:
         return None
-    momenta, members = seen
+    momenta, members = momentum_of_body
     moving = np.ptp(momenta.values, axis=0).any(axis=1)
     if set(np.flatnonzero(moving).tolist()) - set(members):
         return None
-    values = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
+    values = momenta.of(members)[
+        find_window(momenta.time, *flight.within(momenta.time))
+    ]
     return values if len(values) > 1 else None
 
 
-def _of_flight(
+def _select_momenta_of_flight(
     history: History, flight: Flight
 ) -> tuple[Momenta, Sequence[int]] | None:
     """Return the momenta that show the flying parts, and their columns; None if none is written."""
@@ -302,21 +313,23 @@ def _of_flight(
     return None
 
 
-def _closing_speed(history: History, flight: Flight) -> float | None:
+def _compute_closing_speed(history: History, flight: Flight) -> float | None:
     """Return the speed along gravity at the end of a flight, without gravity the speed [length/time], or None."""
-    seen = _of_flight(history, flight)
-    if seen is None:
+    momentum_of_body = _select_momenta_of_flight(history, flight)
+    if momentum_of_body is None:
         return None
-    momenta, members = seen
-    momentum = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
+    momenta, members = momentum_of_body
+    momentum = momenta.of(members)[
+        find_window(momenta.time, *flight.within(momenta.time))
+    ]
     mass = 1.0 if momenta.velocity else momenta.mass(members)
     if len(momentum) < 2 or not mass > 0:
         return None
     size = float(np.linalg.norm(momentum[-1])) / mass
-    return size * float(np.sqrt(_towards_ground(momentum)))
+    return size * float(np.sqrt(_compute_share_towards_ground(momentum)))
 
 
-def _towards_ground(momentum: Samples) -> float:
+def _compute_share_towards_ground(momentum: Samples) -> float:
     """Return the share of the kinetic energy at the end of a flight that belongs to the motion along gravity [-]."""
     last = momentum[-1]
     change = momentum[-1] - momentum[0]

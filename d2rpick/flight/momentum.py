@@ -17,12 +17,12 @@ from d2rpick.flight.window import (
     FEWEST,
     TOLERANCE,
     FreeFlight,
-    all_windows,
-    lasting_window,
-    moments,
-    unheld,
+    find_all_windows,
+    find_lasting_window,
+    limit_to_unheld,
+    list_moments,
 )
-from d2rpick.histories.samples import bent, stretches, window
+from d2rpick.histories.samples import find_stretches, find_window, remove_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -58,12 +58,12 @@ FLYING: Final = "flying"
 ALL: Final = "all"
 
 
-def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
+def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
     """Return the momenta that may show a flight, best first: all, or only the set that was named to fly."""
-    return [one for one in momenta if one.flying] or momenta
+    return [candidate for candidate in momenta if candidate.flying] or momenta
 
 
-def flight_around(
+def find_flight_around(
     momenta: Momenta, td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
     """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
@@ -87,21 +87,24 @@ def flight_around(
     best: FreeFlight | None = None
     if momenta.at_rest:
         return None
-    for members in [momenta.flying] if momenta.flying else _sets(momenta, td):
-        found = flight_of(momenta, members, td, balance)
-        if found and (
-            best is None or found.end - found.start > _LONGER * (best.end - best.start)
+    for members in (
+        [momenta.flying] if momenta.flying else _list_sets_to_try(momenta, td)
+    ):
+        flight = find_flight_of(momenta, members, td, balance)
+        if flight and (
+            best is None
+            or flight.end - flight.start > _LONGER * (best.end - best.start)
         ):
-            best = _of_its_bodies(momenta, members, td, found) or best
+            best = _limit_to_flights_of_bodies(momenta, members, td, flight) or best
     return best
 
 
-def _of_its_bodies(
+def _limit_to_flights_of_bodies(
     momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight
 ) -> FreeFlight | None:
     """Return the part of a set's flight in which each body flies: colliding bodies keep their common momentum."""
-    for part in bodies_apart(momenta, members):
-        alone = flight_of(momenta, (part,), td)
+    for part in find_bodies_apart(momenta, members):
+        alone = find_flight_of(momenta, (part,), td)
         if alone is None:
             return None
         start = max(flight.start, alone.start)
@@ -112,14 +115,14 @@ def _of_its_bodies(
     return flight if flight.start < flight.end else None
 
 
-def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
+def find_bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
     """Return the parts among ``members`` that fly by themselves at some time, not at the set's velocity."""
     return momenta.known.once(
-        ("apart", *members), lambda: tuple(_apart(momenta, members))
+        ("apart", *members), lambda: tuple(_search_bodies_apart(momenta, members))
     )
 
 
-def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
+def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     """Find the parts among ``members`` that fly by themselves, see `bodies_apart`."""
     mass = momenta.mass(members)
     masses = momenta.masses
@@ -133,7 +136,7 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
-    least = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0])
+    least_time = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0])
     spans = np.gradient(momenta.time)
     for part in members:
         if not masses[part] > 0:
@@ -141,27 +144,31 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
         relative = np.linalg.norm(
             momenta.values[:, part] / masses[part] - velocity, axis=1
         )
-        if float(spans[relative > room].sum()) <= least:
+        if float(spans[relative > room].sum()) <= least_time:
             continue  # no flight of this part could count
         apart = (
             flight.end - flight.start
-            for flight in _alone(momenta, part)
-            if float(relative[window(momenta.time, flight.start, flight.end)].min())
+            for flight in _find_flights_of_part(momenta, part)
+            if float(
+                relative[find_window(momenta.time, flight.start, flight.end)].min()
+            )
             > room
         )
-        if sum(apart) > least:
+        if sum(apart) > least_time:
             yield part
 
 
-def _alone(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
+def _find_flights_of_part(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
     """Return the flights of one part by itself, searched once."""
     return momenta.known.once(
         ("alone", part),
-        lambda: all_windows(momenta.time, partial(flight_of, momenta, (part,))),
+        lambda: find_all_windows(
+            momenta.time, partial(find_flight_of, momenta, (part,))
+        ),
     )
 
 
-def flight_of(
+def find_flight_of(
     momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
     """Find the window around ``td`` in which these parts together fly freely, or None."""
@@ -174,17 +181,23 @@ def flight_of(
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
     gravities = momenta.surroundings.gravity_on(parts)
     if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
-        known = float(np.abs(momentum).max()) > noise and _moves(
+        is_flight = float(np.abs(momentum).max()) > noise and _has_clear_motion(
             momenta, members, noise
         )
-        known = known and (gravities is None or 0.0 in gravities)
+        is_flight = is_flight and (gravities is None or 0.0 in gravities)
         whole = FreeFlight.of(time, (0, time.size - 1), parts)
-        return unheld(momenta.surroundings, whole, parts, td) if known else None
+        return (
+            limit_to_unheld(momenta.surroundings, whole, parts, td)
+            if is_flight
+            else None
+        )
     if noise > TOLERANCE * extent:
         return None
-    laws = laws_of(momenta, tuple(members), balance)
+    laws = get_laws_of(momenta, tuple(members), balance)
     states, gravity = laws.window(td)
-    if states is None or (not gravity and gravities is None and _falls(momenta)):
+    if states is None or (
+        not gravity and gravities is None and _has_falling_part(momenta)
+    ):
         return None  # a part that does not fall with the others is carried
     first, last = states
     inside = momentum[first : last + 1]
@@ -196,11 +209,11 @@ def flight_of(
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
             return None  # held, or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
-    found = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
-    return unheld(momenta.surroundings, found, parts, td)
+    flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
+    return limit_to_unheld(momenta.surroundings, flight, parts, td)
 
 
-def laws_of(
+def get_laws_of(
     momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
 ) -> Laws:
     """Return the laws of free flight for a set of parts, made once for all td."""
@@ -213,21 +226,23 @@ def laws_of(
     )
 
 
-def _falls(momenta: Momenta) -> bool:
+def _has_falling_part(momenta: Momenta) -> bool:
     """Return True if a single part is seen to fall under gravity."""
     return momenta.parts is not None and momenta.known.once(
-        "falls", lambda: any(laws_of(momenta, (i,)).fall for i in momenta.moving)
+        "falls", lambda: any(get_laws_of(momenta, (i,)).fall for i in momenta.moving)
     )
 
 
-def all_flights(
+def find_all_flights(
     momenta: Momenta, balance: Balance | None = None
 ) -> tuple[FreeFlight, ...]:
     """Find all windows of free flight of the chosen parts and the parts that fly with them, in ascending order."""
-    return all_windows(momenta.time, partial(flight_around, momenta, balance=balance))
+    return find_all_windows(
+        momenta.time, partial(find_flight_around, momenta, balance=balance)
+    )
 
 
-def tells(momenta: Momenta) -> bool:
+def can_deny_flight(momenta: Momenta) -> bool:
     """Return True if the chosen parts, or the model, move enough for their momentum to show that they do not fly."""
     change = momenta.change(momenta.chosen)
     return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(
@@ -235,7 +250,7 @@ def tells(momenta: Momenta) -> bool:
     )
 
 
-def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
+def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     """Return True if a constant momentum, known up to ``noise``, shows that the chosen parts fly and are not at rest.
 
     Heavy parts print coarse numbers, which may hide a load on the chosen parts.  If the chosen parts have no mass, as
@@ -250,7 +265,7 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     return size > _VISIBLE * noise
 
 
-def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
+def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     """Yield the sets of parts to try: the chosen parts, these with attached parts, and all moving parts.
 
     If all parts are chosen, the user chose none; then parts that something carries are left out.
@@ -259,17 +274,19 @@ def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     yield chosen
     if (
         len(chosen) == momenta.values.shape[1]
-        and len(apart := bodies_apart(momenta, chosen)) > 0
+        and len(apart := find_bodies_apart(momenta, chosen)) > 0
     ):
         yield apart
-    attached = tuple(sorted({*chosen, *_attached(momenta, chosen, td)}))
+    attached = tuple(sorted({*chosen, *_find_attached_parts(momenta, chosen, td)}))
     if attached != chosen:
         yield attached
     if set(momenta.moving) - set(attached):
         yield tuple(sorted({*momenta.moving, *attached}))
 
 
-def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, ...]:
+def _find_attached_parts(
+    momenta: Momenta, chosen: Sequence[int], td: float
+) -> tuple[int, ...]:
     """Return the parts that must be added so that the bending of all momenta before td cancels.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
@@ -280,7 +297,7 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
     look = np.flatnonzero(back)[:: max(1, int(back.sum()) // _LOOK_STATES)]
     if look.size < FEWEST:
         return ()
-    rests = bent(time[look], momenta.values[look].reshape(look.size, -1))
+    rests = remove_line(time[look], momenta.values[look].reshape(look.size, -1))
     rests = (
         rests.reshape(look.size, -1, 3)
         .transpose(1, 0, 2)
@@ -293,20 +310,20 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
     wider = (
         len(moving) > rests.shape[1]
     )  # otherwise all left vectors are there, and the right ones are many
-    left, values, _ = np.linalg.svd(
+    left_vectors, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
     values = np.append(values, np.zeros(len(moving) - values.size))
-    null = left[:, values <= _CANCELS * values[0]]
+    null = left_vectors[:, values <= _CANCELS * values[0]]
     shares = (null @ null.T) / np.outer(sizes[moving], sizes[moving])
     rows = [moving.index(i) for i in chosen if i in moving]
     joined = (shares[rows] > np.diag(shares)[rows, np.newaxis] / 2).any(axis=0)
-    return _polished(
+    return _refine_attached_parts(
         rests, {*chosen, *np.array(moving)[joined].tolist()}, chosen, moving
     )
 
 
-def _polished(
+def _refine_attached_parts(
     rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]
 ) -> tuple[int, ...]:
     """Add or leave out single parts as long as this makes the bending of the sum, (parts, k), smaller."""
@@ -323,7 +340,7 @@ def _polished(
     return tuple(sorted(members - set(chosen)))
 
 
-def with_parts_by_number(run: Run, selection: Selection) -> Selection:
+def replace_words_by_part_ids(run: Run, selection: Selection) -> Selection:
     """Replace the words ``flying`` and ``all`` in a selection of parts by the part ids that they stand for.
 
     A part with such a title takes precedence over the word.
@@ -337,115 +354,128 @@ def with_parts_by_number(run: Run, selection: Selection) -> Selection:
     --------
     >>> from d2rpick.histories.opening import Selection, open_run
     >>> run = open_run(["sample_data/rolloverT01.gz"], Selection())
-    >>> with_parts_by_number(run, Selection(parts=("flying",))).parts
+    >>> replace_words_by_part_ids(run, Selection(parts=("flying",))).parts
     ('1', '2')
     """
     titles = {part.title.strip().casefold() for part in run.parts}
-    meanings = {FLYING: flying_parts, ALL: deformable_parts}
-    named: list[str] = []
+    meanings = {FLYING: find_flying_parts, ALL: list_deformable_parts}
+    numbers: list[str] = []
     for text in selection.parts:
         word = text.strip().casefold()
         meant = meanings.get(word) if word not in titles else None
-        named += [str(part.id) for part in meant(run)] if meant else [text]
-    return selection._replace(parts=tuple(dict.fromkeys(named)))
+        numbers += [str(part.id) for part in meant(run)] if meant else [text]
+    return selection._replace(parts=tuple(dict.fromkeys(numbers)))
 
 
-def deformable_parts(run: Run) -> tuple[Part, ...]:
+def list_deformable_parts(run: Run) -> tuple[Part, ...]:
     """Return the parts that ever have internal energy; raise FormatError if there are none."""
     parts = run.parts
     energies = run.part_energies(
         parts
     )  # raises an error that gives the reason if there are none
-    found = tuple(
+    with_energy = tuple(
         part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
     )
-    if not found:
+    if not with_energy:
         raise FormatError(
             f"{run.name}: no part ever has internal energy; name the parts to be switched"
         )
-    return found
+    return with_energy
 
 
-def flying_parts(run: Run) -> tuple[Part, ...]:
+def find_flying_parts(run: Run) -> tuple[Part, ...]:
     """Return the deformable parts that fly as one body; raise FormatError if momenta do not show them.
 
     Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
     car, which is the body to be switched.  The parts that the deck connects are tried; without a deck, or if none of
     these flies by itself, the sets of `flying_together`.
     """
-    deformable, momenta = _with_momenta(run)
-    found = list(_of_bodies(momenta, run.surroundings.bodies())) if momenta else []
-    return _heaviest(run, deformable, momenta, found) if found else flying_together(run)
+    deformable, momenta = _get_parts_and_momenta(run)
+    flights = (
+        list(_list_flights_of_bodies(momenta, run.surroundings.bodies()))
+        if momenta
+        else []
+    )
+    return (
+        _select_heaviest_parts(run, deformable, momenta, flights)
+        if flights
+        else find_parts_flying_together(run)
+    )
 
 
-def flying_together(run: Run) -> tuple[Part, ...]:
+def find_parts_flying_together(run: Run) -> tuple[Part, ...]:
     """Return the deformable parts that momenta show to fly together, in one or more bodies; raise FormatError without.
 
     All parts are tried together, then each part that is in no set yet, with the parts attached to it.
     """
-    deformable, momenta = _with_momenta(run)
-    found: list[FreeFlight] = []
+    deformable, momenta = _get_parts_and_momenta(run)
+    flights: list[FreeFlight] = []
     if momenta:
-        for part, place in zip(deformable, momenta.chosen, strict=True):
-            if not any(part in (flight.parts or ()) for flight in found):
-                found += all_flights(momenta.choosing((place,)))
-        found += all_flights(momenta)
-        for core in _cores(momenta):
-            found += all_flights(momenta.choosing(core, core))
-    return _heaviest(run, deformable, momenta, found)
+        for part, position in zip(deformable, momenta.chosen, strict=True):
+            if not any(part in (flight.parts or ()) for flight in flights):
+                flights += find_all_flights(momenta.choosing((position,)))
+        flights += find_all_flights(momenta)
+        for core in _list_cores(momenta):
+            flights += find_all_flights(momenta.choosing(core, core))
+    return _select_heaviest_parts(run, deformable, momenta, flights)
 
 
-def _cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
+def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
     """Yield sets of parts that are attached to the heaviest part at some time, without parts that slide then.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
     """
     masses = momenta.masses
-    places = [i for i in momenta.chosen if masses is not None and masses[i] > 0]
-    if masses is None or not places:
+    heavy_members = [i for i in momenta.chosen if masses is not None and masses[i] > 0]
+    if masses is None or not heavy_members:
         return
-    heaviest = max(places, key=lambda i: float(masses[i]))
-    found: set[tuple[int, ...]] = set()
-    for td in moments(momenta.time):
-        attached = _attached(momenta, (heaviest,), td)
+    heaviest = max(heavy_members, key=lambda i: float(masses[i]))
+    sets: set[tuple[int, ...]] = set()
+    for td in list_moments(momenta.time):
+        attached = _find_attached_parts(momenta, (heaviest,), td)
         core = tuple(
-            sorted((heaviest, *(i for i in attached if not _slides(momenta, i, td))))
+            sorted(
+                (heaviest, *(i for i in attached if not _is_sliding(momenta, i, td)))
+            )
         )
         if (
-            len(core) <= len(attached) and core not in found
+            len(core) <= len(attached) and core not in sets
         ):  # the set with all of them was tried before
-            found.add(core)
+            sets.add(core)
             yield core
 
 
-def _slides(momenta: Momenta, part: int, td: float) -> bool:
+def _is_sliding(momenta: Momenta, part: int, td: float) -> bool:
     """Return True if a part is seen to move under a constant force around ``td`` [time] that is not gravity."""
-    laws = laws_of(momenta, (part,))
-    straight = lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
-    return straight is not None and flight_of(momenta, (part,), td) is None
+    laws = get_laws_of(momenta, (part,))
+    straight = find_lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
+    return straight is not None and find_flight_of(momenta, (part,), td) is None
 
 
-def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
+def _get_parts_and_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
     """Return the deformable parts and their momenta, None if the run has no momenta of parts."""
-    deformable = deformable_parts(run)
+    deformable = list_deformable_parts(run)
     return deformable, next(
-        (one for one in run.momenta(deformable, None) if one.parts), None
+        (candidate for candidate in run.momenta(deformable, None) if candidate.parts),
+        None,
     )
 
 
-def _of_bodies(
+def _list_flights_of_bodies(
     momenta: Momenta, bodies: Iterable[Iterable[int]]
 ) -> Iterator[FreeFlight]:
     """Yield the flights of connected parts, given by their ids."""
-    places = {part.id: place for place, part in enumerate(momenta.parts or ())}
+    position_by_id = {
+        part.id: position for position, part in enumerate(momenta.parts or ())
+    }
     for body in bodies:
-        members = tuple(places[part] for part in body if part in places)
+        members = tuple(position_by_id[part] for part in body if part in position_by_id)
         if members:
-            yield from all_flights(momenta.choosing(members, members))
+            yield from find_all_flights(momenta.choosing(members, members))
 
 
-def _heaviest(
+def _select_heaviest_parts(
     run: Run,
     deformable: Sequence[Part],
     momenta: Momenta | None,
@@ -463,22 +493,24 @@ def _heaviest(
     mass = dict(zip(run.parts, masses.tolist(), strict=True))
     best = max(
         found,
-        key=lambda one: (
-            (one.end - one.start) * sum(mass[part] for part in one.parts or ())
+        key=lambda flight: (
+            (flight.end - flight.start) * sum(mass[part] for part in flight.parts or ())
         ),
     )
     return tuple(part for part in deformable if part in (best.parts or ()))
 
 
-def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
+def find_complete_stretches(
+    momenta: Momenta, whole: Momenta | None
+) -> tuple[slice, ...]:
     """Return the ranges of states in which the momenta of parts add up to that of the ``whole`` model.
 
     In the other states a rigid body has taken some of them, and no quantity of a part is used.
     """
-    return stretches(complete(momenta, whole), FEWEST)
+    return find_stretches(is_complete(momenta, whole), FEWEST)
 
 
-def complete(
+def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
     """Return for each state (n,) whether the momenta of the parts add up to that of the whole model.
@@ -491,5 +523,7 @@ def complete(
     largest = np.maximum(
         np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before
     )
-    off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
-    return np.asarray(off <= _ALL_OF_IT * largest + 2 * momenta.noise(everything))
+    difference = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
+    return np.asarray(
+        difference <= _ALL_OF_IT * largest + 2 * momenta.noise(everything)
+    )

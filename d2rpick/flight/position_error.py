@@ -17,14 +17,14 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.flight.rotation import (
-    moving_apart,
-    off_the_circle,
-    periods_of,
-    shows_rotation,
+    count_periods,
+    find_moving_parts,
+    has_clear_rotation,
+    subtract_circles,
 )
-from d2rpick.flight.turning import Flying, turning_in_flight
+from d2rpick.flight.turning import Flying, follow_turning
 from d2rpick.flight.window import FEWEST
-from d2rpick.histories.samples import integral, window
+from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -103,8 +103,8 @@ class Drift:
             return False
         if self.slow or self.turning is None:
             return self.slow or self.doubt > _NOTABLE_DOUBT * moved
-        said = np.radians(self.angles(self.time, float(self.time[-1])))
-        return self.turning.doubt > float(np.sqrt(np.mean(said**2)))
+        angles = np.radians(self.angles(self.time, float(self.time[-1])))
+        return self.turning.doubt > float(np.sqrt(np.mean(angles**2)))
 
     def errors(self, tr: Samples, td: float) -> Samples:
         """Return the distances of the body from its right place at td, for tr (k,) [length]; NaN outside the flight.
@@ -114,11 +114,11 @@ class Drift:
         """
         if self.turning:
             return self._inside(tr, td, self.turning.offsets(tr, td))
-        there = np.stack(
+        place_at_td = np.stack(
             [np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T],
             axis=1,
         )
-        return self._inside(tr, td, there[:-1] - there[-1])
+        return self._inside(tr, td, place_at_td[:-1] - place_at_td[-1])
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return by how much the body is turned at td, for times tr (k,) [degrees]; NaN if unknown."""
@@ -143,7 +143,7 @@ class Drift:
         return MOST_OF_PATH * float(self.path[-1])
 
 
-def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
+def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None:
     """Find the displacement of a body in flight against the place of a rigid one.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
@@ -164,7 +164,7 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
     momenta, masses, inside = (
         seen.momenta,
         seen.masses,
-        window(seen.momenta.time, seen.start, seen.end),
+        find_window(seen.momenta.time, seen.start, seen.end),
     )
     time = momenta.time[inside]
     mass = masses[list(seen.members)]
@@ -172,13 +172,13 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         return None
     members = [i for i, m in zip(seen.members, mass.tolist(), strict=True) if m > 0]
     mass = masses[members]
-    if not shows_rotation(mass):
+    if not has_clear_rotation(mass):
         return None
-    ways, path = _ways(
+    ways, path = _integrate_displacements(
         time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
     )
     stride = -(-time.size // _STATES)
-    moving, rate, rest = moving_apart(time[::stride], ways[::stride], mass)
+    moving, rate, misfit = find_moving_parts(time[::stride], ways[::stride], mass)
     if not moving:
         return None
     whole = float(
@@ -186,45 +186,53 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
     )  # parts without a known place are left out: the error would be too small otherwise
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
-        np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
+        np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
     )
-    offsets = _offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
+    offsets = (
+        _compute_offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
+    )
     against = [members[i] for i in moving]
     ids = [momenta.parts[i].id for i in against]
     part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
     if placement:
-        turning = turning_in_flight(seen._replace(members=members), against, placement)
+        turning = follow_turning(seen._replace(members=members), against, placement)
     else:
         turning = None
-    place = offsets.sum(axis=1)
-    slow = bool(rate.any()) and periods_of(time[::stride], place[::stride], rate) < 1
-    found = Drift(time, place, path, part, doubt, turning, moving=ids, slow=slow)
-    return found if doubt <= found.limit else None
+    offset = offsets.sum(axis=1)
+    slow = (
+        bool(rate.any()) and count_periods(time[::stride], offset[::stride], rate) < 1
+    )
+    drift = Drift(time, offset, path, part, doubt, turning, moving=ids, slow=slow)
+    return drift if doubt <= drift.limit else None
 
 
-def _ways(time: Samples, velocity: Samples, mass: Samples) -> tuple[Samples, Samples]:
+def _integrate_displacements(
+    time: Samples, velocity: Samples, mass: Samples
+) -> tuple[Samples, Samples]:
     """Return the displacements of parts (n, parts, 3) against their centre of mass, and its path (n,) [length]."""
     centre = np.average(velocity, axis=1, weights=mass)
-    ways = integral(
+    ways = integrate_by_trapezia(
         time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)
     ).reshape(velocity.shape)
-    return ways, integral(time, np.linalg.norm(centre, axis=1))
+    return ways, integrate_by_trapezia(time, np.linalg.norm(centre, axis=1))
 
 
-def _offsets(
+def _compute_offsets(
     time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
 ) -> Samples:
     """Return how far each moving part displaces the others if no more parts fly, shape (n, moving, 3) [length]."""
-    others = np.setdiff1d(np.arange(mass.size), moving)
+    frame_parts = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = (
         ways[:, list(moving)]
-        - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+        - np.average(ways[:, frame_parts], axis=1, weights=mass[frame_parts])[
+            :, np.newaxis
+        ]
     )
-    return np.asarray(-shares * off_the_circle(time, against, rate))
+    return np.asarray(-shares * subtract_circles(time, against, rate))
 
 
-def drift_in_flight(
+def find_drift_in_flight(
     history: History,
     flight: Flight,
     parts: Sequence[Part] | None = None,
@@ -234,25 +242,25 @@ def drift_in_flight(
 
     None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
     """
-    seen = _seen(history, flight, parts)
-    return drift_of(seen, placement) if seen else None
+    flying = _collect_flying(history, flight, parts)
+    return find_drift(flying, placement) if flying else None
 
 
-def apart_in_flight(
+def find_parts_apart(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
     """Return those of ``parts``, or of the parts to be switched, that fly away from the others: nothing joins them.
 
     The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
-    seen = _seen(history, flight, parts)
-    if seen is None or seen.momenta.parts is None:
+    flying = _collect_flying(history, flight, parts)
+    if flying is None or flying.momenta.parts is None:
         return ()
-    members = [i for i in seen.members if seen.masses[i] > 0]
-    inside = window(seen.momenta.time, seen.start, seen.end)
-    mass = seen.masses[members]
-    time = seen.momenta.time[inside]
-    momentum = seen.momenta.values[inside][:, members]
+    members = [i for i in flying.members if flying.masses[i] > 0]
+    inside = find_window(flying.momenta.time, flying.start, flying.end)
+    mass = flying.masses[members]
+    time = flying.momenta.time[inside]
+    momentum = flying.momenta.values[inside][:, members]
     if time.size < FEWEST or len(members) < 2:
         return ()
     whole = momentum.sum(axis=1, keepdims=True)
@@ -264,21 +272,24 @@ def apart_in_flight(
     path = np.linalg.norm(whole[:, 0] / mass.sum(), axis=1)
     steady = np.linalg.norm(np.ptp(against, axis=0), axis=1) <= _STEADY * speed
     far = speed * (time[-1] - time[0]) > MOST_OF_PATH * float(
-        integral(time, path[:, np.newaxis])[-1, 0]
+        integrate_by_trapezia(time, path[:, np.newaxis])[-1, 0]
     )
     alone = steady & far & (2 * mass <= mass.sum())
     return tuple(
-        seen.momenta.parts[i]
-        for i, one in zip(members, alone.tolist(), strict=True)
-        if one
+        flying.momenta.parts[i]
+        for i, is_alone in zip(members, alone.tolist(), strict=True)
+        if is_alone
     )
 
 
-def _seen(
+def _collect_flying(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
     """Collect the input of a drift; None if the momenta of single parts do not show the flight."""
-    momenta = next((one for one in history.momenta if one.parts is not None), None)
+    momenta = next(
+        (candidate for candidate in history.momenta if candidate.parts is not None),
+        None,
+    )
     masses = history.masses
     if (
         momenta is None
@@ -348,10 +359,12 @@ class Bodies:
         apart: Sequence[Part] = (),
     ) -> None:
         self.told, self.apart = tuple(told or ()), tuple(apart)
-        self._known = tuple(one for one in drifts if one)
+        self._known = tuple(drift for drift in drifts if drift)
         self._complete = len(self._known) == len(drifts) > 0
         self.unknown = tuple(
-            body for body, one in zip(self.told, drifts, strict=False) if one is None
+            body
+            for body, drift in zip(self.told, drifts, strict=False)
+            if drift is None
         )
 
     def errors(self, tr: Samples, td: float) -> Samples:
@@ -364,33 +377,33 @@ class Bodies:
     def limit(self) -> float:
         """Return the error above which a body is out of place, the least of all bodies whose parts move [length]."""
         return min(
-            (one.limit for one in self._known if one.place.any()), default=np.inf
+            (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
 
     def worst(self, tr: float, td: float) -> Off | None:
         """Return the body that is displaced most; None outside the flight, or if an error is unknown."""
         if self._complete:
-            found = self._each(np.array([tr]), td)[:, 0]
+            errors = self._each(np.array([tr]), td)[:, 0]
         else:
-            found = np.full(1, np.nan)
-        if np.isnan(found).any():
+            errors = np.full(1, np.nan)
+        if np.isnan(errors).any():
             return None
-        at = int(np.argmax(found))
+        at = int(np.argmax(errors))
         body = self.told[at] if len(self.told) > 1 else None
         return Off(
-            float(found[at]),
+            float(errors[at]),
             self._known[at],
             body,
             not self.told,
-            any(one.at_least for one in self._known),
+            any(drift.at_least for drift in self._known),
         )
 
     def _each(self, tr: Samples, td: float) -> Samples:
         """Return the errors of all bodies, shape (bodies, k) [length]."""
-        return np.stack([one.errors(tr, td) for one in self._known])
+        return np.stack([drift.errors(tr, td) for drift in self._known])
 
 
-def bodies_in_flight(
+def find_bodies_in_flight(
     history: History,
     flight: Flight,
     told: Sequence[RigidBody] | None,
@@ -409,24 +422,30 @@ def bodies_in_flight(
         Places of the parts according to the deck.
     """
     if not told:
-        away = apart_in_flight(history, flight)
+        away = find_parts_apart(history, flight)
         return Bodies(
-            [None if away else drift_in_flight(history, flight, placement=placement)],
+            [
+                None
+                if away
+                else find_drift_in_flight(history, flight, placement=placement)
+            ],
             None,
             away,
         )
     parts = [
         [part for part in history.parts or () if part.id in body.parts] for body in told
     ]
-    leaving = [apart_in_flight(history, flight, own) for own in parts]
+    leaving = [find_parts_apart(history, flight, body_parts) for body_parts in parts]
     drifts = [
-        None if some else _drift(history, flight, body, own, placement)
-        for body, own, some in zip(told, parts, leaving, strict=True)
+        None
+        if has_leaving
+        else _find_drift_of_body(history, flight, body, body_parts, placement)
+        for body, body_parts, has_leaving in zip(told, parts, leaving, strict=True)
     ]
     return Bodies(drifts, told, sum(leaving, ()))
 
 
-def _drift(
+def _find_drift_of_body(
     history: History,
     flight: Flight,
     body: RigidBody,
@@ -437,9 +456,11 @@ def _drift(
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:
-        return drift_in_flight(history, flight, parts, placement)
+        return find_drift_in_flight(history, flight, parts, placement)
     (part,) = parts
-    if flight.refusal or part.id not in {one.id for one in flight.parts or ()}:
+    if flight.refusal or part.id not in {
+        part_in_flight.id for part_in_flight in flight.parts or ()
+    }:
         return None
     return Drift(
         np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import bent, integral
+from d2rpick.histories.samples import integrate_by_trapezia, remove_line
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +48,7 @@ _MOST_OF_BODY: Final = 0.95
 _HEAVY: Final = 0.05
 
 
-def _steady_rotation(
+def _fit_steady_rotation(
     time: Samples, ways: Samples, masses: Samples, least: float
 ) -> tuple[Samples, float]:
     """Find the constant rate of rotation that best explains the displacements of a body's parts about its centre.
@@ -72,17 +72,22 @@ def _steady_rotation(
         Sum of m r^2 over parts and states that the rotation does not explain [mass length^2].
     """
     weights = np.sqrt(masses)[:, np.newaxis]
-    stood = float(np.sum(_rest(time, ways, np.zeros(3), weights) ** 2))
+    stood = float(np.sum(_compute_rest(time, ways, np.zeros(3), weights) ** 2))
     if stood <= least:
         return np.zeros(3), stood
-    _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
-    rate = np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
-    rest = _rest(time, ways, rate, weights)
+    _, right_side, normal = (
+        term.sum(axis=0) for term in _list_linear_terms(time, ways, masses)
+    )
+    rate = np.asarray(
+        np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right_side
+    )
+    misfit = _compute_rest(time, ways, rate, weights)
     small = _SMALL * 2 * np.pi / float(time[-1] - time[0])
     damping = 1e-3
     for _ in range(_MOST_STEPS):
         changes = [
-            (_rest(time, ways, rate + small * axis, weights) - rest).ravel() / small
+            (_compute_rest(time, ways, rate + small * axis, weights) - misfit).ravel()
+            / small
             for axis in np.eye(3)
         ]
         slope = np.stack(changes, axis=1)
@@ -92,47 +97,47 @@ def _steady_rotation(
             + damping * np.trace(normal) * np.eye(3) / 3
             + np.finfo(float).tiny * np.eye(3)
         )
-        step = -np.linalg.solve(damped, slope.T @ rest.ravel())
-        trial = _rest(time, ways, rate + step, weights)
+        step = -np.linalg.solve(damped, slope.T @ misfit.ravel())
+        trial = _compute_rest(time, ways, rate + step, weights)
         gain = 1 - float(np.sum(trial**2)) / max(
-            float(np.sum(rest**2)), np.finfo(float).tiny
+            float(np.sum(misfit**2)), np.finfo(float).tiny
         )
         if gain >= 0:
             rate = rate + step
-            rest = trial
+            misfit = trial
             damping = damping / 10
         else:
             damping *= 10
         if 0 <= gain <= _LEAST_GAIN or float(np.abs(step).max()) <= small:
             break
-    turned = float(np.sum(rest**2))
+    turned = float(np.sum(misfit**2))
     return (rate, turned) if turned <= _SHOWN * stood else (np.zeros(3), stood)
 
 
-def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
+def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
     """Return the displacements (n, parts, 3) less their circles at a rate, in the frame that turns, without their mean.
 
     The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """
-    frame = _frame(time, rate)
+    frame = _rotate_frame(time, rate)
     turned = ways @ frame
     frame = frame - frame.mean(axis=0)
     turned = turned - turned.mean(axis=0)
     normal = np.tensordot(frame, frame, axes=((0, 2), (0, 2)))
-    right = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
-    arms = right @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
+    right_side = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
+    arms = right_side @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
     return np.asarray(turned - arms @ frame)
 
 
-def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
+def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
     """Return the number of periods of the harmonic motion that best explains the rest of a displacement.
 
     A motion of less than a period looks like an arc, so the subtracted circle took most of it.  Therefore a circle is
     subtracted from each trial motion before it is compared with ``left`` (n, 3).  Infinite if none explains half of it.
     """
     wanted = (left - left.mean(axis=0)).ravel()
-    least = 0.5 * float(wanted @ wanted)
-    found = np.inf
+    least_misfit = 0.5 * float(wanted @ wanted)
+    best_periods = np.inf
     for periods in _PERIODS:
         phase = (
             2
@@ -145,11 +150,11 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
             [np.cos(phase) * np.eye(3), np.sin(phase) * np.eye(3)], axis=1
         )
         columns = (
-            off_the_circle(time, motions, rate)
+            subtract_circles(time, motions, rate)
             .transpose(0, 2, 1)
             .reshape(wanted.size, -1)
         )
-        rest = float(
+        misfit = float(
             np.sum(
                 (
                     wanted
@@ -158,65 +163,70 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
                 ** 2
             )
         )
-        if rest < least:
-            least = rest
-            found = float(periods)
-    return found
+        if misfit < least_misfit:
+            least_misfit = misfit
+            best_periods = float(periods)
+    return best_periods
 
 
-def _least_ways(ways: Samples, masses: Samples) -> Samples:
+def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
     """Return for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
     return np.asarray(
-        _without_each(
+        _sum_without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
         )
     )
 
 
-def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
+def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
     """Estimate for each part how much of that sum a rotation of the others leaves unexplained (parts,).
 
     In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
     integrals: linear in the rate, with normal equations from which one part is easily removed.
     """
-    square, right, normal = (
-        _without_each(one, masses) for one in _linear(time, ways, masses)
+    square, right_side, normal = (
+        _sum_without_each(term, masses)
+        for term in _list_linear_terms(time, ways, masses)
     )
     solved = np.einsum(
-        "pij,pj->pi", np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True), right
+        "pij,pj->pi",
+        np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True),
+        right_side,
     )
-    return np.asarray(square - np.einsum("pi,pi->p", right, solved))
+    return np.asarray(square - np.einsum("pi,pi->p", right_side, solved))
 
 
-def _without_each(terms: Samples, masses: Samples) -> Samples:
+def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
     """Sum quadratic terms (parts, ...) of displacements over all parts but one, about the centre of these."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
-def _linear(
+def _list_linear_terms(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
     """Return each part's linear equations: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
-    left, arm = (
-        bent(time, values).reshape(ways.shape)
-        for values in (flat, integral(time, flat))
+    bent_places, arm = (
+        remove_line(time, values).reshape(ways.shape)
+        for values in (flat, integrate_by_trapezia(time, flat))
     )
-    square = masses * np.einsum("npi,npi->p", left, left)
-    right = masses[:, np.newaxis] * np.cross(arm, left).sum(axis=0)
+    square = masses * np.einsum("npi,npi->p", bent_places, bent_places)
+    right_side = masses[:, np.newaxis] * np.cross(arm, bent_places).sum(axis=0)
     outer = np.einsum("npi,npj->pij", arm, arm)
     normal = (
         np.trace(outer, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - outer
     )
-    return square, right, masses[:, np.newaxis, np.newaxis] * normal
+    return square, right_side, masses[:, np.newaxis, np.newaxis] * normal
 
 
-def _rest(time: Samples, ways: Samples, rate: Samples, weights: Samples) -> Samples:
+def _compute_rest(
+    time: Samples, ways: Samples, rate: Samples, weights: Samples
+) -> Samples:
     """Return the sum of m r^2 that a rotation at ``rate`` leaves unexplained."""
-    return np.asarray(weights * off_the_circle(time, ways, rate))
+    return np.asarray(weights * subtract_circles(time, ways, rate))
 
 
-def _frame(time: Samples, rate: Samples) -> Samples:
+def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     """Return the axes (n, 3, 3) of a frame that turns at ``rate``; a row vector times it lies in that frame."""
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
@@ -229,20 +239,20 @@ def _frame(time: Samples, rate: Samples) -> Samples:
     )
 
 
-def moving_apart(
+def find_moving_parts(
     time: Samples, ways: Samples, mass: Samples
 ) -> tuple[list[int], Samples, float]:
     """Find the parts that move against the others, the rate of these, and their rest; no parts if unknown."""
     moving: list[int] = []
     rate = np.zeros(3)
-    rest = np.inf
+    misfit = np.inf
     while True:
-        found = _next_apart(
+        best_part = _find_next_moving_part(
             time, ways, mass, np.setdiff1d(np.arange(mass.size), moving)
         )
-        if found is None or found.rest > _MORE_RIGID * rest:
-            return moving, rate, rest
-        part, rate, rest, _ = found
+        if best_part is None or best_part.rest > _MORE_RIGID * misfit:
+            return moving, rate, misfit
+        part, rate, misfit, _ = best_part
         moving.append(part)
 
 
@@ -255,7 +265,7 @@ class _Apart(NamedTuple):
     effect: float
 
 
-def _next_apart(
+def _find_next_moving_part(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
     """Find the part without which the others are most nearly rigid.
@@ -263,69 +273,78 @@ def _next_apart(
     A slide of one part may look like a rotation of all; among parts alike in this, the one with the largest effect
     counts.
     """
-    about = _about_centre(ways[:, left], mass[left])
+    about = _subtract_centre(ways[:, left], mass[left])
     masses = mass[left]
     orders = (
-        np.argsort(_least_rests(time, about, masses)),
-        np.argsort(_least_ways(about, masses)),
+        np.argsort(_estimate_least_rests(time, about, masses)),
+        np.argsort(_compute_least_displacements(about, masses)),
     )
     may = [
-        [one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED]
+        [
+            candidate
+            for candidate in left[order].tolist()
+            if _can_leave_out(mass, left, candidate)
+        ][:_TRIED]
         for order in orders
     ]
-    found = [
-        _without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))
+    trials = [
+        _leave_part_out(time, ways, mass, left, part)
+        for part in dict.fromkeys(chain(*may))
     ]
     nothing = _NOTHING * float(
         np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2)
     )
-    least = min((one.rest for one in found), default=0.0) + nothing
-    alike = [one for one in found if _MORE_RIGID * one.rest <= least]
-    return max(alike, key=lambda one: one.effect, default=None)
+    least_misfit = min((trial.rest for trial in trials), default=0.0) + nothing
+    alike = [trial for trial in trials if _MORE_RIGID * trial.rest <= least_misfit]
+    return max(alike, key=lambda trial: trial.effect, default=None)
 
 
-def _without(
+def _leave_part_out(
     time: Samples, ways: Samples, mass: Samples, left: Places, part: int
 ) -> _Apart:
     """Leave one part out and fit the rotation of the others."""
-    others = left[left != part]
-    way = (
+    remaining = left[left != part]
+    path_of_part = (
         ways[:, [part]]
-        - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+        - np.average(ways[:, remaining], axis=1, weights=mass[remaining])[:, np.newaxis]
     )
-    least = (
+    least_way = (
         _NOTABLE_WAY**2
-        * mass[others].sum()
-        * float(np.sum((way - way.mean(axis=0)) ** 2))
+        * mass[remaining].sum()
+        * float(np.sum((path_of_part - path_of_part.mean(axis=0)) ** 2))
     )
-    rate, rest = _steady_rotation(
-        time, _about_centre(ways[:, others], mass[others]), mass[others], least
+    rate, misfit = _fit_steady_rotation(
+        time,
+        _subtract_centre(ways[:, remaining], mass[remaining]),
+        mass[remaining],
+        least_way,
     )
     return _Apart(
         part,
         rate,
-        rest,
-        float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))),
+        misfit,
+        float(mass[part] * np.linalg.norm(subtract_circles(time, path_of_part, rate))),
     )
 
 
-def _about_centre(ways: Samples, mass: Samples) -> Samples:
+def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
     """Return displacements about the centre of mass."""
     return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
 
 
-def _may_leave(mass: Samples, left: Places, part: int) -> bool:
+def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
     """Return True if the others have half of the mass, and not almost all of it in one part."""
-    others = mass[left[left != part]]
+    remaining_mass = mass[left[left != part]]
     return bool(
-        2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum()
+        2 * remaining_mass.sum() >= mass.sum()
+        and remaining_mass.max() <= _MOST_OF_BODY * remaining_mass.sum()
     )
 
 
-def shows_rotation(mass: Samples) -> bool:
+def has_clear_rotation(mass: Samples) -> bool:
     """Return True if the body still shows its rotation without any one of its heavy parts."""
     if mass.size < 3:
         return False
-    places = np.arange(mass.size)
-    heavy = places[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
-    return all(_may_leave(mass, places, part) for part in heavy.tolist())
+    columns = np.arange(mass.size)
+    heavy = columns[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
+    return all(_can_leave_out(mass, columns, part) for part in heavy.tolist())

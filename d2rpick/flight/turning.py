@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import integral, window
+from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -60,21 +60,27 @@ class Turning(NamedTuple):
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return the angles psi by which a body that is rigid from ``tr`` (k,) on is turned at td, (k, 3) [rad]."""
-        pushed, kept = (
-            _at(self.time, one, np.array([td])) - _at(self.time, one, tr)
-            for one in (self.pushed, self.kept)
+        pushed, kept_turn = (
+            _interpolate_at(self.time, turn, np.array([td]))
+            - _interpolate_at(self.time, turn, tr)
+            for turn in (self.pushed, self.kept)
         )
         turned = pushed - np.einsum(
-            "kaij,kij->ka", kept, _at(self.time, self.inertia, tr)
+            "kaij,kij->ka", kept_turn, _interpolate_at(self.time, self.inertia, tr)
         )
-        return np.asarray(turned @ _at(self.time, self.carried, np.array([td]))[0].T)
+        return np.asarray(
+            turned @ _interpolate_at(self.time, self.carried, np.array([td]))[0].T
+        )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
         """Return the displacements of that body, (k, 3) in its own frame [length]."""
-        there = np.array([td])
-        slid = _at(self.time, self.place, there) - _at(self.time, self.place, tr)
+        at_td = np.array([td])
+        slid = _interpolate_at(self.time, self.place, at_td) - _interpolate_at(
+            self.time, self.place, tr
+        )
         return np.asarray(
-            slid + np.cross(self.angles(tr, td), _at(self.time, self.arm, there))
+            slid
+            + np.cross(self.angles(tr, td), _interpolate_at(self.time, self.arm, at_td))
         )
 
 
@@ -93,7 +99,7 @@ class Flying(NamedTuple):
     others: Collection[int] = ()
 
 
-def turning_in_flight(
+def follow_turning(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Turning | None:
     """Follow the orientation of the body that parts become, from the places of all flying parts in the deck.
@@ -104,62 +110,77 @@ def turning_in_flight(
     momenta = seen.momenta
     masses = seen.masses
     assert momenta.parts is not None
-    every = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
-    placed = {i: placement.parts.get(momenta.parts[i].id) for i in every}
-    known = [one for one in placed.values() if one]
+    all_members = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
+    placed = {i: placement.parts.get(momenta.parts[i].id) for i in all_members}
+    placed_parts = [part_place for part_place in placed.values() if part_place]
     time = momenta.time
-    mass = masses[every]
+    mass = masses[all_members]
     if (
-        len(known) < len(every)
+        len(placed_parts) < len(all_members)
         or not np.isfinite(mass).all()
         or time[0] > time[1] - time[0]
     ):
         return None
-    velocity = momenta.values[:, every] / mass[:, np.newaxis]
-    centre = np.stack([one.centre for one in known])
-    since = integral(time, velocity.reshape(time.size, -1)).reshape(velocity.shape)
-    inside = window(time, seen.start, seen.end)
+    velocity = momenta.values[:, all_members] / mass[:, np.newaxis]
+    centre = np.stack([part_place.centre for part_place in placed_parts])
+    since = integrate_by_trapezia(time, velocity.reshape(time.size, -1)).reshape(
+        velocity.shape
+    )
+    inside = find_window(time, seen.start, seen.end)
     stride = -(-(inside.stop - inside.start) // _STATES)
-    body = _frame_of(seen, moving, placement)
+    body = _choose_frame_parts(seen, moving, placement)
     where = (centre + velocity[0] * time[0] + since)[inside][::stride]
-    at = {i: place for place, i in enumerate(every)}
+    at = {i: place for place, i in enumerate(all_members)}
     rigid = [at[i] for i in seen.members]
     part = [at[i] for i in body]
-    where = where - _mean(where, mass)[:, np.newaxis]
-    home = _mean(centre[part], mass[part])
+    where = where - _weigh_by_mass(where, mass)[:, np.newaxis]
+    home = _weigh_by_mass(centre[part], mass[part])
     shape = centre[part] - home
-    middle = _mean(where[:, part], mass[part])
-    frames = _orientations(shape, where[:, part] - middle[:, np.newaxis], mass[part])
+    middle = _weigh_by_mass(where[:, part], mass[part])
+    frames = _fit_orientations(
+        shape, where[:, part] - middle[:, np.newaxis], mass[part]
+    )
     places = where @ frames
     middle = np.einsum("ni,nij->nj", middle, frames)
-    if _bent(shape, places[:, part] - middle[:, np.newaxis], mass[part]) > _MOST_BENT:
+    if (
+        _measure_bending(shape, places[:, part] - middle[:, np.newaxis], mass[part])
+        > _MOST_BENT
+    ):
         return None
-    own = _inertia(
-        np.einsum("p,pij->ij", mass, np.stack([one.spread for one in known]))
+    own_inertia = _compute_inertia(
+        np.einsum(
+            "p,pij->ij",
+            mass,
+            np.stack([part_place.spread for part_place in placed_parts]),
+        )
     )
-    inertia = _inertia(_second(places, mass)) + own
-    spin = _spin(places, mass)
-    moving_inertia = _inertia(_second(places[:, rigid], mass[rigid]))
+    inertia = _compute_inertia(_compute_second_moments(places, mass)) + own_inertia
+    spin = _integrate_spin(places, mass)
+    moving_inertia = _compute_inertia(
+        _compute_second_moments(places[:, rigid], mass[rigid])
+    )
     time = time[inside][::stride]
-    solved = _solved(
+    solved = _solve_turning(
         time,
         frames,
         (inertia, spin),
-        (moving_inertia, _spin(places[:, rigid], mass[rigid])),
+        (moving_inertia, _integrate_spin(places[:, rigid], mass[rigid])),
     )
-    place = (
+    column = (
         np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis])
         / mass.sum()
     )
-    doubt = _doubt(shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part])
+    doubt = _estimate_doubt(
+        shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part]
+    )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
     )  # according to the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
-    return Turning(time, place, arm, moving_inertia, *solved, doubt)
+    return Turning(time, column, arm, moving_inertia, *solved, doubt)
 
 
-def _frame_of(
+def _choose_frame_parts(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Sequence[int]:
     """Return the parts that make the frame of the body: connected parts that do not move against each other."""
@@ -172,7 +193,7 @@ def _frame_of(
     return still
 
 
-def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
+def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     """Return the angle by which the frame turns from one time to another if each of its parts in turn is left out.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
@@ -180,17 +201,19 @@ def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     """
     count = mass.size
     alone = mass * mass.sum() / (mass.sum() - mass)
-    others = _second(shape[np.newaxis], mass) - np.einsum(
+    other_inertia = _compute_second_moments(shape[np.newaxis], mass) - np.einsum(
         "p,pi,pj->pij", alone, shape, shape
     )
-    light = np.linalg.pinv(_inertia(others), rcond=_ALONG_LINE, hermitian=True)
+    light = np.linalg.pinv(
+        _compute_inertia(other_inertia), rcond=_ALONG_LINE, hermitian=True
+    )
     turned = np.einsum(
         "pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent)
     )
     return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
 
 
-def _solved(
+def _solve_turning(
     time: Samples,
     frames: Samples,
     whole: tuple[Samples, Samples],
@@ -198,56 +221,73 @@ def _solved(
 ) -> tuple[Samples, Samples, Samples]:
     """Solve the equation of psi: return the matrix that carries it, the right side, and the effect of I(tr)."""
     (inertia, spin), steps = whole, np.diff(time)
-    swept = np.einsum("nij,nj->ni", _halves(inertia), _turns(frames)) + spin
-    kept = np.einsum("nij,nj->i", _halves(frames), swept) / steps.sum()  # L at rest
-    momentum = kept @ frames  # in the frame of the body
+    swept = (
+        np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))
+        + spin
+    )
+    kept_rate = (
+        np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
+    )  # L at rest
+    momentum = kept_rate @ frames  # in the frame of the body
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light
-    carried = _carried(time, light @ _across(momentum) - _across(rate))
-    back = _halves(np.asarray(np.linalg.inv(carried), dtype=np.float64)) @ light
+    carried = _integrate_matrix(
+        time, light @ _make_cross_matrices(momentum) - _make_cross_matrices(rate)
+    )
+    back = (
+        _take_middle_values(np.asarray(np.linalg.inv(carried), dtype=np.float64))
+        @ light
+    )
     dragged = (
-        np.einsum("nij,nj->ni", _halves(moving[0]), _halves(rate))
+        np.einsum(
+            "nij,nj->ni", _take_middle_values(moving[0]), _take_middle_values(rate)
+        )
         * steps[:, np.newaxis]
         + moving[1]
     )
     pushed = np.einsum("nij,nj->ni", back, dragged)
     per_inertia = (
         back[..., np.newaxis]
-        * (_halves(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
+        * (_take_middle_values(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
     )
-    return carried, _running(pushed), _running(per_inertia)
+    return carried, _sum_running(pushed), _sum_running(per_inertia)
 
 
-def _carried(time: Samples, slope: Samples) -> Samples:
+def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
     """Return the solution (n, 3, 3) of X' = slope X that starts from the unit matrix."""
-    found = [np.eye(3)]
+    rotations = [np.eye(3)]
     unit = np.eye(3)
-    for step in _halves(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
-        found.append((unit + step + step @ step / 2) @ found[-1])
-    return np.stack(found)
+    for step in _take_middle_values(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
+        rotations.append((unit + step + step @ step / 2) @ rotations[-1])
+    return np.stack(rotations)
 
 
-def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
+def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
     """Return the rotations (n, 3, 3) that bring a shape (parts, 3) nearest to each of ``where`` (n, parts, 3)."""
-    left, _, right = np.linalg.svd(np.einsum("p,npi,pj->nij", mass, where, shape))
-    mirrored = np.linalg.det(left @ right) < 0
-    left[mirrored, :, 2] *= -1
-    return np.asarray(left @ right)
-
-
-def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return how far parts deviate from their shape, over its size across its longest axis; infinite on a line."""
-    least = (
-        np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum()
+    left_vectors, _, right_vectors = np.linalg.svd(
+        np.einsum("p,npi,pj->nij", mass, where, shape)
     )
-    across = np.sqrt(max(0.0, float(least)))
-    off = np.sqrt(
+    mirrored = np.linalg.det(left_vectors @ right_vectors) < 0
+    left_vectors[mirrored, :, 2] *= -1
+    return np.asarray(left_vectors @ right_vectors)
+
+
+def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
+    """Return how far parts deviate from their shape, over its size across its longest axis; infinite on a line."""
+    least_extent = (
+        np.linalg.eigvalsh(_compute_second_moments(shape[np.newaxis], mass)[0])[
+            :2
+        ].sum()
+        / mass.sum()
+    )
+    across = np.sqrt(max(0.0, float(least_extent)))
+    deviation = np.sqrt(
         np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum())
     )
-    return float(off / across) if across > 0 else np.inf
+    return float(deviation / across) if across > 0 else np.inf
 
 
-def _turns(frames: Samples) -> Samples:
+def _compute_turns(frames: Samples) -> Samples:
     """Return the rotation from each frame to the next, (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
     odd = (between - between.transpose(0, 2, 1)) / 2
@@ -263,17 +303,17 @@ def _turns(frames: Samples) -> Samples:
     )
 
 
-def _mean(values: Samples, mass: Samples) -> Samples:
+def _weigh_by_mass(values: Samples, mass: Samples) -> Samples:
     """Return the mean of values weighted by mass."""
     return np.asarray(np.einsum("p,...pi->...i", mass, values) / mass.sum())
 
 
-def _second(places: Samples, mass: Samples) -> Samples:
+def _compute_second_moments(places: Samples, mass: Samples) -> Samples:
     """Return the second moments of mass of places."""
     return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
 
 
-def _inertia(second: Samples) -> Samples:
+def _compute_inertia(second: Samples) -> Samples:
     """Return the tensor of inertia from the second moments (..., 3, 3)."""
     return np.asarray(
         np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
@@ -281,29 +321,29 @@ def _inertia(second: Samples) -> Samples:
     )
 
 
-def _spin(places: Samples, mass: Samples) -> Samples:
+def _integrate_spin(places: Samples, mass: Samples) -> Samples:
     """Return the integral over each step of the parts' angular momentum, (n - 1, 3): twice the swept areas."""
     return np.asarray(np.einsum("p,npi->ni", mass, np.cross(places[:-1], places[1:])))
 
 
-def _across(vectors: Samples) -> Samples:
+def _make_cross_matrices(vectors: Samples) -> Samples:
     """Return matrices (n, 3, 3) whose product with a vector is the cross product of ``vectors`` (n, 3) with it."""
     return np.asarray(np.cross(vectors[:, np.newaxis], np.eye(3)).transpose(0, 2, 1))
 
 
-def _halves(values: Samples) -> Samples:
+def _take_middle_values(values: Samples) -> Samples:
     """Return the values in the middle of the steps."""
     return np.asarray((values[1:] + values[:-1]) / 2)
 
 
-def _running(steps: Samples) -> Samples:
+def _sum_running(steps: Samples) -> Samples:
     """Return the running sum of steps, from 0."""
     return np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
 
 
-def _at(time: Samples, values: Samples, when: Samples) -> Samples:
+def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), linear between samples."""
-    after = np.clip(np.searchsorted(time, when), 1, time.size - 1)
-    share = (when - time[after - 1]) / (time[after] - time[after - 1])
+    next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
+    share = (when - time[next_state - 1]) / (time[next_state] - time[next_state - 1])
     share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[after - 1] * (1 - share) + values[after] * share)
+    return np.asarray(values[next_state - 1] * (1 - share) + values[next_state] * share)

@@ -26,7 +26,7 @@ class Beside(NamedTuple):
     energy: float = 0.0
 
 
-def vibrating_beside(history: History, flight: Flight) -> Beside:
+def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     """Find the parts that vibrate with the chosen ones and were not chosen.
 
     Parameters
@@ -38,21 +38,21 @@ def vibrating_beside(history: History, flight: Flight) -> Beside:
     if flight.parts is None or history.parts is None:
         return Beside()
     chosen = {part.id for part in history.parts}
-    others = tuple(part for part in flight.parts if part.id not in chosen)
-    energies = history.evidence.internal_energies(others) if others else None
+    not_chosen = tuple(part for part in flight.parts if part.id not in chosen)
+    energies = history.evidence.internal_energies(not_chosen) if not_chosen else None
     if energies is None:
         return Beside()
     time, values = energies
     inside = slice(*np.searchsorted(time, flight.within(history.time)).tolist())
-    own = history.between(*flight.within(history.time))[1]
-    if own.size == 0 or values[inside].size == 0:
+    energy_in_flight = history.between(*flight.within(history.time))[1]
+    if energy_in_flight.size == 0 or values[inside].size == 0:
         return Beside()
     ranges = np.ptp(values[inside], axis=0)
-    notable = ranges > _HARDLY * float(np.ptp(own))
-    return Beside(tuple(compress(others, notable)), float(ranges[notable].sum()))
+    notable = ranges > _HARDLY * float(np.ptp(energy_in_flight))
+    return Beside(tuple(compress(not_chosen, notable)), float(ranges[notable].sum()))
 
 
-def kinetic_energy_of(
+def extract_kinetic_energy(
     history: History, flight: Flight
 ) -> tuple[Samples, Samples] | None:
     """Return the kinetic energy of all parts that vibrate together in the flight, without that of their fall.

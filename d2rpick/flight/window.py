@@ -106,7 +106,7 @@ class Constant(Law):
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
 
 
-def lasting_window(
+def find_lasting_window(
     law: Law,
     td: float,
     extent: float,
@@ -140,22 +140,28 @@ def lasting_window(
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
     limit = max(TOLERANCE, enough) * extent
-    own = max(noise, ROUND_OFF * extent)
-    found = _converged(
-        law, at, limit, own if fades else limit, noise, enough * extent, rings=rings
+    rounding = max(noise, ROUND_OFF * extent)
+    states = _find_converged_window(
+        law,
+        at,
+        limit,
+        rounding if fades else limit,
+        noise,
+        enough * extent,
+        rings=rings,
     )
-    if found is None:
+    if states is None:
         return None
-    window, room, from_start = found
-    first, last = _tightened(law, window, own, room)
+    window, room, from_start = states
+    first, last = _tighten_window(law, window, rounding, room)
     if first == 1 and from_start:
         first = 0  # a solver may write the first state before its first step, with velocities of half a step earlier
-    if time[first] <= td <= time[last] and _long_enough(time, (first, last)):
+    if time[first] <= td <= time[last] and _is_long_enough(time, (first, last)):
         return (first, last)
     return None
 
 
-def _converged(
+def _find_converged_window(
     law: Law,
     at: int,
     limit: float,
@@ -172,39 +178,43 @@ def _converged(
     """
     time = law.time
     room = limit + noise
-    found = None
-    window = longest_window(law, at, room)
+    lasting = None
+    window = find_longest_window(law, at, room)
     from_start = window[0] == 0
-    kept = None
-    while _long_enough(time, window):
+    last_result = None
+    while _is_long_enough(time, window):
         strict = _TIGHTER * limit + noise
-        finer = longest_window(law, at, strict)
+        finer = find_longest_window(law, at, strict)
         if enough:  # what fades is steady at one end
-            ends = (longest_window(law, end, strict) for end in window)
-            finer = max(finer, *ends, key=lambda one: _length(time, one))
-        share = _length(time, finer) / _length(time, window)
-        if found and share < _STAYS:
+            ends = (find_longest_window(law, end, strict) for end in window)
+            finer = max(finer, *ends, key=lambda states: _measure_length(time, states))
+        share = _measure_length(time, finer) / _measure_length(time, window)
+        if lasting and share < _STAYS:
             break
         lasts = share >= (1 + np.cbrt(strict / room)) / 2 or (
-            rings and _rings(law, window)
+            rings and _is_ringing(law, window)
         )
         if not _TIGHTER * limit >= finest:
-            return (window, room, from_start) if lasts else found or kept
+            return (window, room, from_start) if lasts else lasting or last_result
         if (
             limit <= enough
-            and _fading(window, finer)
-            and (kept is None or 2 * _length(time, window) >= _length(time, kept[0]))
+            and _is_fading(window, finer)
+            and (
+                last_result is None
+                or 2 * _measure_length(time, window)
+                >= _measure_length(time, last_result[0])
+            )
         ):
-            kept = window, room, from_start
+            last_result = window, room, from_start
         window = finer
         limit = _TIGHTER * limit
         room = strict
         at = (finer[0] + finer[1]) // 2
-        found = (window, room, from_start) if lasts else None
-    return found or kept
+        lasting = (window, room, from_start) if lasts else None
+    return lasting or last_result
 
 
-def _rings(law: Law, window: tuple[int, int]) -> bool:
+def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
     """Return True if a window's misfit is nearly as large in its middle half; a smooth load leaves 1/8 there."""
     quarter = (window[1] - window[0]) // 4
     return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
@@ -212,59 +222,64 @@ def _rings(law: Law, window: tuple[int, int]) -> bool:
     )
 
 
-def _fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
+def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
     """Return True if a window shrinks on one side only: a load fades there, a contact or the record ends the other."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 
 
-def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
+def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
     """Return the first and last state of the longest window around the state ``at`` with a misfit below ``room``.
 
     Near an end of the flight a short window may reach across it.  The side grown first decides, so both orders are
     tried.
     """
     last_state = law.time.size - 1
-    first = farthest(at, 0, lambda i: law.misfit(i, at) <= room)
-    one = first, farthest(at, last_state, lambda j: law.misfit(first, j) <= room)
-    last = farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
-    other = farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
-    return max(one, other, key=lambda window: _length(law.time, window))
+    first = find_farthest(at, 0, lambda i: law.misfit(i, at) <= room)
+    to_the_right = (
+        first,
+        find_farthest(at, last_state, lambda j: law.misfit(first, j) <= room),
+    )
+    last = find_farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
+    to_the_left = find_farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
+    return max(
+        to_the_right, to_the_left, key=lambda window: _measure_length(law.time, window)
+    )
 
 
-def moments(time: Samples) -> Iterator[float]:
+def list_moments(time: Samples) -> Iterator[float]:
     """Yield times so close together that each flight of sufficient length contains one."""
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
 
 
-def marks(time: Samples, td: float) -> Iterator[float]:
+def list_marks(time: Samples, td: float) -> Iterator[float]:
     """Yield the times from which the flight around ``td`` is searched, so that many td share the result.
 
     First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
     """
-    times = tuple(moments(time))
+    times = tuple(list_moments(time))
     yield min(times[::_FAR], key=lambda moment: abs(moment - td))
     yield from sorted(times, key=lambda moment: abs(moment - td))[:2]
 
 
-def all_windows(
+def find_all_windows(
     time: Samples, around: Callable[[float], FreeFlight | None]
 ) -> tuple[FreeFlight, ...]:
     """Find all flights of a record in ascending order; ``around`` returns the flight around a time."""
-    found: list[FreeFlight] = []
-    for moment in moments(time):
-        if not found or moment > found[-1].end:
+    flights: list[FreeFlight] = []
+    for moment in list_moments(time):
+        if not flights or moment > flights[-1].end:
             flight = around(moment)
             if flight:  # the tolerance may let it begin some states before the last flight has ended
-                found.append(
-                    flight._replace(start=max(flight.start, found[-1].end))
-                    if found
+                flights.append(
+                    flight._replace(start=max(flight.start, flights[-1].end))
+                    if flights
                     else flight
                 )
-    return tuple(found)
+    return tuple(flights)
 
 
-def _tightened(
+def _tighten_window(
     law: Law, window: tuple[int, int], noise: float, loose: float
 ) -> tuple[int, int]:
     """Shrink a window until its ends deviate no more than its middle, which cuts off the rest of a load.
@@ -278,9 +293,9 @@ def _tightened(
     for _ in range(_MOST_SHRINKS):
         first, last = window
         inset = round(_ENDS * (last - first))
-        own = law.misfit(first + inset, last - inset)
-        room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, own - noise)
-        tight = longest_window(law, (first + last) // 2, room)
+        inner_misfit = law.misfit(first + inset, last - inset)
+        room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, inner_misfit - noise)
+        tight = find_longest_window(law, (first + last) // 2, room)
         if room <= loose:
             tighter = tight
         else:
@@ -288,10 +303,10 @@ def _tightened(
         if tighter == window:
             break
         window = tighter
-    return _without_what_is_hidden(law, window, room)
+    return _cut_off_hidden_push(law, window, room)
 
 
-def _without_what_is_hidden(
+def _cut_off_hidden_push(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
     """Cut off what ``room`` still hides of a push at the ends of a window.
@@ -300,28 +315,31 @@ def _without_what_is_hidden(
     room takes as long as from there to its end.  Less than one state cannot be resolved.
     """
     first, last = window
-    wide = longest_window(law, (first + last) // 2, 4 * room)
-    most = round(_ENDS * (last - first))
+    wide = find_longest_window(law, (first + last) // 2, 4 * room)
+    most_states = round(_ENDS * (last - first))
     return (
-        first + min(most, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
-        last - min(most, max(0, wide[1] - last - 1))
+        first + min(most_states, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
+        last - min(most_states, max(0, wide[1] - last - 1))
         if wide[1] < law.time.size - 1
         else last,
     )
 
 
-def _long_enough(time: Samples, window: tuple[int, int]) -> bool:
+def _is_long_enough(time: Samples, window: tuple[int, int]) -> bool:
     """Return True if a window is long enough to be a flight."""
     shortest = SHORTEST * float(time[-1] - time[0])
-    return window[1] - window[0] + 1 >= FEWEST and _length(time, window) >= shortest
+    return (
+        window[1] - window[0] + 1 >= FEWEST
+        and _measure_length(time, window) >= shortest
+    )
 
 
-def _length(time: Samples, window: tuple[int, int]) -> float:
+def _measure_length(time: Samples, window: tuple[int, int]) -> float:
     """Return the duration of a window [time]."""
     return float(time[window[1]] - time[window[0]])
 
 
-def farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
+def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
     """Walk from ``start`` towards ``limit`` in doubling steps while it fits, then halve the last step."""
     sign = 1 if limit > start else -1
     good = start
@@ -340,7 +358,7 @@ def farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
     return good
 
 
-def unheld(
+def limit_to_unheld(
     surroundings: Surroundings,
     flight: FreeFlight | None,
     parts: Sequence[Part] | None,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, lasting_window
-from d2rpick.histories.samples import integral, window
+from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, find_lasting_window
+from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,21 +43,23 @@ _LITTLE, _MUCH = 5e-3, 0.5
 _VISIBLE = 100
 
 
-def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
+def compute_work_beyond_gravity(
+    balance: Balance, start: float, end: float
+) -> float | None:
     """Return the largest external work in a window that neither gravity nor damping explains [energy].
 
     Both factors have a sign: gravity acts along the mean change of the momentum, and damping takes energy.  If no
     velocity is written, the work of gravity is an upward parabola of time.  Errors of digits and of the solver's sums
     are subtracted.  None if the work is not written, or the window has too few states.
     """
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
         return None
     time = balance.time[inside]
     work = balance.external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])
     free = [np.ones_like(time)]
-    most = np.inf
+    most_gravity = np.inf
     if balance.velocity is None:
         free.append(elapsed)
         gravity = elapsed**2
@@ -65,19 +67,23 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
         from d2rpick.flight.free_fall import FreeFall
 
         velocity = balance.velocity[inside]
-        gravity = integral(time, velocity @ FreeFall(time, velocity).gravity())
+        gravity = integrate_by_trapezia(
+            time, velocity @ FreeFall(time, velocity).gravity()
+        )
         if balance.kinetic is not None:
-            most = _most_gravity(velocity, balance.kinetic[inside])
+            most_gravity = _bound_work_of_gravity(velocity, balance.kinetic[inside])
     one_sided = [gravity]
     if balance.kinetic is not None:
-        one_sided.append(-integral(time, balance.kinetic[inside]))
+        one_sided.append(-integrate_by_trapezia(time, balance.kinetic[inside]))
     error = _BENT if balance.velocity is None else _OWN_ERROR
-    rest = float(np.abs(_rest(work, free, one_sided, most)).max())
-    own = 2 * balance.precision.noise(work) + error * float(np.ptp(work))
-    return max(0.0, rest - own)
+    unexplained = float(
+        np.abs(_fit_one_sided(work, free, one_sided, most_gravity)).max()
+    )
+    open_error = 2 * balance.precision.noise(work) + error * float(np.ptp(work))
+    return max(0.0, unexplained - open_error)
 
 
-def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
+def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
     """Return the largest factor of the integral of F v: the whole motion has at most all the kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
@@ -86,48 +92,50 @@ def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
     return np.inf
 
 
-def _rest(
+def _fit_one_sided(
     values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples], most: float
 ) -> Samples:
     """Return the residual of a least-squares fit to ``values`` (n,).
 
     Columns of ``one_sided`` have factors >= 0, the first one at most ``most``.
     """
-    first, *others = one_sided
+    first, *other_columns = one_sided
     for gravity in ([first], []):
         used = [
             column / np.abs(column).max()
-            for column in (*gravity, *others)
+            for column in (*gravity, *other_columns)
             if column.any()
         ]
-        rest, factors = _least_squares(values, free, used)
+        remainder, factors = _fit_not_negative(values, free, used)
         if not (gravity and first.any() and factors[0] > most * np.abs(first).max()):
-            return rest
+            return remainder
         values = values - most * first
-    return rest
+    return remainder
 
 
-def _least_squares(
+def _fit_not_negative(
     values: Samples, free: Sequence[Samples], used: Sequence[Samples]
 ) -> tuple[Samples, Samples]:
     """Return the residual of a fit to ``values``, and the factors of the columns ``used``, none of them negative."""
-    kept = list(range(len(used)))
+    used_columns = list(range(len(used)))
     while True:
-        table = np.stack([*free, *(used[i] for i in kept)], axis=1)
-        found, *_ = np.linalg.lstsq(table, values, rcond=None)
+        table = np.stack([*free, *(used[i] for i in used_columns)], axis=1)
+        solution, *_ = np.linalg.lstsq(table, values, rcond=None)
         factors = np.zeros(len(used))
-        factors[kept] = found[len(free) :]
+        factors[used_columns] = solution[len(free) :]
         if factors.min(initial=0.0) >= 0:
-            return values - table @ found, factors
-        kept = [i for i in kept if factors[i] > 0]
+            return values - table @ solution, factors
+        used_columns = [i for i in used_columns if factors[i] > 0]
 
 
-def can_tell(balance: Balance) -> bool:
+def has_laws(balance: Balance) -> bool:
     """Return True if work or energy is written that obeys a law in free flight."""
-    return balance.time.size >= FEWEST and bool(_terms(balance))
+    return balance.time.size >= FEWEST and bool(_list_terms(balance))
 
 
-def change_of_balance(balance: Balance, start: float, end: float) -> float | None:
+def compute_change_of_balance(
+    balance: Balance, start: float, end: float
+) -> float | None:
     """Return the largest change of kinetic plus internal energy that gravity and damping leave open [energy].
 
     Errors of digits are subtracted.  None if one of the energies is not written.
@@ -135,19 +143,19 @@ def change_of_balance(balance: Balance, start: float, end: float) -> float | Non
     whole = balance.kinetic_and_internal
     if whole is None:
         return None
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     kinetic = None if balance.kinetic is None else balance.kinetic[inside]
     law = _Parabola(balance.time[inside], whole[inside][:, np.newaxis], kinetic)
-    rest = law.misfit(0, law.time.size - 1)
+    misfit = law.misfit(0, law.time.size - 1)
     return max(
         0.0,
-        rest
+        misfit
         - 2 * balance.precision.noise(whole)
         - _OWN_ERROR * float(np.ptp(whole[inside])),
     )
 
 
-def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
+def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which energy changes only by gravity and damping, or None.
 
     The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
@@ -155,7 +163,7 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     looks like it.
     """
     time = balance.time
-    terms = _terms(balance)
+    terms = _list_terms(balance)
     if (
         balance.velocity is not None
         or not terms
@@ -179,20 +187,22 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
             for of in (None, balance.internal)
         ],
     )
-    window = lasting_window(exact, td, extent, noise)
+    window = find_lasting_window(exact, td, extent, noise)
     if window is None:
-        rings = lasting_window(ringing, td, extent, noise, rings=True)
+        rings = find_lasting_window(ringing, td, extent, noise, rings=True)
     else:
         rings = None
-    found = window or rings
-    if found is None:
+    states = window or rings
+    if states is None:
         return None
     return FreeFlight.of(
-        time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0)
+        time,
+        states,
+        gravity=_classify_gravity(balance, *states) or (np.nan if rings else 0.0),
     )
 
 
-def lowered_by_damping(
+def list_damped_energies(
     balance: Balance, flight: FreeFlight, momenta: Momenta | None
 ) -> tuple[list[Samples], float]:
     """Return energies (n,) of a balance that damping lowers in a flight, and the error of their digits [energy].
@@ -208,17 +218,21 @@ def lowered_by_damping(
     if momenta is not None and work is None and np.isnan(flight.gravity):
         return [], 0.0
     if momenta is not None and work is None and flight.gravity:
-        work = _work_of_gravity(balance, flight, momenta)
+        work = _compute_work_of_gravity(balance, flight, momenta)
     sums = [whole]
     sums += [] if balance.damping is None else [-balance.damping]
     sums += [] if work is None or not flight.gravity else [whole - work]
     largest = float(
-        np.abs(whole[window(balance.time, flight.start, flight.end)]).max(initial=0.0)
+        np.abs(whole[find_window(balance.time, flight.start, flight.end)]).max(
+            initial=0.0
+        )
     )
     return sums, _OF_DIGITS * balance.precision.noise(np.ones(1)) * largest
 
 
-def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> Samples:
+def _compute_work_of_gravity(
+    balance: Balance, flight: FreeFlight, momenta: Momenta
+) -> Samples:
     """Return the work of gravity since the first state (n,), from the momentum of the model that it changes [energy].
 
     For a velocity, the mass is the largest one that the written kinetic energy allows.
@@ -227,18 +241,22 @@ def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> 
 
     time = momenta.time
     momentum = momenta.of((0,))
-    inside = window(time, flight.start, flight.end)
+    inside = find_window(time, flight.start, flight.end)
     force = FreeFall(time[inside], momentum[inside]).gravity()
     along = momentum @ force / np.linalg.norm(force)
     if momenta.velocity and balance.kinetic is not None:
         along *= (
-            _most_gravity(momentum, np.interp(time, balance.time, balance.kinetic))
+            _bound_work_of_gravity(
+                momentum, np.interp(time, balance.time, balance.kinetic)
+            )
             / _MASS_ERROR
         )
-    return np.interp(balance.time, time, flight.gravity * integral(time, along))
+    return np.interp(
+        balance.time, time, flight.gravity * integrate_by_trapezia(time, along)
+    )
 
 
-def taken_by_damping(
+def is_taken_by_damping(
     balance: Balance,
     start: float,
     end: float,
@@ -252,7 +270,7 @@ def taken_by_damping(
     vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that no load can pass for
     either ("Energies that look like flight" in docs).  None if an energy is missing.
     """
-    inside = window(balance.time, start, end)
+    inside = find_window(balance.time, start, end)
     whole = balance.kinetic_and_internal
     kinetic = balance.kinetic
     time = balance.time[inside]
@@ -262,12 +280,17 @@ def taken_by_damping(
     changes = [float(np.ptp(whole[inside] - of_vibration))]
     if alpha is not None:
         changes.append(
-            float(np.ptp(whole[inside] + 2 * alpha * integral(time, kinetic[inside])))
+            float(
+                np.ptp(
+                    whole[inside]
+                    + 2 * alpha * integrate_by_trapezia(time, kinetic[inside])
+                )
+            )
         )
     return min(changes) <= _LITTLE * float((kinetic[inside] - of_vibration).max())
 
 
-def _unexplained(balance: Balance, first: int, last: int) -> float:
+def _classify_gravity(balance: Balance, first: int, last: int) -> float:
     """Return the value for gravity in a window: 0 if energies change by nothing or damping alone, else unknown.
 
     NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
@@ -283,12 +306,12 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     grown = float((whole[states] - np.minimum.accumulate(whole[states])).max())
     if grown > _LITTLE * largest:
         return np.inf
-    spent = -integral(balance.time[states], kinetic[states])
-    rest, _ = _least_squares(
+    spent = -integrate_by_trapezia(balance.time[states], kinetic[states])
+    remainder, _ = _fit_not_negative(
         whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else []
     )
     lost = float(whole[first] - whole[last])
-    bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
+    bent = float(np.ptp(remainder)) / largest if largest > 0 else 0.0
     if (bent <= _OWN_ERROR and lost >= _MUCH * largest) or (
         bent <= _LITTLE and lost <= _LITTLE * largest
     ):
@@ -296,13 +319,15 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     if balance.internal is None or lost <= np.ptp(balance.internal[states]):
         return np.nan
     elapsed = balance.time[states] - balance.time[first]
-    pulled, _ = _least_squares(
+    pulled, _ = _fit_not_negative(
         whole[states], [np.ones_like(elapsed), elapsed, elapsed**2], []
     )
-    return np.nan if bent <= _OWN_ERROR and np.ptp(rest) < np.ptp(pulled) else np.inf
+    return (
+        np.nan if bent <= _OWN_ERROR and np.ptp(remainder) < np.ptp(pulled) else np.inf
+    )
 
 
-def _terms(balance: Balance) -> list[Samples]:
+def _list_terms(balance: Balance) -> list[Samples]:
     """Return the written energies that change by gravity and damping only, if they change at all."""
     whole = balance.kinetic_and_internal
     internal = balance.internal
@@ -333,7 +358,7 @@ class _Parabola(Law):
     ) -> None:
         super().__init__(time)
         self.energies = energies
-        self.others = [] if kinetic is None else [integral(time, kinetic)]
+        self.others = [] if kinetic is None else [integrate_by_trapezia(time, kinetic)]
         if internal is not None and time.size > 1:
             self.others.append(np.gradient(internal, time))
 
@@ -343,12 +368,14 @@ class _Parabola(Law):
         if time.size < FEWEST_STATES:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
-        others = [
-            (one[states] - one[states.start]) / extent
-            for one in self.others
-            if (extent := np.ptp(one[states]))
+        other_columns = [
+            (column[states] - column[states.start]) / extent
+            for column in self.others
+            if (extent := np.ptp(column[states]))
         ]
-        table = np.stack([np.ones_like(elapsed), elapsed, elapsed**2, *others], axis=1)
+        table = np.stack(
+            [np.ones_like(elapsed), elapsed, elapsed**2, *other_columns], axis=1
+        )
         scale = 2.0 ** (
             np.frexp(np.abs(self.energies[states]).max())[1] - 1
         )  # a power of 2 scales exactly; squares of 1e200 would overflow
@@ -357,7 +384,7 @@ class _Parabola(Law):
         return float(np.abs(energies - table @ factors).max()) * float(scale)
 
 
-def shows_contacts(balance: Balance) -> bool:
+def has_visible_contacts(balance: Balance) -> bool:
     """Return True if the contact energy shows that contacts of the model were ever closed."""
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
@@ -365,7 +392,7 @@ def shows_contacts(balance: Balance) -> bool:
     return float(np.ptp(energy)) > _VISIBLE * balance.precision.noise(energy)
 
 
-def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
+def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which the contact energy is constant, or None.
 
     If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
@@ -376,9 +403,9 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))
-    states = lasting_window(
+    states = find_lasting_window(
         law, td, float(np.ptp(energy)), balance.precision.noise(energy)
     )
     if states is None or (states[0] == 0 and balance.external_work is None):
         return None
-    return FreeFlight.of(time, states, gravity=_unexplained(balance, *states))
+    return FreeFlight.of(time, states, gravity=_classify_gravity(balance, *states))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, if_written
+from d2rpick.base.errors import FormatError, give_if_written
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
 from d2rpick.histories.meaning import (
@@ -16,8 +16,8 @@ from d2rpick.histories.meaning import (
     is_internal_energy,
     is_total_internal_energy,
 )
-from d2rpick.histories.names import Part, normalised
-from d2rpick.histories.samples import median
+from d2rpick.histories.names import Part, normalise_name
+from d2rpick.histories.samples import compute_median
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -64,7 +64,7 @@ _ADDS_UP: Final = 1e-3
 _HALF: Final = 0.5
 
 
-def balance_of(
+def read_balance(
     databases: Sequence[Legs],
     parts: Sequence[Part] | None,
     until: float = np.inf,
@@ -75,34 +75,34 @@ def balance_of(
     ``known`` are its `terms_of` if they were read already and all times are requested. The result is None if the
     files contain no term by which the run can be judged, or if the columns are ambiguous.
     """
-    whole = _whole(databases)
-    of_parts = _hourglass_of(databases, parts, until) if parts else ()
+    whole = _find_whole_model(databases)
+    of_parts = _read_hourglass_energies(databases, parts, until) if parts else ()
     judged = whole is not None and not _JUDGED.isdisjoint(whole.quantities)
     if not (judged or of_parts):
         return None
     if whole is None:
         return Balance(databases[0].part_time, hourglass_of_parts=of_parts)
-    terms = known or _terms(whole, until)
+    terms = known or _read_terms_until(whole, until)
     return terms and replace(terms, hourglass_of_parts=of_parts)
 
 
-def terms_of(databases: Sequence[Legs]) -> Balance | None:
+def read_terms(databases: Sequence[Legs]) -> Balance | None:
     """Return the energy balance of the whole model, even if it is not enough to judge the health of the run.
 
     The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
-    whole = _whole(databases)
+    whole = _find_whole_model(databases)
     if whole is None or {*_QUANTITIES.values()}.isdisjoint(whole.quantities):
         return None
-    return _terms(whole, np.inf)
+    return _read_terms_until(whole, np.inf)
 
 
-def momentum_of(database: Legs) -> Momenta | None:
+def read_momentum(database: Legs) -> Momenta | None:
     """Return the momentum of the whole model, or its velocity, of an unknown mass; None if neither is written."""
     has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
-    if not has_components and not _global_velocities(database):
+    if not has_components and not _find_global_velocities(database):
         return None
-    columns = if_written(lambda: _Columns(database, database.time.size))
+    columns = give_if_written(lambda: _Columns(database, database.time.size))
     values = columns.velocity() if columns else None
     if columns is None or values is None:
         return None
@@ -122,7 +122,7 @@ def momentum_of(database: Legs) -> Momenta | None:
     )
 
 
-def least_masses(momenta: Samples, kinetic: Samples) -> Samples:
+def compute_least_masses(momenta: Samples, kinetic: Samples) -> Samples:
     """Return the least masses (k,) with these momenta (n, k, 3) and kinetic energies (n, k); 0 without energy."""
     squares = np.sum(momenta**2, axis=2)
     masses = np.divide(
@@ -131,14 +131,14 @@ def least_masses(momenta: Samples, kinetic: Samples) -> Samples:
     return np.asarray(masses.max(axis=0))
 
 
-def _whole(databases: Sequence[Legs]) -> Legs | None:
+def _find_whole_model(databases: Sequence[Legs]) -> Legs | None:
     """Return the first database of the whole model."""
     return next((database for database in databases if database.channels), None)
 
 
-def _terms(whole: Legs, until: float) -> Balance | None:
+def _read_terms_until(whole: Legs, until: float) -> Balance | None:
     """Return the terms of the balance up to a time; None if the time or the columns cannot be read."""
-    columns = if_written(
+    columns = give_if_written(
         lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     )
     if columns is None:
@@ -151,7 +151,7 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     terms["wall"] = next((energy for energy in walls if energy is not None), None)
     total = terms["total"]
     work = terms["external_work"]
-    is_less_work = _LESS_WORK.issubset(map(normalised, columns.used))
+    is_less_work = _LESS_WORK.issubset(map(normalise_name, columns.used))
     if total is not None and work is not None and is_less_work:
         terms["total"] = total + work
     return Balance(
@@ -164,9 +164,9 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     )
 
 
-def _global_velocities(database: Legs) -> dict[str, str]:
+def _find_global_velocities(database: Legs) -> dict[str, str]:
     """Return the channels with the name of a velocity of the whole model, by their normalised names."""
-    names = {normalised(name): name for name in reversed(database.channels)}
+    names = {normalise_name(name): name for name in reversed(database.channels)}
     return {name: names[name] for name in _GLOBAL_VELOCITIES if name in names}
 
 
@@ -187,10 +187,10 @@ class _Columns:
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
-            return float(median(written))
+            return float(compute_median(written))
         if kinetic is None or not (kinetic > 0).any():
             return float("nan")
-        return float(least_masses(momenta, kinetic[:, np.newaxis])[0])
+        return float(compute_least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def quantity(self, quantity: str) -> Samples | None:
         """Return the column of a quantity of `d2rpick.histories.names.QUANTITIES`."""
@@ -200,7 +200,11 @@ class _Columns:
     def called(self, wanted: str) -> Samples | None:
         """Return the column with this normalised name."""
         name = next(
-            (name for name in self._database.channels if normalised(name) == wanted),
+            (
+                name
+                for name in self._database.channels
+                if normalise_name(name) == wanted
+            ),
             None,
         )
         return None if name is None else self._values(name)
@@ -230,7 +234,7 @@ class _Columns:
 
     def _values(self, name: str) -> Samples | None:
         """Return a column with finite numbers in all states, or None."""
-        values = if_written(lambda: self._database.channel(name)[: self.states])
+        values = give_if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None
         self.used.append(name)
@@ -248,7 +252,7 @@ def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
     )
 
 
-def _hourglass_of(
+def _read_hourglass_energies(
     databases: Sequence[Legs], parts: Sequence[Part], until: float
 ) -> tuple[tuple[Part, float, float], ...]:
     """Return the highest hourglass and internal energy of each part, if they are written."""
@@ -270,17 +274,19 @@ def _hourglass_of(
     return ()
 
 
-def spring_energy(database: Legs) -> tuple[str, Samples] | None:
+def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
     """Return name and values (n,) of the energy of all springs and dampers; None if it is zero, or all energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
     name = next(
-        (name for name in database.channels if normalised(name) in _SPRINGS), None
+        (name for name in database.channels if normalise_name(name) in _SPRINGS), None
     )
     if name is None:
         return None
-    energies = if_written(lambda: (database.channel(name), database.channel(total)))
+    energies = give_if_written(
+        lambda: (database.channel(name), database.channel(total))
+    )
     if energies is None or not energies[0].size or not np.isfinite(energies[0]).all():
         return None
     springs, whole = energies
@@ -294,14 +300,14 @@ def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     return (name, springs) if is_part_of_whole else None
 
 
-def springs_among(
+def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
     """Return the parts whose energies add up to the energy of all springs and dampers; () if no set of parts does.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """
-    candidates = ((legs, spring_energy(legs)) for legs in databases)
+    candidates = ((legs, find_spring_energy(legs)) for legs in databases)
     database, springs = next(
         ((legs, energy) for legs, energy in candidates if energy), (None, None)
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import stretches
+from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ class ContactForce(NamedTuple):
     @classmethod
     def of_forces(cls, name: str, time: Samples, forces: Samples) -> ContactForce:
         """Make a contact force from forces at the states, of shape (n, 3) [force]."""
-        is_nonzero = _is_something(forces)
+        is_nonzero = _is_above_round_off(forces)
         acts = is_nonzero.copy()
         acts[1:] |= is_nonzero[:-1]
         acts[:1] = False
@@ -53,7 +53,7 @@ class ContactForce(NamedTuple):
         """Make a contact force from impulses since the start, of shape (n, 3) [momentum]."""
         changes = np.zeros_like(impulses)
         changes[1:] = np.diff(impulses, axis=0)
-        return cls(name, time, changes, _is_something(changes))
+        return cls(name, time, changes, _is_above_round_off(changes))
 
     @classmethod
     def of_changes(cls, name: str, time: Samples, values: Samples) -> ContactForce:
@@ -62,7 +62,7 @@ class ContactForce(NamedTuple):
         A force that stays at one value is zero, since a contact lets parts vibrate.
         """
         acts = np.zeros(time.size, np.bool_)
-        acts[1:] = _is_something(np.diff(values, axis=0))
+        acts[1:] = _is_above_round_off(np.diff(values, axis=0))
         return cls(name, time, np.full((time.size, 3), np.nan), acts)
 
     @property
@@ -73,7 +73,7 @@ class ContactForce(NamedTuple):
                 float(self.time[max(interval.start - 1, 0)]),
                 float(self.time[interval.stop - 1]),
             )
-            for interval in stretches(self.acts)
+            for interval in find_stretches(self.acts)
         )
 
     @property
@@ -92,7 +92,9 @@ def find_force(
     )
 
 
-def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactForce:
+def join_contact_forces(
+    pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
+) -> ContactForce:
     """Join the forces of one contact in the legs of a run; ``keep`` are the valid states of all legs together.
 
     Between two legs the force acts if it acts just before or after.
@@ -111,7 +113,7 @@ def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactFo
     return whole
 
 
-def _is_something(values: Samples) -> NDArray[np.bool_]:
+def _is_above_round_off(values: Samples) -> NDArray[np.bool_]:
     """Return True for each state whose values (n, k) are more than round-off compared with the largest of all."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

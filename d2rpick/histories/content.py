@@ -15,7 +15,12 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import ChangedError, FormatError
-from d2rpick.base.files import FileState, at_rest, settled_state, settled_states
+from d2rpick.base.files import (
+    FileState,
+    read_at_rest,
+    wait_for_settled_state,
+    wait_for_settled_states,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +66,7 @@ class Content:
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
         """Return ``width`` bytes at each of many addresses, shape (n, width)."""
-        return _gathered(self.view(0, len(self)), addresses, width)
+        return _gather_fields(self.view(0, len(self)), addresses, width)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
         """Fill the rows of ``room`` (n, width) with bytes at ``begin`` and every ``stride`` after it.
@@ -79,7 +84,7 @@ class Content:
         """Do nothing: bytes in memory do not change."""
 
 
-def content_of(data: bytes | Content) -> Content:
+def make_content(data: bytes | Content) -> Content:
     """Return the content of bytes, whether they are in memory or on disk."""
     return Content(data) if isinstance(data, bytes) else data
 
@@ -200,7 +205,7 @@ class OnDisk(Content):
         ):
             low = int(addresses[first])
             near = self.view(low, int(addresses[end - 1]) + width)
-            fields[first:end] = _gathered(near, addresses[first:end] - low, width)
+            fields[first:end] = _gather_fields(near, addresses[first:end] - low, width)
         alone = firsts[~several]
         room = fields.reshape(-1).data
         for start, address in zip(
@@ -252,7 +257,7 @@ class OnDisk(Content):
             return
         if now.size == self._size and now.modified != self._state.modified:
             # a write sets its time first and its size last: it may be in progress
-            settled_state(self._file, may_grow=True)
+            wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
@@ -327,7 +332,7 @@ class Scattered(OnDisk):
             return file.read(max(0, min(size_after, self._size - end)))
 
 
-def scattered(names: Sequence[str]) -> list[Scattered]:
+def open_scattered(names: Sequence[str]) -> list[Scattered]:
     """Return the contents of files of which little is read, once they are not being written.
 
     Raises
@@ -335,11 +340,11 @@ def scattered(names: Sequence[str]) -> list[Scattered]:
     FormatError
         If a file changes all the time.
     """
-    states = settled_states(names, FormatError)
+    states = wait_for_settled_states(names, FormatError)
     return [Scattered(name, state) for name, state in zip(names, states, strict=True)]
 
 
-def stored(name: str) -> bytes | OnDisk:
+def open_content(name: str) -> bytes | OnDisk:
     """Return the content of a file, as bytes if it is small or not a regular file.
 
     Raises
@@ -348,7 +353,7 @@ def stored(name: str) -> bytes | OnDisk:
         If it changes all the time, or is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
-        state = at_rest(name, file, FormatError, may_grow=True)
+        state = read_at_rest(name, file, FormatError, may_grow=True)
         if isinstance(state, bytes):
             return state
         on_disk = OnDisk(name, os.dup(file.fileno()), state)
@@ -377,13 +382,13 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
     return on_disk
 
 
-def line_at(data: Content, address: int) -> int:
+def count_line_number(data: Content, address: int) -> int:
     """Return the number of the line at an address, counted from 1."""
     pieces = (data[at : min(at + _LINES, address)] for at in range(0, address, _LINES))
     return 1 + sum(piece.count(b"\n") for piece in pieces)
 
 
-def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:
+def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each address, shape (n, width)."""
     # a view with a field at every address, so that fetching is plain indexing
     fields = np.ndarray(

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
-from d2rpick.histories.contact_forces import joined
+from d2rpick.base.errors import FormatError, list_names
+from d2rpick.histories.contact_forces import join_contact_forces
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
-from d2rpick.histories.names import Part, resolve, with_namesakes
-from d2rpick.histories.samples import newest_states, window
+from d2rpick.histories.names import Part, mark_namesakes, resolve_name
+from d2rpick.histories.samples import find_newest_states, find_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -134,7 +134,7 @@ class Database:
 
     def find(self, wanted: str) -> str:
         """Return the column that the user means by name or, in tables, by number; FormatError lists the columns."""
-        return resolve(wanted, self.channels, self.source)
+        return resolve_name(wanted, self.channels, self.source)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
         """Return the precision of the times and of these channels, or of the parts without channels."""
@@ -160,8 +160,8 @@ class Legs:
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
         if len(legs) > 1:  # the times of a single leg may not be known yet
-            self._files = sorted(legs, key=_leg_order)
-            with_states = [leg for leg in self._files if _start(leg) > -np.inf]
+            self._files = sorted(legs, key=_make_leg_key)
+            with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
         # ids and energies of the parts that were requested last
         self._energies: tuple[tuple[int, ...], Samples] | None = None
@@ -207,7 +207,7 @@ class Legs:
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """Parts that all legs have."""
-        return with_namesakes(
+        return mark_namesakes(
             part for part in self._legs[0].parts if part.id not in self._passing
         )
 
@@ -224,7 +224,7 @@ class Legs:
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(
-                f"{self.source}: only some legs have part {listing(self._passing)}, which was left out"
+                f"{self.source}: only some legs have part {list_names(self._passing)}, which was left out"
             )
         notes += notes_on_states
         if self.parts:
@@ -234,7 +234,7 @@ class Legs:
     @property
     def span(self) -> tuple[float, float] | None:
         """First and last time [time]; None if there are no states."""
-        times = [time for time in _times(self) if time.size]
+        times = [time for time in _list_times(self) if time.size]
         return (float(times[0][0]), float(times[0][-1])) if times else None
 
     @cached_property
@@ -275,8 +275,8 @@ class Legs:
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Return the precisions of the coarsest leg."""
         precisions = [leg.precisions(names) for leg in self._legs]
-        coarsest_time = min((time for time, _ in precisions), key=_digits)
-        coarsest_energy = min((energy for _, energy in precisions), key=_digits)
+        coarsest_time = min((time for time, _ in precisions), key=_count_digits)
+        coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
         return coarsest_time, coarsest_energy
 
     @cached_property
@@ -288,7 +288,7 @@ class Legs:
         common = [name for name in legs[0] if all(name in leg for leg in legs)]
         pieces = [[leg[name] for leg in legs] for name in common]
         return tuple(
-            joined(of_one, self._order([leg.time for leg in of_one])[0])
+            join_contact_forces(of_one, self._order([leg.time for leg in of_one])[0])
             for of_one in pieces
         )
 
@@ -320,8 +320,8 @@ class Legs:
                 raise FormatError(
                     f"{problem}; check that this is the time (`time`) and the file is not damaged"
                 )
-        all_times = _together(times)
-        keep, notes = newest_states(all_times)
+        all_times = _join_columns(times)
+        keep, notes = find_newest_states(all_times)
         ends = np.cumsum([time.size for time in times])
         unused = [
             f"{leg.source} was not used: a newer leg begins at or before its first time"
@@ -329,20 +329,20 @@ class Legs:
             if states.size and not states.any()
         ]
         valid_times = all_times if keep.all() else all_times[keep]
-        return keep, (*notes, *unused, *_holes(valid_times))
+        return keep, (*notes, *unused, *_note_holes(valid_times))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         """Join the columns of the legs, without the states that are not valid."""
-        whole = _together(columns)
+        whole = _join_columns(columns)
         return whole if keep.all() else whole[keep]
 
 
-def _together(columns: Sequence[Samples]) -> Samples:
+def _join_columns(columns: Sequence[Samples]) -> Samples:
     """Join columns; a single one is not copied."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
-def _times(database: Database | Legs) -> list[Samples]:
+def _list_times(database: Database | Legs) -> list[Samples]:
     """Return the times of the whole model and of the parts, if there are any."""
     return [
         *([database.time] if database.channels else []),
@@ -350,23 +350,25 @@ def _times(database: Database | Legs) -> list[Samples]:
     ]
 
 
-def _start(leg: Database) -> float:
+def _find_start(leg: Database) -> float:
     """Return the first time of a leg, -inf if it has no states."""
-    return min((float(time[0]) for time in _times(leg) if time.size), default=-np.inf)
+    return min(
+        (float(time[0]) for time in _list_times(leg) if time.size), default=-np.inf
+    )
 
 
-def _leg_order(leg: Database) -> tuple[float, list[tuple[str, int]]]:
+def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
     """Return the sort key of a leg: its start, then its name, so that the order of the arguments does not matter."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
-    return _start(leg), [(text, int(number or -1)) for text, number in pieces]
+    return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
 
-def _digits(precision: Precision) -> int:
+def _count_digits(precision: Precision) -> int:
     """Return the digits or decimals of a precision."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
-def _holes(time: Samples) -> tuple[str, ...]:
+def _note_holes(time: Samples) -> tuple[str, ...]:
     """Return notes on long intervals without output, at which a leg may be missing."""
     if time.size < 4:
         return ()
@@ -387,7 +389,7 @@ def _holes(time: Samples) -> tuple[str, ...]:
     )
 
 
-def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
+def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     """Raise FormatError if parts have more internal energy than the whole model at the same times.
 
     ``energies`` are those of some parts of ``holder``, shape (n, parts) [energy].
@@ -397,10 +399,10 @@ def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
             return
     except FormatError:  # an ambiguous energy is reported when it is read
         return
-    in_parts, in_model = _coincident(
+    in_parts, in_model = _find_coincident(
         holder.part_time,
         whole.time,
-        _room((holder, whole), (holder.part_time, whole.time)),
+        _compute_tolerance((holder, whole), (holder.part_time, whole.time)),
     )
     if not in_parts.size:
         return
@@ -420,20 +422,24 @@ def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
         )
 
 
-def doubts(databases: Sequence[Legs]) -> Iterator[str]:
+def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
     """Yield a note on each pair of databases with few states at the same printed times, or with different ends."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue
-        times = [_times(database)[0] for database in (first, second)]
+        times = [_list_times(database)[0] for database in (first, second)]
         longest_step = max(np.diff(time).max(initial=0.0) for time in times)
         if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * longest_step:
             ends = f"{first.source} ends at {times[0][-1]:.6g} and {second.source} at {times[1][-1]:.6g}"
             yield f"{ends}; are they from the same run, or is one cut?"
         low = max(t[0] for t in times)
         high = min(t[-1] for t in times)
-        coarse, fine = sorted((t[window(t, low, high)] for t in times), key=np.size)
-        shared = _coincident(coarse, fine, _room((first, second), times))[0].size
+        coarse, fine = sorted(
+            (t[find_window(t, low, high)] for t in times), key=np.size
+        )
+        shared = _find_coincident(
+            coarse, fine, _compute_tolerance((first, second), times)
+        )[0].size
         if shared < _FEWEST * coarse.size:
             yield (
                 f"{first.source} and {second.source} have only {shared} of {coarse.size} states at the same times; "
@@ -441,14 +447,14 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
             )
 
 
-def _coincident(
+def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
     """Return the indices of the times within ``room`` [time] of one of the others, and of the nearest other times.
 
     Examples
     --------
-    >>> _coincident(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
+    >>> _find_coincident(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
     (array([0, 1]), array([0, 1]))
     """
     if not other_times.size:
@@ -464,7 +470,7 @@ def _coincident(
     return near, nearest[near]
 
 
-def _room(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
+def _compute_tolerance(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
     """Return by how much a printed time may differ between databases [time]."""
     ends = zip(databases, times, strict=True)
     return (

@@ -25,83 +25,83 @@ _HARDLY_MEANT: Final = 0.05
 _FIRST_STATES: Final = 10
 
 
-def as_read(time: float) -> float:
+def round_as_read(time: float) -> float:
     """Return the time that a user types after reading this one.
 
     Examples
     --------
-    >>> as_read(0.0128852793630525)
+    >>> round_as_read(0.0128852793630525)
     0.0128853
     """
     return float(f"{time:.{_DIGITS}g}")
 
 
-def first_as_read(time: float) -> float:
+def round_to_first_as_read(time: float) -> float:
     """Return the time itself, or its printed form if that is earlier.
 
     Examples
     --------
-    >>> first_as_read(0.0385101065), first_as_read(0.0385101965)
+    >>> round_to_first_as_read(0.0385101065), round_to_first_as_read(0.0385101965)
     (0.0385101, 0.0385101965)
     """
-    return min(time, as_read(time))
+    return min(time, round_as_read(time))
 
 
-def sum_as_read(time: float, further: float) -> float:
+def sum_times_as_read(time: float, further: float) -> float:
     """Add two printed times, without the digits that only a sum of doubles has.
 
     Examples
     --------
-    >>> 0.2884 - 0.02, sum_as_read(0.2884, -0.02)
+    >>> 0.2884 - 0.02, sum_times_as_read(0.2884, -0.02)
     (0.26839999999999997, 0.2684)
     """
     return float(f"{time + further:.{_EXACT}g}") if further else time
 
 
-def not_before(time: float) -> float:
+def round_up_as_read(time: float) -> float:
     """Return the first time with six digits that is not before this one.
 
     Examples
     --------
-    >>> not_before(0.1000520661), not_before(0.25)
+    >>> round_up_as_read(0.1000520661), round_up_as_read(0.25)
     (0.100053, 0.25)
     """
-    printed = as_read(time)
-    return printed if printed >= time else _next(printed)
+    printed = round_as_read(time)
+    return printed if printed >= time else _find_next_printed(printed)
 
 
-def not_after(time: float) -> float:
+def round_down_as_read(time: float) -> float:
     """Return the last time with six digits that is not after this one.
 
     Examples
     --------
-    >>> not_after(0.1986539), not_after(0.25)
+    >>> round_down_as_read(0.1986539), round_down_as_read(0.25)
     (0.198653, 0.25)
     """
-    return -not_before(-time)
+    return -round_up_as_read(-time)
 
 
-def window_as_read(start: float, end: float) -> str:
+def format_window(start: float, end: float) -> str:
     """Format a window so that every printed time between both ends is inside; an interval too short for that in full.
 
     Examples
     --------
-    >>> window_as_read(0.08800000000000001, 0.3108), window_as_read(0.10005206, 0.10005208)
+    >>> format_window(0.08800000000000001, 0.3108), format_window(0.10005206, 0.10005208)
     ('0.0880001 to 0.3108', '0.10005206 to 0.10005208')
     """
-    low = not_before(start)
-    high = not_after(end)
+    low = round_up_as_read(start)
+    high = round_down_as_read(end)
     if low > high:
         return f"{float(start)!r} to {float(end)!r}"
     return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}"
 
 
-def told_apart(numbers: Sequence[float]) -> list[str]:
+def format_distinctly(numbers: Sequence[float]) -> list[str]:
     """Format numbers with six digits, or with as many as make different numbers look different.
 
     Examples
     --------
-    >>> told_apart([0.42, 0.0, 0.15]), told_apart([0.42, 0.4199999])
+    >>> format_distinctly([0.42, 0.0, 0.15]), format_distinctly([0.42, 0.4199999])
     (['0.42', '0', '0.15'], ['0.42', '0.4199999'])
     """
     for digits in range(_DIGITS, 17):
@@ -111,25 +111,25 @@ def told_apart(numbers: Sequence[float]) -> list[str]:
     return [repr(float(number)) for number in numbers]
 
 
-def above(value: float, limit: float) -> str:
+def format_above_limit(value: float, limit: float) -> str:
     """Format a value above a limit with three digits, or with as many as show that it is above.
 
     Examples
     --------
-    >>> above(0.31416, 0.2), above(0.20004, 0.2)
+    >>> format_above_limit(0.31416, 0.2), format_above_limit(0.20004, 0.2)
     ('0.314', '0.20004')
     """
     texts = (f"{value:.{digits}g}" for digits in range(3, 17))
     return next((text for text in texts if float(text) > limit), repr(float(value)))
 
 
-def _next(printed: float) -> float:
+def _find_next_printed(printed: float) -> float:
     """Return the next number with six digits."""
     mantissa, _, exponent = f"{printed:.{_DIGITS - 1}e}".partition("e")
     return float(f"{int(mantissa.replace('.', '')) + 1}e{int(exponent) - _DIGITS + 1}")
 
 
-def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
+def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
     """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit, or an empty text.
 
     The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
@@ -144,22 +144,22 @@ def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> s
         return ""
     earliest = max(first, 0.0) + _HARDLY_MEANT * (last - first)
     for unit, size in (("ms", 1e-3), ("us", 1e-6)):
-        values = _scaled(times, size)
+        values = _scale_times(times, size)
         is_inside = all(first <= value <= last for value in values)
         if earliest <= values[-1] and is_inside:
-            return _question(unit, argument, values)
+            return _ask_for_unit(unit, argument, values)
     return ""
 
 
-def in_larger_unit(
+def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
     """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s."""
-    values = in_the_record(record, times, unit)
-    return _question("s", argument, values) if values else ""
+    values = convert_to_unit_of_record(record, times, unit)
+    return _ask_for_unit("s", argument, values) if values else ""
 
 
-def in_the_record(
+def convert_to_unit_of_record(
     record: Samples, times: Sequence[float], unit: str = ""
 ) -> list[float]:
     """Convert times among the first ten states of a ``record`` (n,) from s to the ms or us of the record.
@@ -171,8 +171,8 @@ def in_the_record(
     --------
     >>> import numpy as np
     >>> record = np.linspace(0, 150, 1501)
-    >>> in_the_record(record, [0.064]), in_the_record(record, [0.64]), in_the_record(record, [0.0])
-    ([64.0], [], [])
+    >>> [convert_to_unit_of_record(record, [time]) for time in (0.064, 0.64, 0.0)]
+    [[64.0], [], []]
     """
     first = float(record[0])
     last = float(record[-1])
@@ -186,18 +186,18 @@ def in_the_record(
     earliest = min(early, first + _NEVER_MEANT * (last - first))
     # us first: if both units fit, the value in ms is too early in the record to be meant
     for size in (1e6, 1e3):
-        values = _scaled(times, size)
+        values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
             return values
     return []
 
 
-def _scaled(times: Sequence[float], size: float) -> list[float]:
+def _scale_times(times: Sequence[float], size: float) -> list[float]:
     """Multiply times by the size of a unit, without the digits that only a product of doubles has."""
     return [float(f"{time * size:.12g}") for time in times]
 
 
-def _question(unit: str, argument: str, values: Sequence[float]) -> str:
+def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
     """Return the question whether an argument was meant in a unit, with the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

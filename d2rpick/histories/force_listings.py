@@ -14,8 +14,8 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.contact_forces import ContactForce, joined
-from d2rpick.histories.samples import newest_states
+from d2rpick.histories.contact_forces import ContactForce, join_contact_forces
+from d2rpick.histories.samples import find_newest_states
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -53,7 +53,7 @@ def recognises(head: bytes) -> bool:
     return re.search(_SIDE, head) is not None or re.search(_WALL_HEAD, head) is not None
 
 
-def forces_of(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
+def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
     """Return the forces of some files; several files with the same contact are legs of a run.
 
     Raises
@@ -63,58 +63,58 @@ def forces_of(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
     """
     pieces_of: dict[str, list[ContactForce]] = {}
     for source in sources:
-        for force in _of_file(source):
+        for force in _read_forces_of_file(source):
             pieces_of.setdefault(force.name, []).append(force)
     ordered = (
         sorted(pieces, key=lambda piece: float(piece.time[0]))
         for pieces in pieces_of.values()
     )
-    return tuple(_newest(pieces) for pieces in ordered)
+    return tuple(_join_legs(pieces) for pieces in ordered)
 
 
-def _newest(pieces: Sequence[ContactForce]) -> ContactForce:
+def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
     """Join the legs of one contact; where they overlap the newer one is used."""
-    return joined(
-        pieces, newest_states(np.concatenate([piece.time for piece in pieces]))[0]
+    return join_contact_forces(
+        pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
 
 
-def _of_file(source: Source) -> Iterator[ContactForce]:
+def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
     """Yield the forces of one file; raise FormatError if there are none."""
     data = bytes(source.data)
     is_wall = re.search(_WALL_HEAD, data[:_HEAD]) is not None
-    rows = _wall_rows(data) if is_wall else _contact_rows(data)
+    rows = _read_wall_rows(data) if is_wall else _read_contact_rows(data)
     if not rows.time.size:
         listed, name = ("rigid walls", "rwforc") if is_wall else ("contacts", "rcforc")
         raise FormatError(
             f"{source.name}: no forces of {listed} can be read in it; is it a whole {name} of LS-DYNA?"
         )
     kind = "rigid wall" if is_wall else "contact"
-    titles = _titles(data[:_HEAD])
+    titles = _read_titles_of_legend(data[:_HEAD])
     for id_ in dict.fromkeys(rows.ids.astype(int).tolist()):
         mine = rows.ids == id_
         title = titles.get(id_, "")
-        time, forces = _of_sides(rows.time[mine], rows.forces[mine])
+        time, forces = _choose_largest_of_sides(rows.time[mine], rows.forces[mine])
         yield ContactForce.of_forces(
             f"{kind} {id_}{f' {title!r}' if title else ''}", time, forces
         )
 
 
-def _of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
+def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
     """Return the line with the largest force at each time: sides of a contact have the same force, or one has none."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
 
 
-def _contact_rows(data: bytes) -> _Rows:
+def _read_contact_rows(data: bytes) -> _Rows:
     """Read the lines of an rcforc."""
     lines = np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 5)
     return _Rows(numbers[:, 0], numbers[:, 1], numbers[:, 2:])
 
 
-def _wall_rows(data: bytes) -> _Rows:
+def _read_wall_rows(data: bytes) -> _Rows:
     """Read the lines of an rwforc; a wall without components gets its normal force as the first one."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
@@ -124,7 +124,7 @@ def _wall_rows(data: bytes) -> _Rows:
     return _Rows(numbers[:, 1], numbers[:, 0], forces)
 
 
-def _titles(head: bytes) -> dict[int, str]:
+def _read_titles_of_legend(head: bytes) -> dict[int, str]:
     """Return the titles in the legend by number."""
     legend = re.search(_LEGEND, head)
     entries = re.findall(_ENTRY, legend[0]) if legend else []

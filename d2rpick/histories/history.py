@@ -10,8 +10,8 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import HistoryError, RangeError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.digits import told_apart
-from d2rpick.histories.samples import find_turns, window
+from d2rpick.histories.digits import format_distinctly
+from d2rpick.histories.samples import find_turns, find_window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class Momenta:
     def of(self, members: Sequence[int]) -> Samples:
         """Return the sum over the parts with these indices, shape (n, 3), read-only."""
         return self.known.once(
-            ("sum", *members), lambda: frozen(self.values[:, list(members)].sum(axis=1))
+            ("sum", *members), lambda: freeze(self.values[:, list(members)].sum(axis=1))
         )
 
     def noise(self, members: Sequence[int]) -> float:
@@ -300,8 +300,8 @@ class History:
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
-        time = frozen(self.time)
-        energy = frozen(self.energy)
+        time = freeze(self.time)
+        energy = freeze(self.energy)
         where = ", ".join(self.source)
         if time.ndim != 1 or time.shape != energy.shape:
             shapes = f"{where}: time has shape {time.shape}, energy {energy.shape}"
@@ -319,7 +319,7 @@ class History:
                 f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}"
             )
         if self.part_energies is not None:
-            terms = frozen(self.part_energies)
+            terms = freeze(self.part_energies)
             expected = (time.size, len(self.part_names))
             if terms.shape != expected:
                 raise HistoryError(
@@ -370,9 +370,9 @@ class History:
     def left_beside(self) -> str:
         """A question on later legs of the run in the same folder that were not named; empty if there are none."""
         # imported here since pathlib slows start-up
-        from d2rpick.histories.source import later_legs
+        from d2rpick.histories.source import find_later_legs
 
-        legs = later_legs(self.source)
+        legs = find_later_legs(self.source)
         if not legs:
             return ""
         return f"; in the same folder is {', '.join(legs)}, a later leg of the run? Name it too"
@@ -383,15 +383,15 @@ class History:
         high = self.time[-1]
         if all(low <= time <= high for time in times):
             return
-        from d2rpick.histories.digits import in_smaller_unit
+        from d2rpick.histories.digits import ask_for_smaller_unit
 
         is_late = max(times) > high
         hint = self.left_beside if is_late else ""
         if not hint and argument:
-            hint = in_smaller_unit(self.time, times, argument)
+            hint = ask_for_smaller_unit(self.time, times, argument)
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
-        *values, first, last = told_apart((*times, low, high))
+        *values, first, last = format_distinctly((*times, low, high))
         subject = f"`{argument}`" if argument else "time"
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
@@ -403,11 +403,13 @@ class History:
         """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
         if times[-1] * 1e3 > self.time[-1]:  # the usual case
             return
-        from d2rpick.histories.digits import in_larger_unit
+        from d2rpick.histories.digits import ask_for_larger_unit
 
-        meant = in_larger_unit(self.time, times, argument, self.time_unit)
+        meant = ask_for_larger_unit(self.time, times, argument, self.time_unit)
         if meant:
-            *values, first, last = told_apart((*times, self.time[0], self.time[-1]))
+            *values, first, last = format_distinctly(
+                (*times, self.time[0], self.time[-1])
+            )
             problem = f"`{argument}` {' '.join(values)} lies within the first ten states of the record"
             raise RangeError(
                 f"{', '.join(self.source)}: {problem}, {first} to {last}{meant}"
@@ -445,11 +447,11 @@ class History:
 
     def between(self, start: float, end: float) -> tuple[Samples, Samples]:
         """Return times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
-        inside = window(self.time, start, end)
+        inside = find_window(self.time, start, end)
         return self.time[inside], self.energy[inside]
 
 
-def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
+def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
     """Return a record with some of its states only: of all its arrays with one row per time, except masses of parts."""
     size = record.time.size
     rows = {}
@@ -461,7 +463,7 @@ def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
     return replace(record, **rows)  # type: ignore[arg-type]
 
 
-def frozen(values: ArrayLike) -> Samples:
+def freeze(values: ArrayLike) -> Samples:
     """Return values as a read-only array of doubles, copied unless they are such an array, not part of another."""
     if (
         isinstance(values, np.ndarray)

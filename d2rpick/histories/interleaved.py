@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.samples import FEWEST_TIMES, count_rows_per_time
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def refuse_rows_of_parts(
     problem = f"{source}: each time stands {rows} times with different energies, one row for each time was expected"
     if parts is None:
         raise FormatError(f"{problem}; give the rows of one part")
-    values = listing(
+    values = list_names(
         [str(value) for value in dict.fromkeys(columns[parts][:rows])], most=6
     )
     raise FormatError(

@@ -76,7 +76,7 @@ _SEARCHED: Final = 64 << 20  # bytes at the start of a file that are searched
 _D3HSP: Final = "d3hsp"
 
 
-def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
+def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
     """Yield the listings of restarts whose engine reports a wrong internal energy, and what shows it.
 
     OpenRadioss before its fix of January 2026 reports a wrong energy of elements that /RBODY/ON or /RBODY/OFF of a
@@ -86,12 +86,12 @@ def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
         match = re.fullmatch(_HISTORY, name)
         if match and int(match["leg"]) > 1:
             listing = f"{match['root']}_{int(match['leg']):04d}.out"
-            old = _before_the_fix(*_ends(listing))
+            old = _detect_old_engine(*_read_ends(listing))
             if old:
                 yield f"{listing}: {old}"
 
 
-def ending(history: str) -> str | None:
+def find_ending(history: str) -> str | None:
     """Return how a run ended according to the listing of its last history; None if the listing does not show it.
 
     A leg that was told to stop has not ended the run, nor has a leg with a next leg.
@@ -105,14 +105,14 @@ def ending(history: str) -> str | None:
         return None
     else:
         listings = [f"{match['root']}_{int(match['leg']):04d}.out"]
-    tails = [_ends(listing)[1] for listing in listings]
+    tails = [_read_ends(listing)[1] for listing in listings]
     for words, manner in _ENDINGS.items():
         if any(words in tail and _STOPPED not in tail for tail in tails):
             return manner
     return None
 
 
-def _ends(path: str) -> tuple[bytes, bytes]:
+def _read_ends(path: str) -> tuple[bytes, bytes]:
     """Return the first and the last bytes of a file; empty if it cannot be read."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123  start-up
@@ -123,7 +123,7 @@ def _ends(path: str) -> tuple[bytes, bytes]:
         return b"", b""
 
 
-def _before_the_fix(head: bytes, tail: bytes) -> str:
+def _detect_old_engine(head: bytes, tail: bytes) -> str:
     """Return what shows that an engine that switches rigid bodies is older than the fix; empty if nothing does."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
@@ -164,12 +164,12 @@ def read_timing(path: str) -> Timing:
     FormatError
         If the file cannot be read, or has no usable summary of CPU times.
     """
-    data = _read(path)
+    data = _read_listing(path)
     timing = None
     if _SUMMARY in data:
-        timing = _of_radioss(path, data)
+        timing = _read_radioss_timing(path, data)
     elif _TIMING in data:
-        timing = _of_d3hsp(path, data)
+        timing = _read_d3hsp_timing(path, data)
     if timing is None or not timing.cycles or not 0 < timing.elements <= timing.total:
         raise FormatError(
             f"{path}: no times of elements and of all work with their cycles were found, a Radioss listing "
@@ -182,7 +182,7 @@ def read_zone_times(path: str) -> ZoneTimes:
     """Read the times per zone cycle of a glstat; raise FormatError if there is none above zero."""
     pairs: list[tuple[float, float]] = []
     time = 0.0
-    for line in re.finditer(_ZONE, _read(path)):
+    for line in re.finditer(_ZONE, _read_listing(path)):
         if line[0].startswith(_PER_ZONE):
             pairs.append((time, float(line[1])))
         else:
@@ -198,10 +198,10 @@ def read_zone_times(path: str) -> ZoneTimes:
 
 def is_glstat(path: str) -> bool:
     """Return True if a file contains times per zone cycle."""
-    return b"time per zone cycle" in _read(path)
+    return b"time per zone cycle" in _read_listing(path)
 
 
-def _read(path: str) -> bytes:
+def _read_listing(path: str) -> bytes:
     """Return the bytes of a file; raise FormatError if it cannot be read."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123
@@ -212,7 +212,7 @@ def _read(path: str) -> bytes:
         ) from None
 
 
-def _of_radioss(name: str, data: bytes) -> Timing | None:
+def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
     """Return the CPU times of a Radioss listing, 0 for a number that is not there."""
     summary = data[data.rindex(_SUMMARY) :]
     numbers = []
@@ -223,7 +223,7 @@ def _of_radioss(name: str, data: bytes) -> Timing | None:
     return Timing(name, int(cycles), total, elements)
 
 
-def _of_d3hsp(name: str, data: bytes) -> Timing | None:
+def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
     """Return the CPU times of a d3hsp (elapsed times if these are rounded to 0), without the time before the run."""
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
@@ -238,7 +238,7 @@ def _of_d3hsp(name: str, data: bytes) -> Timing | None:
     )
 
 
-def printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str]]:
+def find_printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str]]:
     """Return the smallest time step of each part, with the name of its source.
 
     Parameters
@@ -255,13 +255,13 @@ def printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str]]:
     """
     steps: dict[int, tuple[float, str]] = {}
     names = (*run.sources, *neighbours)
-    for name, part, step in (*_of_glstat(run), *_smallest_of_d3hsp(names)):
+    for name, part, step in (*_read_steps_of_glstat(run), *_read_steps_of_d3hsp(names)):
         if step > 0 and (part not in steps or step < steps[part][0]):
             steps[part] = step, name
     return steps
 
 
-def _of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
+def _read_steps_of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
     """Yield the part that controls each cycle, with the step printed below it."""
     for file in run.files:
         part: bytes | None = None
@@ -269,11 +269,11 @@ def _of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
             if line[1]:
                 part = line[1]
             elif part:
-                yield ("glstat", *_pair(part, line[2]))
+                yield ("glstat", *_parse_part_and_step(part, line[2]))
                 part = None
 
 
-def _smallest_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
+def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
     """Yield the parts and steps in the table of smallest steps of each d3hsp in the folders of some files."""
     from pathlib import Path
 
@@ -285,11 +285,12 @@ def _smallest_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]
             table = re.search(_TABLE, stream.read(_SEARCHED))
         if table:
             yield from (
-                (_D3HSP, *_pair(*row.groups())) for row in re.finditer(_ROW, table[1])
+                (_D3HSP, *_parse_part_and_step(*row.groups()))
+                for row in re.finditer(_ROW, table[1])
             )
 
 
-def _pair(part: bytes, step: bytes) -> tuple[int, float]:
+def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
     """Return part id and step, 0 for a step that is cut."""
     try:
         return int(part), float(step)

@@ -11,14 +11,14 @@ import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.names import (
     INTERNAL_ENERGY,
     QUANTITIES,
     TIME_NAMES,
-    normalised,
-    without_unit,
+    normalise_name,
+    remove_unit,
 )
 
 if TYPE_CHECKING:
@@ -115,19 +115,19 @@ def find_meaning(name: str) -> Meaning | None:
     steps = name.split("/")
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
-    whole = _match_words(_words_of("/".join(steps)))
+    whole = _match_words(_split_words("/".join(steps)))
     # "total energy / initial energy" is a name with a slash, not a path
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
         return None
-    last = _match_words(_words_of(steps[-1]))
+    last = _match_words(_split_words(steps[-1]))
     return last if last and last.rank < OF_SOMETHING_ELSE else whole
 
 
-def _words_of(name: str) -> list[str]:
+def _split_words(name: str) -> list[str]:
     """Cut a name into lower-case words without accents and unit; "totalKineticEnergy" becomes three words."""
-    text = _CAMEL_CASE.sub(" ", without_unit(_NUMBERING.sub("", name)))
+    text = _CAMEL_CASE.sub(" ", remove_unit(_NUMBERING.sub("", name)))
     text = text.casefold().translate(_PLAIN_LETTERS)
     return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
 
@@ -138,7 +138,7 @@ def _match_words(words: Sequence[str]) -> Meaning | None:
     other_words: list[str] = []
     rank, position = EXACT, 0
     while position < len(words):
-        length = _phrase_length(words, position)
+        length = _match_phrase(words, position)
         if length:
             quantities.add(_PHRASES["".join(words[position : position + length])])
         elif words[position] in _WHOLE_MODEL_WORDS:
@@ -152,7 +152,7 @@ def _match_words(words: Sequence[str]) -> Meaning | None:
     return Meaning(quantities.pop(), rank, tuple(other_words))
 
 
-def _phrase_length(words: Sequence[str], start: int) -> int:
+def _match_phrase(words: Sequence[str], start: int) -> int:
     """Return the number of words of the longest phrase that begins at ``start``, 0 if there is none."""
     longest = min(_LONGEST_PHRASE, len(words) - start)
     for length in range(longest, 0, -1):
@@ -170,7 +170,7 @@ def is_time(name: str) -> bool:
     >>> [name for name in ("Time (ms)", "t in ms", "Zeit [s]", "Total Time", "Time step", "wall time") if is_time(name)]
     ['Time (ms)', 't in ms', 'Zeit [s]', 'Total Time']
     """
-    words = _words_of(name)
+    words = _split_words(name)
     if "".join(words) in TIME_NAMES:
         return True
     remaining = [word for word in words if word not in _TIME_WORDS]
@@ -213,12 +213,12 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
     return exact or inexact
 
 
-def quantity_of(name: str) -> str | None:
+def find_quantity(name: str) -> str | None:
     """Return which of `QUANTITIES` of the whole model a channel of this name contains, None for any other name.
 
     Examples
     --------
-    >>> [quantity_of(name) for name in ("KINETIC ENERGY", "glstat/global_x_velocity", "momentum_z [N s]", "boxKE_J")]
+    >>> [find_quantity(name) for name in ("KINETIC ENERGY", "glstat/global_x_velocity", "momentum_z [N s]", "boxKE_J")]
     ['kinetic_energy', 'x_velocity', 'z_momentum', None]
     """
     meaning = find_meaning(name)
@@ -269,7 +269,7 @@ def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
 
 def _is_bare_total(name: str) -> bool:
     """Return True if a name is "total", perhaps with a word for energy."""
-    words = _words_of(name.rpartition("/")[2])
+    words = _split_words(name.rpartition("/")[2])
     words = [word for word in words if word not in _ENERGY_WORDS]
     return words == ["total"]
 
@@ -286,7 +286,7 @@ def note_unused_energies(
 whole model, name it with `channel`, as in kinetic_energy=NAME",)
     """
     unused = [
-        name for name in channels if name not in used and _looks_like_an_energy(name)
+        name for name in channels if name not in used and _has_name_of_energy(name)
     ]
     if not unused:
         return ()
@@ -294,7 +294,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
     for name in unused:
         meaning = find_meaning(name)
         texts.append(f"{name!r} ({meaning.quantity}?)" if meaning else repr(name))
-    names = listing(texts, most=_MOST_NAMED)
+    names = list_names(texts, most=_MOST_NAMED)
     if len(unused) == 1:
         problem = f"{names} looks like an energy but is not used; if it is one"
     else:
@@ -304,14 +304,14 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
     )
 
 
-def _looks_like_an_energy(name: str) -> bool:
+def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    if normalised(name) == ROTATION_ENERGY:  # added to the kinetic energy
+    if normalise_name(name) == ROTATION_ENERGY:  # added to the kinetic energy
         return False
     meaning = find_meaning(name)
     if meaning is not None:
         return meaning.quantity.endswith(("energy", "work"))
-    return any(re.fullmatch(_LIKE_AN_ENERGY, word) for word in _words_of(name))
+    return any(re.fullmatch(_LIKE_AN_ENERGY, word) for word in _split_words(name))
 
 
 def note_other_quantity(channel: str) -> tuple[str, ...]:
@@ -324,7 +324,7 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
     >>> note_other_quantity("ALLKE for Whole Model")
     ("'ALLKE for Whole Model' is not an internal energy by its name (ALLKE); it was used as it is",)
     """
-    word = _word_of_other_quantity(channel)
+    word = _find_word_of_other_quantity(channel)
     if not word:
         return ()
     return (
@@ -334,13 +334,13 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
 
 def refuse_other_quantity(channel: str, where: str) -> None:
     """Raise FormatError if the only column or curve of a file has the name of something other than internal energy."""
-    word = _word_of_other_quantity(channel)
+    word = _find_word_of_other_quantity(channel)
     if word:
         problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
         raise FormatError(f"{problem}; choose with `energy` what to use instead")
 
 
-def _word_of_other_quantity(channel: str) -> str:
+def _find_word_of_other_quantity(channel: str) -> str:
     """Return the word that makes a name mean something other than internal energy, or an empty string."""
     meaning = find_meaning(channel)
     is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE

@@ -7,7 +7,7 @@ from collections import Counter
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
@@ -91,13 +91,15 @@ _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
 
 
-def unit_of(name: str) -> str:
+def find_unit(name: str) -> str:
     """Return the unit at the end of a column name: in brackets, or after ``in``, ``/``, ``_``, ``,`` or a blank.
 
     Examples
     --------
-    >>> [unit_of(name) for name in ("Time (ms)", "t/ms", "time_s", "t in ms", "Internal Energy [J]", "time", "part_3")]
-    ['ms', 'ms', 's', 'ms', 'J', '', '']
+    >>> [find_unit(name) for name in ("Time (ms)", "t/ms", "time_s", "t in ms")]
+    ['ms', 'ms', 's', 'ms']
+    >>> [find_unit(name) for name in ("Internal Energy [J]", "time", "part_3")]
+    ['J', '', '']
     """
     name = name.strip()
     brackets = [match for match in _BRACKETS.finditer(name) if match.end() == len(name)]
@@ -110,16 +112,16 @@ def unit_of(name: str) -> str:
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
 
 
-def without_unit(name: str) -> str:
+def remove_unit(name: str) -> str:
     """Return a name without its unit and the word before it; a bracket without a unit stays.
 
     Examples
     --------
-    >>> [without_unit(name) for name in ("t in ms", "Energy(J): ALLKE", "Energy (kinetic) [N mm]", "KE_kJ")]
+    >>> [remove_unit(name) for name in ("t in ms", "Energy(J): ALLKE", "Energy (kinetic) [N mm]", "KE_kJ")]
     ['t', 'Energy: ALLKE', 'Energy (kinetic)', 'KE']
     """
     name = _BRACKETS.sub(_drop_unit, name).strip()
-    unit = unit_of(name)
+    unit = find_unit(name)
     if unit and name.endswith(unit):
         name = name[: -len(unit)].rstrip(" /_,\t")
     return name.removesuffix(" in")
@@ -131,16 +133,16 @@ def _drop_unit(brackets: re.Match[str]) -> str:
 
 
 @lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
-def normalised(name: str) -> str:
+def normalise_name(name: str) -> str:
     """Reduce a name to its letters and digits, in lower case and without its unit.
 
     Examples
     --------
-    >>> [normalised(name) for name in ("Internal_Energy (J)", "t/ms", "IE_J", "E int")]
+    >>> [normalise_name(name) for name in ("Internal_Energy (J)", "t/ms", "IE_J", "E int")]
     ['internalenergy', 't', 'ie', 'eint']
     """
     return "".join(
-        letter for letter in without_unit(name).casefold() if letter.isalnum()
+        letter for letter in remove_unit(name).casefold() if letter.isalnum()
     )
 
 
@@ -152,12 +154,12 @@ def is_unit(cell: str) -> bool:
     return cell[:1] + cell[-1:] in ("()", "[]")
 
 
-def meant(wanted: str, names: Sequence[str]) -> list[int]:
+def match_names(wanted: str, names: Sequence[str]) -> list[int]:
     """Return the indices of the names that ``wanted`` means: literally, else in other case, else without unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
-        normalised,
+        normalise_name,
     )
     for spelling in spellings:
         indices = [
@@ -170,32 +172,32 @@ def meant(wanted: str, names: Sequence[str]) -> list[int]:
     return []
 
 
-def resolve(wanted: str, names: Sequence[str], where: str) -> str:
+def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
     """Return the one name that is `meant`; raise FormatError, with similar names, if there is none or several.
 
     Examples
     --------
-    >>> resolve("internal energy", ["kinetic_energy", "internal_energy"], "binout")
+    >>> resolve_name("internal energy", ["kinetic_energy", "internal_energy"], "binout")
     'internal_energy'
     """
-    same = [names[index] for index in meant(wanted, names)]
+    same = [names[index] for index in match_names(wanted, names)]
     if not same:
         raise FormatError(
-            f"{where}: no {wanted!r}{near_miss(wanted, names)}; there are: {listing(names)}"
+            f"{where}: no {wanted!r}{suggest_name(wanted, names)}; there are: {list_names(names)}"
         )
     if len(same) > 1:
         raise FormatError(
-            f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written"
+            f"{where}: {wanted!r} may be any of these: {list_names(same)}; choose one as it is written"
         )
     return same[0]
 
 
-def in_seconds(text: str) -> float | None:
+def parse_seconds(text: str) -> float | None:
     """Return a time given with its unit [s]; None if the text is not such a time.
 
     Examples
     --------
-    >>> in_seconds("64ms"), in_seconds("0.064 s"), in_seconds("64"), in_seconds("forms")
+    >>> parse_seconds("64ms"), parse_seconds("0.064 s"), parse_seconds("64"), parse_seconds("forms")
     (0.064, 0.064, None, None)
     """
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|ms|us|µs)\s*", text, re.ASCII)
@@ -205,7 +207,7 @@ def in_seconds(text: str) -> float | None:
     return float(f"{float(match[1]) * sizes[match[2]]:.12g}")
 
 
-def near_miss(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
+def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
     """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity."""
     import difflib
 
@@ -214,12 +216,12 @@ def near_miss(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 
-def plain_text(raw: bytes) -> str:
+def clean_text(raw: bytes) -> str:
     r"""Return the text of a fixed field without padding; bytes that are not text become blanks.
 
     Examples
     --------
-    >>> plain_text(b" shell \xe9 \n\0\0  ")
+    >>> clean_text(b" shell \xe9 \n\0\0  ")
     'shell é'
     """
     try:
@@ -265,12 +267,12 @@ class Namesake(Part):
         return f"{self.title} ({self.id})"
 
 
-def with_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
+def mark_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
     """Add the number to the names of parts with the same title.
 
     Examples
     --------
-    >>> [part.name for part in with_namesakes([Part(1, "shell"), Part(2, "door"), Part(7, "shell"), Part(9, "")])]
+    >>> [part.name for part in mark_namesakes([Part(1, "shell"), Part(2, "door"), Part(7, "shell"), Part(9, "")])]
     ['shell (1)', 'door', 'shell (7)', 'part 9']
     """
     listed = tuple(parts)
@@ -321,66 +323,66 @@ def select_parts(
     titled[""] = []  # an empty title selects no part
     selected: set[Part] = set()
     for text in wanted:
-        selected.update(_meant(text, parts, titled, where))
+        selected.update(_match_parts(text, parts, titled, where))
     return tuple(part for part in parts if part in selected)
 
 
-def _meant(
+def _match_parts(
     text: str, parts: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
 ) -> Iterator[Part]:
     """Yield the parts that a text selects: one title, or numbers, ranges and titles between commas."""
     whole = titled.get(text.strip().casefold())
     if whole and "," in text:  # a title may contain a comma
-        yield _only(whole, text, where)
+        yield _choose_only_part(whole, text, where)
         return
     for piece in text.split(","):
-        yield from _piece(
+        yield from _match_piece(
             piece.strip(), parts, titled.get(piece.strip().casefold()), where
         )
 
 
-def _piece(
+def _match_piece(
     piece: str, parts: Sequence[Part], titled: Sequence[Part] | None, where: str
 ) -> Sequence[Part]:
     """Return the parts that a number, range or title selects; ``titled`` are the parts with that title."""
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
-            near = near_miss(piece, [part.title for part in parts])
+            near = suggest_name(piece, [part.title for part in parts])
             raise FormatError(
-                f"{where}: no part {piece!r}{near}; there are: {menu(parts)}"
+                f"{where}: no part {piece!r}{near}; there are: {list_parts(parts)}"
             )
-        return [_only(titled, piece, where)]
+        return [_choose_only_part(titled, piece, where)]
     low = int(numbers[1])
     high = int(numbers[2] or numbers[1])
     inside = [part for part in parts if low <= part.id <= high]
     if titled and titled != inside:
         problem = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means"
         raise FormatError(
-            f"{problem} {menu(inside) or 'none'}; choose by a number or title that is one part's only"
+            f"{problem} {list_parts(inside) or 'none'}; choose by a number or title that is one part's only"
         )
     if not inside:
-        raise FormatError(f"{where}: no part {piece}; there are: {menu(parts)}")
+        raise FormatError(f"{where}: no part {piece}; there are: {list_parts(parts)}")
     return inside
 
 
-def _only(titled: Sequence[Part], text: str, where: str) -> Part:
+def _choose_only_part(titled: Sequence[Part], text: str, where: str) -> Part:
     """Return the only part with a title; raise FormatError if there are several."""
     if len(titled) > 1:
         raise FormatError(
-            f"{where}: {text!r} is the title of several parts, choose by number: {menu(titled)}"
+            f"{where}: {text!r} is the title of several parts, choose by number: {list_parts(titled)}"
         )
     return titled[0]
 
 
-def menu(parts: Sequence[Part]) -> str:
+def list_parts(parts: Sequence[Part]) -> str:
     """Return number and title of some parts for a message."""
-    return listing(
+    return list_names(
         [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
     )
 
 
-def asks_for_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
+def has_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
     """Return True if texts contain the word "recommended", and it is not the title of a part."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

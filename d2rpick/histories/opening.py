@@ -28,7 +28,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-__all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
+__all__ = [
+    "Reader",
+    "Run",
+    "Selection",
+    "Source",
+    "load_reader",
+    "open_run",
+    "open_sources",
+]
 
 # Bytes that contain the head of a file and more than one state of the longest blocks.
 _HEAD = 8192
@@ -54,7 +62,7 @@ class Reader(Protocol):
         """Open files of this format as the legs of one run; raise FormatError if one has another format."""
 
 
-def reader(kind: str) -> Reader:
+def load_reader(kind: str) -> Reader:
     """Import the reader of a format, a key of `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
@@ -92,7 +100,7 @@ def open_sources(
     """Open the files of one run from their bytes; arguments and errors as in `open_run`."""
     with_forces = []
     if input_format == "auto":
-        with_forces = [source for source in sources if _holds_forces(source)]
+        with_forces = [source for source in sources if _is_force_listing(source)]
     sources = [source for source in sources if source not in with_forces]
     if not sources and with_forces:
         raise FormatError(
@@ -102,16 +110,16 @@ def open_sources(
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
-    opened, notes = _opened(kinds, ordered, selection)
+    opened, notes = _open_legs_of_formats(kinds, ordered, selection)
     ordered = [kind for kind in ordered if kind in opened]
-    forces, unread = _forces_of(with_forces)
+    forces, unread = _read_force_listings(with_forces)
     read_sources = [source for kind in ordered for source in kinds[kind]]
     if not unread:
         read_sources += with_forces
     used = {source.name for source in read_sources}
     for legs in opened.values():
         check_legs(legs)
-    ordered = _with_forces_last(opened, ordered)
+    ordered = _sort_forces_last(opened, ordered)
     databases = tuple(
         Legs(
             opened[kind],
@@ -125,7 +133,7 @@ def open_sources(
     check_companions(databases)
     later_files = set[str]()
     for kind in FAMILIES:
-        later_files |= _behind_firsts(kinds.get(kind, ()))
+        later_files |= _find_later_files(kinds.get(kind, ()))
     files = tuple(source for source in (*sources, *with_forces) if source.name in used)
     # the first file of a family stands for all its files
     names = tuple(source.name for source in files if source.name not in later_files)
@@ -169,7 +177,7 @@ def _sort_by_format(
             elif input_format != "auto":
                 formats[source.name] = input_format
             else:
-                formats[source.name] = _format(source)
+                formats[source.name] = _detect_format(source)
         except FormatError as error:
             if not source.by_pattern:
                 raise
@@ -180,7 +188,7 @@ def _sort_by_format(
             kinds.setdefault(formats[source.name], []).append(source)
     if foreign and not kinds:
         raise foreign[0][1]
-    notes = [_left_out(source, str(error)) for source, error in foreign]
+    notes = [_note_left_out_file(source, str(error)) for source, error in foreign]
     if input_format == "auto" and any(READERS[kind].solver for kind in kinds):
         tables = [source for source in kinds.get("csv", []) if source.by_pattern]
         notes += [
@@ -193,7 +201,7 @@ def _sort_by_format(
     return kinds, notes
 
 
-def _left_out(source: Source, refusal: str) -> str:
+def _note_left_out_file(source: Source, refusal: str) -> str:
     """Return the note on a file that was left out, with the reason from its error."""
     reason = (
         refusal.removeprefix(f"{source.name}: ")
@@ -203,7 +211,7 @@ def _left_out(source: Source, refusal: str) -> str:
     return f"{source.name} was left out: {reason}"
 
 
-def _with_forces_last(
+def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
     """Return the formats with those last that contain forces only; raise FormatError if all do."""
@@ -214,24 +222,24 @@ def _with_forces_last(
     return sorted(ordered, key=alone.__getitem__)
 
 
-def _holds_forces(source: Source) -> bool:
+def _is_force_listing(source: Source) -> bool:
     """Return True if a file is a listing of forces; files of families are not searched for them."""
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
 
 
-def _forces_of(
+def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
     """Read the forces of files without energies; return a note instead if they cannot be read."""
     try:
-        return force_listings.forces_of(sources), ()
+        return force_listings.read_listed_forces(sources), ()
     except FormatError as error:
         return (), (f"{error}; it was not used",)
 
 
-def _behind_firsts(sources: Sequence[Source]) -> set[str]:
+def _find_later_files(sources: Sequence[Source]) -> set[str]:
     """Return the names of the later files of families, whose first file stands for all of them."""
     names = {source.name for source in sources}
     return {
@@ -239,7 +247,7 @@ def _behind_firsts(sources: Sequence[Source]) -> set[str]:
     }
 
 
-def _opened(
+def _open_legs_of_formats(
     kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
     """Open the files by format; return the legs of each format, and notes on files that were not used.
@@ -251,10 +259,10 @@ def _opened(
     notes = []
     for kind in ordered:
         legs_so_far = [leg for legs in opened.values() for leg in legs]
-        if kind in FAMILIES and _hold_all(legs_so_far):
+        if kind in FAMILIES and _has_model_and_parts(legs_so_far):
             continue
         try:
-            opened[kind] = reader(kind).open_legs(kinds[kind], selection)
+            opened[kind] = load_reader(kind).open_legs(kinds[kind], selection)
         except FormatError as error:
             if kind not in FAMILIES or len(ordered) == 1:
                 raise
@@ -264,7 +272,7 @@ def _opened(
     return opened, tuple(notes)
 
 
-def _hold_all(legs: Sequence[Database]) -> bool:
+def _has_model_and_parts(legs: Sequence[Database]) -> bool:
     """Return True if databases have histories of the whole model and of its parts."""
     return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
@@ -288,7 +296,7 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
         )
 
 
-def _format(source: Source) -> str:
+def _detect_format(source: Source) -> str:
     """Return the format of a file: a binary signature comes first, and a text is a table only if it is nothing else."""
     head = _head_of(source)
     is_binary = b"\0" in head
@@ -297,7 +305,9 @@ def _format(source: Source) -> str:
     for kind, listed in READERS.items():
         if kind == "csv" and not is_binary:
             _refuse_foreign(source.name, head)
-        if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
+        if re.search(listed.hint, head, re.DOTALL) and load_reader(kind).recognises(
+            head
+        ):
             return kind
     if re.search(r"(^|[/\\.])d3(plot|part|thdt)\d+$", source.name):
         first = source.name.rstrip(_DIGITS)
@@ -352,20 +362,23 @@ def check_legs(legs: Sequence[Database]) -> None:
     the same time are copies, or of different runs: then all states at common times are compared.
     """
     for first, second in combinations(legs, 2):
-        held_by_first = _held(first)
-        held_by_second = _held(second)
+        held_by_first = _list_columns_and_parts(first)
+        held_by_second = _list_columns_and_parts(second)
         both_hold = held_by_first and held_by_second
         if both_hold and held_by_first.isdisjoint(held_by_second):
             raise FormatError(
                 f"{first.source} and {second.source} have neither a column nor a part in common, "
                 "legs of one run were expected; give the files of one run"
             )
-        for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
+        for times, columns in (
+            (_list_model_times, _read_model_energies),
+            (_list_part_times, _read_part_energies),
+        ):
             try:
-                shared = _shared(times(first), times(second))
+                shared = _find_shared_states(times(first), times(second))
                 if shared is None:
                     continue
-                are_alike = _alike(
+                are_alike = _is_same_energy(
                     columns(first, shared[0]), columns(second, shared[1])
                 )
             except FormatError:  # reported when the column is read
@@ -377,34 +390,36 @@ def check_legs(legs: Sequence[Database]) -> None:
                 )
 
 
-def _held(leg: Database) -> set[str | int]:
+def _list_columns_and_parts(leg: Database) -> set[str | int]:
     """Return the columns and part ids of a leg."""
     return {*leg.channels, *(part.id for part in leg.parts)}
 
 
-def _own_times(leg: Database) -> Samples:
+def _list_model_times(leg: Database) -> Samples:
     """Return the times of the whole model, shape (n,); empty if it has no columns."""
     return leg.time if leg.channels else np.empty(0)
 
 
-def _part_times(leg: Database) -> Samples:
+def _list_part_times(leg: Database) -> Samples:
     """Return the times of the parts, shape (n,); empty if there are no parts."""
     return leg.part_time if leg.parts else np.empty(0)
 
 
-def _energies(leg: Database, states: Indices) -> Samples:
+def _read_model_energies(leg: Database, states: Indices) -> Samples:
     """Return the internal energy of the whole model at some states, (states,), or an array (states, 0)."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 
 
-def _part_energies(leg: Database, states: Indices) -> Samples:
+def _read_part_energies(leg: Database, states: Indices) -> Samples:
     """Return the internal energies of the compared parts at some states, shape (states, parts)."""
     ids = [part.id for part in leg.parts][:_COMPARED]
     return leg.part_channel("internal_energy", ids)[states]
 
 
-def _shared(first: Samples, second: Samples) -> tuple[Indices, Indices] | None:
+def _find_shared_states(
+    first: Samples, second: Samples
+) -> tuple[Indices, Indices] | None:
     """Return the states at common times: all if both legs begin together, else only the start of the later leg."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
@@ -417,7 +432,7 @@ def _shared(first: Samples, second: Samples) -> tuple[Indices, Indices] | None:
     return in_first[begins], in_second[begins]
 
 
-def _alike(first: Samples, second: Samples) -> bool:
+def _is_same_energy(first: Samples, second: Samples) -> bool:
     """Return True if energies differ only as after a restart on other processors; NaN is not compared."""
     if first.shape != second.shape:
         return True

@@ -11,18 +11,24 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, if_written, listing
-from d2rpick.histories.database import check_sum, doubts
+from d2rpick.base.errors import FormatError, give_if_written, list_names
+from d2rpick.histories.database import check_energy_of_parts, note_doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
 from d2rpick.histories.meaning import (
     is_any_internal_energy,
     note_other_quantity,
     note_unused_energies,
 )
-from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, select_parts
-from d2rpick.histories.samples import median
+from d2rpick.histories.names import (
+    QUANTITIES,
+    Part,
+    Selection,
+    list_parts,
+    select_parts,
+)
+from d2rpick.histories.samples import compute_median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
-from d2rpick.histories.table_forces import forces_of
+from d2rpick.histories.table_forces import find_forces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -101,7 +107,7 @@ class Run:
         notes = [*self._notes]
         for database in self.databases:
             notes += database.notes
-        return tuple(dict.fromkeys([*notes, *doubts(self.databases)]))
+        return tuple(dict.fromkeys([*notes, *note_doubts(self.databases)]))
 
     def history(self, selection: Selection) -> History:
         """Return the history of the selected energy: of parts, of channels, or by default of the whole model.
@@ -125,7 +131,9 @@ class Run:
         for database in self.databases:
             if not database.named_by_people or not database.channels:
                 continue
-            chosen = if_written(partial(_selected_channels, database, selection))
+            chosen = give_if_written(
+                partial(_list_energy_channels, database, selection)
+            )
             if chosen is not None:
                 notes += note_unused_energies(
                     database.channels, {*chosen, *database.quantities.values()}
@@ -162,7 +170,7 @@ class Run:
         holder = self._with_parts()
         if holder is None:
             return None
-        values = if_written(
+        values = give_if_written(
             lambda: np.stack(
                 [self._of_holder(axis, holder.parts) for axis in _AXES], axis=2
             )
@@ -194,9 +202,11 @@ class Run:
     def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         """Return the masses of all parts, shape (parts,), as written or from momenta (n, parts, 3) and velocities."""
         with suppress(FormatError):
-            return _median_of_some(self._of_holder("mass", holder.parts))
+            return _compute_median_of_nonzero(self._of_holder("mass", holder.parts))
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
-        velocity = if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts))
+        velocity = give_if_written(
+            lambda: self._of_holder(_VELOCITIES[axis], holder.parts)
+        )
         momentum = momenta[:, :, axis]
         if velocity is None:
             return None
@@ -210,22 +220,24 @@ class Run:
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         """Return the masses of the parts; for an unknown one, the least with its momentum and kinetic energy."""
-        from d2rpick.histories.balance import least_masses
+        from d2rpick.histories.balance import compute_least_masses
 
         masses = self._masses(momenta, holder)
         if masses is None or not np.isnan(masses).any():
             return masses
-        kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
+        kinetic = give_if_written(lambda: self.part_kinetic_energies(holder.parts))
         if kinetic is None:
             return masses
-        return np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
+        return np.where(
+            np.isnan(masses), compute_least_masses(momenta, kinetic), masses
+        )
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of contacts and rigid walls, each from the first file that contains it."""
         forces_by_name: dict[str, ContactForce] = {}
         for database in self.databases:
-            for force in if_written(partial(forces_of, database)) or ():
+            for force in give_if_written(partial(find_forces, database)) or ():
                 forces_by_name.setdefault(force.name, force)
         for force in self._forces:
             forces_by_name.setdefault(force.name, force)
@@ -234,10 +246,10 @@ class Run:
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
         """Momentum of the whole model, or its velocity; None if neither is written."""
-        from d2rpick.histories.balance import momentum_of
+        from d2rpick.histories.balance import read_momentum
 
         for database in self.databases:
-            momentum = momentum_of(database) if database.channels else None
+            momentum = read_momentum(database) if database.channels else None
             if momentum:
                 return replace(momentum, surroundings=self.surroundings)
         return None
@@ -258,14 +270,14 @@ class Run:
     @cached_property
     def springs(self) -> tuple[Part, ...]:
         """Parts that are springs and dampers, as far as their energies show it."""
-        from d2rpick.histories.balance import springs_among
+        from d2rpick.histories.balance import find_springs
 
         parts = self.parts
         # None if the energies are not in every state
-        energies = if_written(lambda: self.part_energies(parts)) if parts else None
+        energies = give_if_written(lambda: self.part_energies(parts)) if parts else None
         if energies is None:
             return ()
-        return springs_among(self.databases, parts, energies, self.part_time)
+        return find_springs(self.databases, parts, energies, self.part_time)
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
         """Return internal energies of some parts, shape (n, parts), at the times of the parts [energy]."""
@@ -290,7 +302,7 @@ class Run:
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
         """Return the mean of the centres of some parts [length]; None if they are not written."""
-        components = if_written(
+        components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
         if components is None:
@@ -342,7 +354,7 @@ class Run:
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
-            check_sum(database, holder, energies)
+            check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
         if not energies[:, ~left_out].any():  # only springs have energy
             left_out[:] = False
@@ -354,31 +366,31 @@ class Run:
         notes: tuple[str, ...] = ()
         if idle:
             notes = (
-                f"without any internal energy: part {menu(idle)}; rigid, or without elements?",
+                f"without any internal energy: part {list_parts(idle)}; rigid, or without elements?",
             )
         all_names = [part.name for part in chosen]
         names = list(compress(all_names, ~left_out))
         names_left_out = list(compress(all_names, left_out))
         channel = "internal energy of " + ", ".join(names)
         if names_left_out:
-            notes = (*notes, _left_out(", ".join(names_left_out)))
+            notes = (*notes, _note_left_out_springs(", ".join(names_left_out)))
         energies = energies[:, ~left_out]
         history = self._history_of(
             holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen
         )
-        return _with_terms(
+        return _add_terms(
             replace(history, springs=tuple(compress(chosen, left_out))), names, energies
         )
 
     def _without_springs(self, database: Legs, channel: str) -> History:
         """Return the history of the whole model without the energy of springs and dampers, if it has other energy."""
-        from d2rpick.histories.balance import spring_energy
+        from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
-        springs = spring_energy(database)
+        springs = find_spring_energy(database)
         if springs is None:
             return whole
-        note = _left_out(f"all springs and dampers, {springs[0]},")
+        note = _note_left_out_springs(f"all springs and dampers, {springs[0]},")
         return replace(
             whole,
             energy=whole.energy - springs[1],
@@ -394,7 +406,7 @@ class Run:
             ]
             raise FormatError(
                 f"{self.name}: no internal energy; choose with `energy`: "
-                f"{listing(channels) or 'there are no channels'}"
+                f"{list_names(channels) or 'there are no channels'}"
             )
         sum_of_parts = self._of_parts(self.parts)
         note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
@@ -419,7 +431,7 @@ class Run:
         )
         if len(columns) == 1:
             return history
-        return _with_terms(history, names, np.stack(columns, axis=1))
+        return _add_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Return the database that has all these channels, and their names in it."""
@@ -483,26 +495,26 @@ class _Written(Given):
     @cached_property
     def balance(self) -> Balance | None:
         """Energies of the whole model."""
-        from d2rpick.histories.balance import terms_of
+        from d2rpick.histories.balance import read_terms
 
-        return terms_of(self._run.databases)
+        return read_terms(self._run.databases)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
         """Return internal energies of some parts; None if they are not written."""
-        values = if_written(lambda: self._run.part_energies(parts))
+        values = give_if_written(lambda: self._run.part_energies(parts))
         return None if values is None else Track(self._run.part_time, values)
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the kinetic energy of some parts together, or of the whole model; None if it is not written."""
         if parts is None:
             return super().kinetic_energy(parts)
-        values = if_written(lambda: self._run.part_kinetic_energies(parts))
+        values = give_if_written(lambda: self._run.part_kinetic_energies(parts))
         if values is None:
             return None
         return Track(self._run.part_time, values.sum(axis=1))
 
 
-def _selected_channels(database: Legs, selection: Selection) -> list[str]:
+def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
     """Return the channels used as energy, and those that could have been: all other internal energies."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
@@ -510,26 +522,26 @@ def _selected_channels(database: Legs, selection: Selection) -> list[str]:
     return [database.energy_channel] if database.energy_channel else []
 
 
-def _median_of_some(values: Samples) -> Samples:
+def _compute_median_of_nonzero(values: Samples) -> Samples:
     """Return the median of each column of values (n, k) over the states in which it is not 0.
 
     The mass of a rigid part is 0 in some states.
     """
     is_nonzero = values != 0
     if is_nonzero.all():
-        return median(values)
+        return compute_median(values)
     medians = []
     for column, states in zip(values.T, is_nonzero.T, strict=True):
-        medians.append(median(column[states]) if states.any() else 0.0)
+        medians.append(compute_median(column[states]) if states.any() else 0.0)
     return np.array(medians)
 
 
-def _left_out(springs: str) -> str:
+def _note_left_out_springs(springs: str) -> str:
     """Return the note on the energy of springs that is left out."""
     return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"
 
 
-def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:
+def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
     """Add the terms (n, k) of a summed energy that are not always zero; a single term is the energy itself."""
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:

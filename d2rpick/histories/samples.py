@@ -28,24 +28,24 @@ _STILL: Final = 8 * float(np.finfo(np.float64).eps)
 HALVINGS: Final = 50  # halvings of a bracket down to rounding
 
 
-def window(time: Samples, start: float, end: float) -> slice:
+def find_window(time: Samples, start: float, end: float) -> slice:
     """Return the slice of ascending times from ``start`` to ``end``, both included [time].
 
     Examples
     --------
-    >>> window(np.array([0.0, 1.0, 2.0, 3.0]), 1.0, 2.0)
+    >>> find_window(np.array([0.0, 1.0, 2.0, 3.0]), 1.0, 2.0)
     slice(1, 3, None)
     """
     first, last = np.searchsorted(time, [start, np.nextafter(end, np.inf)]).tolist()
     return slice(first, last)
 
 
-def integral(time: Samples, values: Samples) -> Samples:
+def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
     """Return the integral of values (n,) or (n, k) from the first time on, in their shape, by the trapezoidal rule.
 
     Examples
     --------
-    >>> integral(np.array([0.0, 1.0, 3.0]), np.array([0.0, 2.0, 2.0])).tolist()
+    >>> integrate_by_trapezia(np.array([0.0, 1.0, 3.0]), np.array([0.0, 2.0, 2.0])).tolist()
     [0.0, 1.0, 5.0]
     """
     areas = (values[1:] + values[:-1]).T
@@ -56,24 +56,24 @@ def integral(time: Samples, values: Samples) -> Samples:
     )
 
 
-def median(values: Samples) -> Samples:
+def compute_median(values: Samples) -> Samples:
     """Return the median of values (n,) or (n, k) over the first axis; the one of numpy imports masked arrays.
 
     Examples
     --------
-    >>> median(np.array([[3.0, 1.0], [1.0, 1.0], [2.0, 5.0], [4.0, 2.0]])).tolist()
+    >>> compute_median(np.array([[3.0, 1.0], [1.0, 1.0], [2.0, 5.0], [4.0, 2.0]])).tolist()
     [2.5, 1.5]
     """
     ends = [(len(values) - 1) // 2, len(values) // 2]
     return np.asarray(np.partition(values, ends, axis=0)[ends].sum(axis=0) / 2)
 
 
-def bent(time: Samples, values: Samples) -> Samples:
+def remove_line(time: Samples, values: Samples) -> Samples:
     """Return the residual of each column of values (n, k) after a linear fit.
 
     Examples
     --------
-    >>> bent(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
+    >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
     # the same as mean(), which is slow for few values
@@ -84,7 +84,7 @@ def bent(time: Samples, values: Samples) -> Samples:
     return np.asarray(centred)
 
 
-def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Return which states of a file are valid, and notes on the others.
 
     A state gives way to any later one at or before its time: of equal printed times the last one is valid, and after
@@ -104,7 +104,7 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
 
     Examples
     --------
-    >>> keep, notes = newest_states(np.array([0.0, 1.0, 2.0, 1.5, 2.5, 2.5]))
+    >>> keep, notes = find_newest_states(np.array([0.0, 1.0, 2.0, 1.5, 2.5, 2.5]))
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
@@ -147,9 +147,9 @@ def count_rows_per_time(time: Samples) -> int:
     return int(np.sort(rows)[rows.size // 2])
 
 
-def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
+def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     """Return times (n,) unchanged; raise FormatError, with the place of the state, if they are not those of one run."""
-    state = _not_a_restart(time)
+    state = _find_wrong_step_back(time)
     if state is None:
         return time
     problem = (
@@ -164,7 +164,7 @@ def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     )
 
 
-def _not_a_restart(time: Samples) -> int | None:
+def _find_wrong_step_back(time: Samples) -> int | None:
     """Return the first state at which times (n,) step back other than by a restart; None if there is none.
 
     One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
@@ -172,8 +172,9 @@ def _not_a_restart(time: Samples) -> int | None:
 
     Examples
     --------
-    >>> _not_a_restart(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5])), _not_a_restart(np.array([0.0, 1.0, 0.0, 1.0]))
-    (None, 2)
+    >>> _find_wrong_step_back(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5]))
+    >>> _find_wrong_step_back(np.array([0.0, 1.0, 0.0, 1.0]))
+    2
     """
     back = np.flatnonzero(time[1:] < time[:-1]) + 1
     if back.size == 0:
@@ -183,16 +184,16 @@ def _not_a_restart(time: Samples) -> int | None:
         return first
     before_restart, after_restart = (np.diff(leg) for leg in np.split(time, [first]))
     for steps in (after_restart, after_restart[:1]):
-        ratio = _median(steps) / _median(before_restart)
+        ratio = _compute_median_step(steps) / _compute_median_step(before_restart)
         if ratio < 1 / _ALIKE or ratio > _ALIKE:
             return first
     return None
 
 
-def _median(steps: Samples) -> float:
+def _compute_median_step(steps: Samples) -> float:
     """Return the median of the steps above 0 (equal printed times are no interval); NaN if there are none."""
     steps = steps[steps > 0]
-    return float(median(steps)) if steps.size else np.nan
+    return float(compute_median(steps)) if steps.size else np.nan
 
 
 def find_crossings(
@@ -220,7 +221,7 @@ def find_crossings(
     >>> find_crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 1.0, 2.0]), 1.0)
     (array([0.25]), array([ True]))
     """
-    side = _sides(energy, level)
+    side = _compare_sides(energy, level)
     off_level = np.flatnonzero(side)
     if not off_level.size:
         return np.zeros(0), np.zeros(0, dtype=bool)
@@ -255,23 +256,23 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     >>> find_turns(np.array([0.0, 4.0, 4.0, 2.0]))
     (array([1]), array([ True]))
     """
-    slope = _sides(energy[1:], energy[:-1])
+    slope = _compare_sides(energy[1:], energy[:-1])
     moving = np.flatnonzero(slope)
     turn = np.flatnonzero(np.diff(slope[moving]))
     return moving[turn] + 1, slope[moving[turn]] > 0
 
 
-def _sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
+def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
     """Return 1 where values (n,) are above the limits, -1 where they are below, else 0; one byte each saves memory."""
     return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
-def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
+def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
     """Return the slices of consecutive ``states`` (n,) that are True, if they have at least ``fewest`` states.
 
     Examples
     --------
-    >>> stretches(np.array([True, False, True, True]), 2)
+    >>> find_stretches(np.array([True, False, True, True]), 2)
     (slice(2, 4, None),)
     """
     edges = np.flatnonzero(
@@ -282,7 +283,7 @@ def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
     )
 
 
-def first_above(
+def find_first_above(
     values: Samples, start: NDArray[np.intp], limit: Samples
 ) -> NDArray[np.intp]:
     """Return the index of the first of values (n,) from each ``start`` on above its ``limit``, in their shape (m,).
@@ -291,7 +292,7 @@ def first_above(
 
     Examples
     --------
-    >>> first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
+    >>> find_first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
     # tops[i] is the largest of ``_TOGETHER**i`` values from each index on
@@ -313,19 +314,19 @@ def first_above(
     return first
 
 
-def union(*times: Samples) -> Samples:
+def merge_times(*times: Samples) -> Samples:
     """Return all times once, ascending; the function of numpy for this imports numpy.ma, which slows start-up.
 
     Examples
     --------
-    >>> union(np.array([1.0, 3.0]), np.array([[2.0, 3.0]])).tolist()
+    >>> merge_times(np.array([1.0, 3.0]), np.array([[2.0, 3.0]])).tolist()
     [1.0, 2.0, 3.0]
     """
     ascending = np.sort(np.concatenate([array.ravel() for array in times]))
     return np.asarray(ascending[np.diff(ascending, prepend=-np.inf) > 0])
 
 
-def outline(time: Samples, values: Samples, stretches: int) -> Samples:
+def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
     """Return times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
 
     Parameters
@@ -337,7 +338,7 @@ def outline(time: Samples, values: Samples, stretches: int) -> Samples:
 
     Examples
     --------
-    >>> outline(np.arange(8.0), np.array([0.0, 9.0, 0.0, 1.0, 2.0, -7.0, 1.0, 0.0]), 2).tolist()
+    >>> draw_outline(np.arange(8.0), np.array([0.0, 9.0, 0.0, 1.0, 2.0, -7.0, 1.0, 0.0]), 2).tolist()
     [[0.0, 1.0, 4.0, 5.0, 7.0], [0.0, 9.0, 2.0, -7.0, 0.0]]
     """
     if time.size <= 2 * stretches:
@@ -359,7 +360,7 @@ class Roots(NamedTuple):
     at: Samples
 
 
-def narrow(
+def narrow_brackets(
     inside: Callable[[Samples], Samples | NDArray[np.bool_]],
     within: Samples,
     beyond: Samples,
@@ -384,7 +385,7 @@ def narrow(
 
     Examples
     --------
-    >>> found = narrow(lambda t: 2 - t**2, np.array([0.0]), np.array([2.0]), slope=lambda t: -2 * t)
+    >>> found = narrow_brackets(lambda t: 2 - t**2, np.array([0.0]), np.array([2.0]), slope=lambda t: -2 * t)
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """

@@ -8,12 +8,12 @@ import stat
 import sys
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, listing
-from d2rpick.base.files import STDIN, FileState, bound, unpacked_beyond
+from d2rpick.base.errors import FormatError, list_names
+from d2rpick.base.files import STDIN, FileState, bound, describe_unpacked_excess
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.content import OnDisk, scattered, stored
+from d2rpick.histories.content import OnDisk, open_content, open_scattered
 from d2rpick.histories.formats import READERS
-from d2rpick.histories.names import in_seconds, near_miss, number_in_family
+from d2rpick.histories.names import number_in_family, parse_seconds, suggest_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,7 +70,7 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
     FormatError
         If a folder or glob has none, or a folder the T01 files of several runs.
     """
-    return tuple(dict.fromkeys(file for name in names for file in _files(name)))
+    return tuple(dict.fromkeys(file for name in names for file in _list_files(name)))
 
 
 def open_files(names: Sequence[str]) -> list[Source]:
@@ -82,18 +82,20 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _of_families(files)  # checked whenever they are read
-    states_before = {name: _state(name) for name in files if name not in families}
+    families = _open_families(files)  # checked whenever they are read
+    states_before = {
+        name: _look_at_state(name) for name in files if name not in families
+    }
     named_files = {*names}
     for name in names:
         if not _is_pattern(name):
-            named_files.update(_files(name))
+            named_files.update(_list_files(name))
     sources = []
     for name in files:
         source = families[name] if name in families else open_source(name)
         sources.append(source._replace(by_pattern=source.name not in named_files))
     for name, state in states_before.items():
-        now = _state(name)
+        now = _look_at_state(name)
         is_unchanged = now.continues(state) if now and state else now is state
         if len(files) > 1 and not is_unchanged:
             raise FormatError(
@@ -103,25 +105,25 @@ def open_files(names: Sequence[str]) -> list[Source]:
     return sources
 
 
-def _of_families(names: Sequence[str]) -> dict[str, Source]:
+def _open_families(names: Sequence[str]) -> dict[str, Source]:
     """Open the files of families by name, of which little is read."""
     family = re.compile(_FAMILY)
     in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
     try:
         sources = {
             name: Source(name, data)
-            for name, data in zip(in_families, scattered(in_families), strict=True)
+            for name, data in zip(in_families, open_scattered(in_families), strict=True)
         }
     except OSError as error:
-        raise _unread(error.filename, error) from None
+        raise _report_unread(error.filename, error) from None
     for name, source in sources.items():
         # a later file may be empty: a solver opens it before it writes a state
         if not source.data and not name[-1].isdigit():
-            raise _empty(name)
+            raise _report_empty(name)
     return sources
 
 
-def _state(name: str) -> FileState | None:
+def _look_at_state(name: str) -> FileState | None:
     """Return the state of a regular file; None for anything else."""
     try:
         status = os.stat(name)  # noqa: PTH116  start-up
@@ -141,22 +143,22 @@ def open_source(name: str) -> Source:
         If there is nothing to read under this name.
     """
     data = _read_stdin() if name == STDIN else _read_file(name)
-    source = _unpacked(name, data) if data[:2] == _GZIP else Source(name, data)
+    source = _unpack(name, data) if data[:2] == _GZIP else Source(name, data)
     if not source.data:
-        raise _empty(name)
+        raise _report_empty(name)
     return source
 
 
-def _empty(name: str) -> FormatError:
+def _report_empty(name: str) -> FormatError:
     """Return the error for an empty file."""
     return FormatError(f"{name}: the file is empty; has the run been started?")
 
 
-def _files(name: str) -> Sequence[str]:
+def _list_files(name: str) -> Sequence[str]:
     """Return the files of a name: a file with the later files of its family, or those of a folder or pattern."""
     # os.path instead of pathlib, for start-up
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113
-        return [name, *_behind(name)]
+        return [name, *_list_later_files(name)]
     from pathlib import Path
 
     path = Path(name)
@@ -165,7 +167,7 @@ def _files(name: str) -> Sequence[str]:
     except OSError:  # a name too long is reported when it is opened
         return [name]
     if is_folder:
-        return _databases(path)
+        return _list_databases(path)
     if _is_pattern(name):
         pattern = name.removeprefix(path.anchor)
         matches = Path(path.anchor).glob(pattern)
@@ -181,7 +183,7 @@ def _is_pattern(name: str) -> bool:
     return any(sign in name for sign in "*?[")
 
 
-def _behind(name: str) -> Sequence[str]:
+def _list_later_files(name: str) -> Sequence[str]:
     """Return the later files of a family in their order: the name of its first file stands for all."""
     folder, first = os.path.split(name)
     match = re.fullmatch(_FAMILY, first)
@@ -200,12 +202,12 @@ def _behind(name: str) -> Sequence[str]:
     return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118
 
 
-def _databases(folder: Path) -> list[str]:
+def _list_databases(folder: Path) -> list[str]:
     """Return the databases of solvers in a folder; raise FormatError unless they belong to one run."""
-    runs_of_files = {file: _run_of(file) for file in sorted(folder.iterdir())}
+    runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
     databases = {file: run for file, run in runs_of_files.items() if run}
     if not databases:
-        inner = any(map(_run_of, folder.glob("*/*")))
+        inner = any(map(_find_run, folder.glob("*/*")))
         cure = "give the file"
         if inner:
             cure = f"its folders are runs: give one, or all to study as '{folder}/*'"
@@ -214,12 +216,12 @@ def _databases(folder: Path) -> list[str]:
         )
     runs = sorted({*databases.values()})
     if len(runs) > 1:
-        problem = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
+        problem = f"{folder}: this folder holds several runs ({list_names(runs, most=5)}), one was expected"
         raise FormatError(f"{problem}; name the files of one")
     return [str(file) for file in databases]
 
 
-def _run_of(file: Path) -> str:
+def _find_run(file: Path) -> str:
     """Return the run to which a file belongs by the name of a solver's database; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
@@ -249,16 +251,16 @@ def _read_stdin() -> bytes:
 def _read_file(name: str) -> bytes | OnDisk:
     """Return the content of a file; raise FormatError if it cannot be read."""
     try:
-        return stored(name)
+        return open_content(name)
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
-        raise _unread(name, error) from None
+        raise _report_unread(name, error) from None
 
 
-def _unread(name: str, error: OSError | ValueError) -> FormatError:
+def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
     """Return the error for a file that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return FormatError(
-            f"{name}: no such file{_meant(name)}; check the name and the folder"
+            f"{name}: no such file{_suggest_file(name)}; check the name and the folder"
         )
     reason = getattr(error, "strerror", None) or error
     return FormatError(
@@ -266,9 +268,9 @@ def _unread(name: str, error: OSError | ValueError) -> FormatError:
     )
 
 
-def _meant(name: str) -> str:
+def _suggest_file(name: str) -> str:
     """Return a question for a similar file name in the folder, or a hint if the name is a time; empty if neither."""
-    seconds = in_seconds(name)
+    seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
         return (
@@ -279,10 +281,10 @@ def _meant(name: str) -> str:
         siblings = os.listdir(folder or ".")  # noqa: PTH208  start-up
     except OSError:
         return ""
-    return near_miss(wanted, siblings, _LIKENESS)
+    return suggest_name(wanted, siblings, _LIKENESS)
 
 
-def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
+def _unpack(name: str, packed: bytes | OnDisk) -> Source:
     """Unpack gzip data, as far as they are whole, within the bounds of memory."""
     import zlib
 
@@ -290,8 +292,8 @@ def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
     try:
         if len(data) * bound("RATIO") > bound("UNPACKED"):
             # check the size before memory is used for the data
-            _pieces(name, data, keep=False)
-        pieces, cut = _pieces(name, data)
+            _unpack_pieces(name, data, keep=False)
+        pieces, cut = _unpack_pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
     except zlib.error as error:
         raise FormatError(
@@ -303,7 +305,9 @@ def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
         ) from None
 
 
-def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes], bool]:
+def _unpack_pieces(
+    name: str, packed: bytes, *, keep: bool = True
+) -> tuple[list[bytes], bool]:
     """Unpack gzip files that follow each other; return their pieces, and True if the last file is cut."""
     import zlib
 
@@ -321,33 +325,33 @@ def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes]
             if keep:
                 pieces.append(piece)
             size += len(piece)
-            if too_much := unpacked_beyond(end, size):
+            if too_much := describe_unpacked_excess(end, size):
                 raise FormatError(f"{name}: its packed data become {too_much}")
             unread = unpacker.unused_data
     return pieces, not unpacker.eof
 
 
-def later_legs(names: Sequence[str]) -> list[str]:
+def find_later_legs(names: Sequence[str]) -> list[str]:
     """Return the files in the folders of these files with the same name and a higher number that were not named."""
     from pathlib import Path  # imported here for start-up
 
     legs: list[str] = []
     for name in names:
         path = Path(name)
-        stem, number = _split(path.name)
+        stem, number = _split_leg_number(path.name)
         try:
             siblings = sorted(path.parent.iterdir())
         except OSError:
             continue
         for sibling in siblings:
-            sibling_stem, sibling_number = _split(sibling.name)
+            sibling_stem, sibling_number = _split_leg_number(sibling.name)
             if sibling_stem == stem and sibling_number > number:
                 legs.append(str(sibling))
     given = {str(Path(name)) for name in names}
     return [leg for leg in dict.fromkeys(legs) if leg not in given]
 
 
-def _split(name: str) -> tuple[str, int]:
+def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of the leg, 0 without a number."""
     match = _NUMBERED.fullmatch(name)
     assert match is not None  # it matches any text

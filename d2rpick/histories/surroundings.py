@@ -37,19 +37,19 @@ class Surroundings:
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
         """Return the possible accelerations of some parts together, or of the model; None if they are unknown."""
-        accelerations = {self.gravity.get(number) for number in _numbers(parts)}
+        accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 
     def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
         """Return the supports of some parts, or of the model."""
         supports: list[Support] = []
-        for number in _numbers(parts):
+        for number in _list_ids(parts):
             supports += self.supports.get(number, ())
         return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
         """Return a sentence on what holds some of these parts, or the model, at a time; None if nothing does."""
-        for number in _numbers(parts):
+        for number in _list_ids(parts):
             for support in self.supports.get(number, ()):
                 if support.start <= time <= support.end:
                     subject = "the model" if number is None else f"part {number}"
@@ -76,6 +76,6 @@ class Surroundings:
 UNKNOWN = Surroundings()
 
 
-def _numbers(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
+def _list_ids(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
     """Return the ids of some parts; None stands for the model."""
     return (None,) if parts is None else tuple(part.id for part in parts)

@@ -21,7 +21,7 @@ _OF_CONTACT: Final = rf"(?i){_TOUCHING}.*forc|forc.*{_TOUCHING}|rcforc|rwforc|(?
 _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
-def forces_of(database: Legs) -> tuple[ContactForce, ...]:
+def find_forces(database: Legs) -> tuple[ContactForce, ...]:
     """Return the forces of a database; in a table each column whose name says contact force is one."""
     if READERS[database.format].solver:
         return database.contact_forces

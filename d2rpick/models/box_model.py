@@ -140,15 +140,15 @@ class Structure(NamedTuple):
     toes: Ends
 
 
-def build(parameters: Parameters) -> Structure:
+def build_structure(parameters: Parameters) -> Structure:
     """Return the box and step on the tilted floor of the sled, with the lower end of the step at the curb (the origin).
 
     For a drop they are moved vertically to their height above the ground.
     """
     p = parameters
-    ring = _ring(p.mesh)
-    outer = _scaled(ring, p.width, p.height)
-    inner = _scaled(ring, p.width - 2 * p.wall, p.height - 2 * p.wall)
+    ring = _make_ring(p.mesh)
+    outer = _scale_ring(ring, p.width, p.height)
+    inner = _scale_ring(ring, p.width - 2 * p.wall, p.height - 2 * p.wall)
     cells = ring.size
     top = p.mesh // 4
     toes = outer[[0, top]] + p.wall
@@ -157,7 +157,9 @@ def build(parameters: Parameters) -> Structure:
     if p.drop is not None:
         positions += 1j * (p.drop - p.ground - positions.imag.min())
     of_box = 2 * cells
-    walls = Truss.between(positions, _walls(cells), p.stiffness, p.yield_strain)
+    walls = Truss.between(
+        positions, _list_bars_of_box(cells), p.stiffness, p.yield_strain
+    )
     walls.strength[_BARS * p.mesh : _BARS * 2 * p.mesh] *= p.roof_strength
     toe_points = of_box + np.arange(toes.size)
     return Structure(
@@ -168,14 +170,17 @@ def build(parameters: Parameters) -> Structure:
         of_box=of_box,
         box=walls,
         step=Truss.between(
-            positions, _step(cells, top), p.step_stiffness, p.step_yield_strain
+            positions,
+            _list_bars_of_step(cells, top),
+            p.step_stiffness,
+            p.step_yield_strain,
         ),
         skin=np.concatenate([np.arange(cells), toe_points]),
         toes=toe_points,
     )
 
 
-def _ring(mesh: int) -> Plane:
+def _make_ring(mesh: int) -> Plane:
     """Return points around a square of side 1 about the origin, beginning at its lower leading corner and going up."""
     side = np.arange(mesh) / mesh - 0.5
     return np.concatenate(
@@ -183,12 +188,12 @@ def _ring(mesh: int) -> Plane:
     )
 
 
-def _scaled(ring: Plane, width: float, height: float) -> Plane:
+def _scale_ring(ring: Plane, width: float, height: float) -> Plane:
     """Return the points of a ring with this width and height [m]."""
     return ring.real * width + 1j * ring.imag * height
 
 
-def _walls(cells: int) -> list[tuple[int, int]]:
+def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
     """Return the bars of the box: along both rings, across, and both diagonals of every cell."""
     ends = []
     for cell in range(cells):
@@ -202,7 +207,7 @@ def _walls(cells: int) -> list[tuple[int, int]]:
     return ends
 
 
-def _step(cells: int, top: int) -> list[tuple[int, int]]:
+def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
     """Return the bars of the step: between its two points, from both to the skin next to them and to points inside."""
     low = 2 * cells
     high = 2 * cells + 1
@@ -275,7 +280,7 @@ class Bars:
         )
 
 
-def stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:
+def compute_stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:
     """Return an upper bound of the angular frequencies of the model [1/s].
 
     A bar of stiffness k between points whose masses are divided among their bars in proportion to the stiffness has

@@ -22,8 +22,8 @@ from d2rpick.models.box_model import (
     Plane,
     Structure,
     Values,
-    build,
-    stiffest_rate,
+    build_structure,
+    compute_stiffest_rate,
 )
 
 # Stiffness of floor and curb at one point [N/m]: softer than the box, so that contact does not determine the time step;
@@ -267,10 +267,10 @@ class Motion:
     """
 
     def __init__(self, parameters: Parameters, interval: float) -> None:
-        s = self.structure = build(parameters)
+        s = self.structure = build_structure(parameters)
         touching = np.zeros(s.places.size)
         touching[s.skin] = max(STIFFNESS, parameters.ground_stiffness)
-        rate = stiffest_rate(s.masses, s.box, s.step, extra=touching)
+        rate = compute_stiffest_rate(s.masses, s.box, s.step, extra=touching)
         limit = 2 / rate
         if not (limit > 0 and np.isfinite(interval / limit)):
             problem = f"an output interval of {interval:g} s holds no number of steps at a rate of {rate:g} 1/s"

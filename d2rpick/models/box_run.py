@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.base.workers import cores, on_cores
+from d2rpick.base.workers import choose_farm, count_cores
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.models.box_motion import Motion
@@ -115,7 +115,7 @@ class Recorder:
         self._motion, self._began, self._updates = (
             motion,
             perf_counter(),
-            _updates(motion),
+            _count_updates(motion),
         )
         s = motion.structure
         states = last // motion.every - -(-motion.count // motion.every) + 1
@@ -208,7 +208,7 @@ class Recorder:
             released=motion.contact.released,
             landings=tuple(motion.contact.landings),
             dt=motion.dt,
-            bar_updates=_updates(motion) - self._updates,
+            bar_updates=_count_updates(motion) - self._updates,
             seconds=perf_counter() - self._began,
         )
 
@@ -220,7 +220,7 @@ class Recorder:
         )
 
 
-def _updates(motion: Motion) -> int:
+def _count_updates(motion: Motion) -> int:
     """Return how many bar forces were computed so far."""
     return motion.box.evaluations + motion.step.evaluations
 
@@ -268,10 +268,10 @@ def simulate(
             raise RangeError(
                 f"the window from tr {following.tr:g} begins before the one up to td {window.td:g} is over"
             )
-    return proceed(motion, t_end, *windows)
+    return continue_motion(motion, t_end, *windows)
 
 
-def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
+def continue_motion(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
     """Continue ``motion`` to ``t_end`` [s], switching at the first time step at or after the times of ``windows``.
 
     Raises RangeError if its numbers become infinite.
@@ -302,7 +302,7 @@ def run_to(motion: Motion, time: float) -> None:
         motion.move()
 
 
-def history_of(record: Record) -> History:
+def make_history(record: Record) -> History:
     """Return the history of the energy of the box, with the momenta of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
     momentum = np.stack(
@@ -356,7 +356,7 @@ def scan_times(released: float, td: float) -> list[float]:
     ]
 
 
-def comparison_end(reference: Record, td: float) -> float:
+def find_comparison_end(reference: Record, td: float) -> float:
     """Return when the comparison after ``td`` ends [s]: at the landing or with the record; RangeError from then on."""
     end = float(reference.time[-1]) if reference.landed is None else reference.landed
     if not td < end:
@@ -376,24 +376,28 @@ def scan(
     All runs are the reference until their tr, so that part is computed once; then ``jobs`` processes share the runs
     (None: one for each core; 1: this one).
     """
-    end = comparison_end(reference, td)
+    end = find_comparison_end(reference, td)
     ready: dict[int, Record] = {}
     ordered = sorted(times)
     following = 0
-    with on_cores(jobs or cores(), "d2rpick.models.box_run") as farm:
+    with choose_farm(jobs or count_cores(), "d2rpick.models.box_run") as farm:
         for answer in farm.answers(
-            _switched,
-            _branches(Motion(parameters, _interval(reference)), ordered, td, end),
+            _compute_switched_run,
+            _make_branches(
+                Motion(parameters, _find_interval(reference)), ordered, td, end
+            ),
         ):
             if answer.error:
                 raise answer.error
             ready[answer.number] = answer.result
             while following in ready:
-                yield compare(reference, ready.pop(following), ordered[following], td)
+                yield compare_runs(
+                    reference, ready.pop(following), ordered[following], td
+                )
                 following += 1
 
 
-def _branches(
+def _make_branches(
     motion: Motion, times: Iterable[float], td: float, end: float
 ) -> Iterator[tuple[Motion, float, RigidWindow]]:
     """Yield, for each tr, a copy of the reference run advanced to it, the end of the run, and its window."""
@@ -402,16 +406,16 @@ def _branches(
         yield motion.copy(), end, RigidWindow(tr, td)
 
 
-def _switched(branch: tuple[Motion, float, RigidWindow]) -> Record:
+def _compute_switched_run(branch: tuple[Motion, float, RigidWindow]) -> Record:
     """Compute the switched run of a branch."""
-    return proceed(*branch)
+    return continue_motion(*branch)
 
 
-def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
+def compare_runs(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
     """Compare a switched run, which may begin at tr, with the reference run at td and from td to the landing."""
-    interval = _interval(reference)
+    interval = _find_interval(reference)
     at = round(td / interval)
-    end = round(comparison_end(reference, td) / interval)
+    end = round(find_comparison_end(reference, td) / interval)
     begin = round(float(switched.time[0]) / interval)
     after_td = slice(at, end)
     after_td_switched = slice(at - begin, end - begin)
@@ -432,6 +436,6 @@ def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcom
     )
 
 
-def _interval(record: Record) -> float:
+def _find_interval(record: Record) -> float:
     """Return the output interval of a record [s]."""
     return float(record.time[1] - record.time[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.cost import MEASURED, weights_as_toml
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
@@ -90,7 +90,7 @@ def _rows(found: Calibration) -> list[list[tables.Cell]]:
 
 def _legs(found: Calibration) -> list[list[tables.Cell]]:
     return [
-        [printable(one.name), f"{one.total:.4g} us", None if one.elements is None else f"{one.elements:.4g} us",
+        [make_printable(one.name), f"{one.total:.4g} us", None if one.elements is None else f"{one.elements:.4g} us",
          f"{one.rigid_nodes:.0f}"]
         for one in found.legs
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.histories.samples import outline
+from d2rpick.histories.samples import draw_outline
 from d2rpick.report.page import Explorer, Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable, mean_energy
 from d2rpick.report.tables import filled, measure, shell_line, short, shown
@@ -113,9 +113,9 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     seen = view_of(situation, found.offers[-1].td)
     levels = [one.energy_td for one in found.offers]
     scale = scale_in(situation, seen, levels)
-    whole = outline(history.time, history.energy, _OVERVIEW)
+    whole = draw_outline(history.time, history.energy, _OVERVIEW)
     inner = history.between(seen.start, seen.end)
-    time, energy = outline(*inner, stretches=_STRETCHES)
+    time, energy = draw_outline(*inner, stretches=_STRETCHES)
     unit = history.time_unit
     above = [
         f"the {what}, up to {energy:.4g}"

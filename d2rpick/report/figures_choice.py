@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
-from d2rpick.histories.samples import outline
+from d2rpick.histories.samples import draw_outline
 from d2rpick.report import figures
 from d2rpick.report.figures import (
     BETTER,
@@ -128,7 +128,7 @@ def _draw_energy(
         situation.flight,
         situation.evidence.span,
     )
-    drawn = outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
+    drawn = draw_outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
     if flight.start is not None:
         known = (
             span.end if span else situation.td
@@ -249,7 +249,7 @@ def draw_parts(found: Parts) -> Figure:
     energies, time = run.part_energies(run.parts), run.part_time
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     for at in energies.max(axis=0).argsort()[::-1][:_MOST_PARTS]:
-        curve = outline(time, energies[:, at], stretches=STRETCHES)
+        curve = draw_outline(time, energies[:, at], stretches=STRETCHES)
         axes.plot(*curve, linewidth=1, label=plain(run.parts[at].name))
     for flight in found.facts.flights:
         shade(axes, flight, "flight")
@@ -280,7 +280,9 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     energy, error, rigid = panels
     history = found.situation.history
     inner = history.between(*found.td_window)
-    energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
+    energy.plot(
+        *draw_outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1
+    )
     energy.set(ylabel="internal energy")
     by_energy = bool(found.offers) and all(
         one.basis == "energy" for one in found.offers

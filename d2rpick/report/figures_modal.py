@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.histories.samples import outline
+from d2rpick.histories.samples import draw_outline
 from d2rpick.report.figures import REFERENCE, STRETCHES, SWITCHED
 from d2rpick.vibration.measures import residual
 from d2rpick.vibration.model import NOTHING_KEPT
@@ -35,7 +35,7 @@ def draw_residuals(axes: Axes, situation: Situation) -> None:
         residual(profile.error[shown], situation.kinetic_share or 0.0)
     )
     axes.plot(
-        *outline(profile.time[shown], residuals, stretches=STRETCHES),
+        *draw_outline(profile.time[shown], residuals, stretches=STRETCHES),
         color=REFERENCE,
         linewidth=1,
         label="_",

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base import __version__
-from d2rpick.base.errors import Caution, name_units, printable
+from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules
-from d2rpick.rules.base import Finding, Severity, Unreadable, grouped
+from d2rpick.rules.base import Finding, Severity, Unreadable, group_values
 from d2rpick.rules.rule import MAIN_DECK, Example, Rule
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def as_table(checks: Checks, _: Shown) -> str:
             lines.append("  switching cards that switch nothing")
         lines += [f"  {line}" for line in _window_lines(result.windows, checks.root)]
         lines += [f"  {_line(one)}" for one in _findings(checks, result)]
-    return "\n".join([*map(printable, lines), "", _last_line(checks)])
+    return "\n".join([*map(make_printable, lines), "", _last_line(checks)])
 
 
 def as_ndjson(checks: Checks, shown: Shown) -> str:
@@ -233,7 +233,7 @@ def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
         ((window.cards, window.unit.kind, window.tr, window.td), window)
         for window in windows
     )
-    for group in grouped(alike).values():
+    for group in group_values(alike).values():
         first = group[0]
         until = "the end" if first.td is None else f"{first.td:g}"
         names = name_units((window.unit.id for window in group), first.unit.kind)
@@ -329,12 +329,12 @@ def _places(shown: str, **more: Any) -> list[dict[str, Any]]:
 def _escaped(text: str, more: str = "") -> str:
     for letter in "%\r\n" + more:
         text = text.replace(letter, f"%{ord(letter):02X}")
-    return printable(text)
+    return make_printable(text)
 
 
 def _xml(text: str) -> str:
     """Return the text in characters that XML 1.0 can write and a terminal shows."""
-    return re.sub(_NOT_XML, "?", printable(text))
+    return re.sub(_NOT_XML, "?", make_printable(text))
 
 
 def as_list() -> str:

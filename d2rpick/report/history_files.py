@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, cast
 
-from d2rpick.base.errors import FormatError, printable
+from d2rpick.base.errors import FormatError, make_printable
 from d2rpick.histories.formats import glstat, matsum
-from d2rpick.histories.opening import reader
+from d2rpick.histories.opening import load_reader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -42,14 +42,14 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
     asked = _SUFFIXES.get(path.suffix[1:], by_name)
     if asked not in formats:
         raise FormatError(
-            f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}"
+            f"{make_printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}"
         )
     return str(asked)
 
 
 def write_table(form: str, columns: Table) -> bytes:
     """Write columns (n,) in one of the formats of `TABLES`."""
-    return cast("bytes", reader(form).write(columns))  # type: ignore[attr-defined]
+    return cast("bytes", load_reader(form).write(columns))  # type: ignore[attr-defined]
 
 
 def _oscillator_table(motion: Trajectory) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import listing, printable
+from d2rpick.base.errors import list_names, make_printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import head, measures_of, spoken
@@ -96,7 +96,9 @@ def as_table(overview: Overview, shown: Shown) -> str:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
     if overview.health and (health := _health(overview)):
         lines += ["", tables.as_text(head(overview.health), health, shown.width)]
-    return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
+    return "\n".join(
+        [*lines, *(f"note: {make_printable(note)}" for note in overview.notes)]
+    )
 
 
 def as_markdown(overview: Overview, _: Shown) -> str:
@@ -188,7 +190,7 @@ def _parts(overview: Overview) -> list[list[tables.Cell]]:
 def _force(force: ForceOverview) -> str:
     """Name a contact and the times in which it acts."""
     times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
-    when = f"acts from {listing(times, most=_MOST_TIMES)}" if times else "never acts"
+    when = f"acts from {list_names(times, most=_MOST_TIMES)}" if times else "never acts"
     return f"{force.name} {when}"
 
 

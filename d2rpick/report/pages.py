@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import if_written
+from d2rpick.base.errors import give_if_written
 from d2rpick.choice.study import Study, runs_of
 from d2rpick.report import (
     drive,
@@ -495,7 +495,7 @@ def sentence(kind: str, answer: Any) -> str:
 def of_run(run: Run) -> str:
     """Say what a run is in short: files, format, states, times, parts, as far as its files can be read."""
     first = run.databases[0]
-    time = if_written(lambda: first.time if first.channels else first.part_time)
+    time = give_if_written(lambda: first.time if first.channels else first.part_time)
     told = [" + ".join(one.format for one in run.databases)]
     if time is not None and time.size:
         told += [

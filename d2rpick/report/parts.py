@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import in_rows, listing, printable
+from d2rpick.base.errors import format_ranges, list_names, make_printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -275,7 +275,7 @@ def heading(found: Parts) -> list[tuple[str, str]]:
                 f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}",
             )
         )
-    return [(name, printable(text)) for name, text in lines]
+    return [(name, make_printable(text)) for name, text in lines]
 
 
 def table(
@@ -373,7 +373,7 @@ def _sharing(row: PartRow) -> str | None:
     return (
         None
         if row.shares_nodes is None
-        else listing(row.shares_nodes, most=_MOST_SHOWN, between=",")
+        else list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
     )
 
 
@@ -385,7 +385,7 @@ def ranges(ids: Sequence[int]) -> str:
     >>> ranges([1, 2, 3, 5, 6, 12])
     '1-3,5,6,12'
     """
-    return ",".join(in_rows(ids))
+    return ",".join(format_ranges(ids))
 
 
 def _short(value: float | None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -103,7 +103,9 @@ def as_table(plan: Plan, shown: Shown) -> str:
         if plan.flights
         else "no flight"
     )
-    told = [(name, printable(text)) for name, text in (*outlook(plan), *reasons(plan))]
+    told = [
+        (name, make_printable(text)) for name, text in (*outlook(plan), *reasons(plan))
+    ]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
     return "\n".join(
         [sentence(plan), "", *above, "", rows, "", *tables.in_line(told, 9)]

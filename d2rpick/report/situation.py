@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.base.errors import listing, printable
+from d2rpick.base.errors import list_names, make_printable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice import health as limits
 from d2rpick.flight.flight import MOST_WORK
@@ -25,7 +25,7 @@ def what_was_read(history: History) -> str:
     unit = f" {history.time_unit}" if history.time_unit else ""
     what = f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
-    return printable(f"{what}, {history.time.size} states, {span}")
+    return make_printable(f"{what}, {history.time.size} states, {span}")
 
 
 def energy_name(history: History) -> str:
@@ -34,7 +34,7 @@ def energy_name(history: History) -> str:
     return (
         history.channel
         if len(parts) <= _NAMED
-        else f"internal energy of {listing(parts, most=_NAMED)}"
+        else f"internal energy of {list_names(parts, most=_NAMED)}"
     )
 
 
@@ -62,11 +62,11 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
         parts = [
             part.name if part.title else str(part.id) for part in flight.parts or ()
         ]
-        who = f" of {listing(parts, most=_NAMED)}" if parts else ""
+        who = f" of {list_names(parts, most=_NAMED)}" if parts else ""
         lines.append(
             ("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
         )
-    return [(name, printable(text)) for name, text in lines]
+    return [(name, make_printable(text)) for name, text in lines]
 
 
 def spoken(source: str | None) -> str:

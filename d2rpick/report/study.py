@@ -6,7 +6,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.study import Study, StudyRow, cut_runs, runs_of
-from d2rpick.histories.digits import window_as_read
+from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -187,7 +187,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     if common.tr is not None and common.window:
         known = [error for error in common.errors if error is not None]
         shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
-        shared += f"so is every tr from {window_as_read(*common.window)}; "
+        shared += f"so is every tr from {format_window(*common.window)}; "
         shared += (
             f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
         )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.choice.candidates import MUCH_HIGHER, Candidate
-from d2rpick.histories.digits import window_as_read
+from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import heading
@@ -278,12 +278,12 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
     share = sum(one.share for one in windows)
     if len(windows) == 1:
-        return f"every tr from {window_as_read(*windows[0][:2])}, {share:.0%} of the flight up to td"
+        return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
     named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[
         :_NAMED
     ]
     shown = [
-        f"{window_as_read(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
+        f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
         for w in named
     ]
     more = (

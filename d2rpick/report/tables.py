@@ -6,7 +6,7 @@ import re
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import UNSEEN, printable
+from d2rpick.base.errors import UNSEEN, make_printable
 from d2rpick.report.formats import WIDEST
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def short(value: Cell) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else printable(str(value))
+    return f"{value:.6g}" if isinstance(value, float) else make_printable(str(value))
 
 
 def measure(value: float | None) -> str:
@@ -293,7 +293,9 @@ def in_markdown(text: str) -> str:
     a\|b C:\\run \<i>part_1\</i>
     """
     return re.sub(
-        r"[\\|<*\[~]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", printable(text)
+        r"[\\|<*\[~]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])",
+        r"\\\g<0>",
+        make_printable(text),
     )
 
 
@@ -324,7 +326,7 @@ def _exact(value: Cell) -> Cell:
         return str(value).lower()
     if not isinstance(value, str):
         return value
-    return re.sub(_FORMULA, r"\g<0>'", printable(value))
+    return re.sub(_FORMULA, r"\g<0>'", make_printable(value))
 
 
 def as_json(result: Any, indent: int | None = 2) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
@@ -72,7 +72,7 @@ def as_table(found: TradeOff, shown: Shown) -> str:
     left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
-    return "\n".join([*lines, "", printable(answer(found))])
+    return "\n".join([*lines, "", make_printable(answer(found))])
 
 
 def as_markdown(found: TradeOff, shown: Shown) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, maybe, row
 from d2rpick.report.situation import heading
@@ -62,7 +62,7 @@ def as_table(answer: Verdict, shown: Shown) -> str:
         for name, value in MEASURES.plain(answer).items()
         if value is not None
     )
-    reasons = [f"  {printable(reason)}" for reason in answer.reasons]
+    reasons = [f"  {make_printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     graded = (
@@ -148,10 +148,10 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     return [
-        f"switched run  {printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
+        f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
         *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
-        *(f"note: {printable(note)}" for note in switched.notes),
+        *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator import Replay, State, from_mode
+from d2rpick.vibration.oscillator import Replay, State, make_from_mode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -194,7 +194,7 @@ def replayed_motion(
         return None
     if time is None:
         time = np.linspace(span.start, max(span.end, td), _POINTS)
-    oscillator, start = from_mode(mode, span.start)
+    oscillator, start = make_from_mode(mode, span.start)
     replay = Replay(oscillator, start, span.start, tr, td)
 
     def deformation(state: State) -> Samples:
@@ -230,7 +230,7 @@ def response(situation: Situation) -> Response | None:
     if not (isinstance(mode, Mode) and span):
         return None
     time = np.linspace(span.start, max(span.end, td), _POINTS)
-    oscillator, _ = from_mode(mode, span.start)
+    oscillator, _ = make_from_mode(mode, span.start)
     unit = oscillator.free(State.of(-0.5, 0.5, 0.0, 0.0), time - span.start)
     return Response(
         time,

@@ -12,9 +12,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown, toml_text
+from d2rpick.base.settings import (
+    RULE_KEYS,
+    find_nearest_settings,
+    format_toml_value,
+    refuse_unknown,
+)
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.radioss_files import HEAD, recognises
+from d2rpick.deck.radioss_files import HEAD, is_radioss
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
@@ -24,8 +29,8 @@ from d2rpick.rules.rule import Rule
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.deck.card import Field
-    from d2rpick.deck.switching import SwitchSet, Unit, Window
+    from d2rpick.deck.card import CardField
+    from d2rpick.deck.switching import SwitchSet, SwitchWindow, Unit
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
@@ -69,7 +74,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
         rule for rule in RULES.values() if name and rule.id.startswith(name.upper())
     )
     if not matching:
-        raise ConfigurationError(f"no rule {name!r}, {_expected_instead(name, RULES)}")
+        raise ConfigurationError(f"no rule {name!r}, {_describe_expected(name, RULES)}")
     return matching
 
 
@@ -109,16 +114,16 @@ class Configuration(NamedTuple):
             ):
                 continue
             raise ConfigurationError(
-                f"{where}no rule {name!r}, {_expected_instead(name, rule_ids)}"
+                f"{where}no rule {name!r}, {_describe_expected(name, rule_ids)}"
             )
 
 
-def _expected_instead(name: str, rule_ids: Collection[str]) -> str:
+def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
     """Return the part of an error message that says which rule ids exist, and a similar one if there is one."""
     import difflib
 
     wanted = name.upper()
-    near = [rule for rule in sorted(rule_ids) if _signs_apart(rule, wanted) == 1]
+    near = [rule for rule in sorted(rule_ids) if _count_differences(rule, wanted) == 1]
     near = near or difflib.get_close_matches(wanted, rule_ids, n=1, cutoff=_ALIKE)
     text = "an id like D2R101 or its beginning was expected"
     if near:
@@ -126,7 +131,7 @@ def _expected_instead(name: str, rule_ids: Collection[str]) -> str:
     return text
 
 
-def _signs_apart(first: str, second: str) -> int:
+def _count_differences(first: str, second: str) -> int:
     """Return the number of characters in which two texts of the same length differ; the longer length for other
     texts.
     """
@@ -155,30 +160,32 @@ def read_configuration(
     refuse_unknown(single, (*RULE_KEYS, *other_keys), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
-        problem = f"{source}: severity is {toml_text(severity)}"
+        problem = f"{source}: severity is {format_toml_value(severity)}"
         raise ConfigurationError(
             f"{problem}, a table like {{D2R104 = 'warning'}} was expected"
         )
     for rule, value in severity.items():
         if value not in [*Severity]:
-            problem = f"{source}: severity of {rule} is {toml_text(value)}"
+            problem = f"{source}: severity of {rule} is {format_toml_value(value)}"
             raise ConfigurationError(
                 f"{problem}, one of {', '.join(Severity)} expected"
             )
     return Configuration(
-        _names(table, "select", source),
-        _names(table, "ignore", source),
+        _read_rule_names(table, "select", source),
+        _read_rule_names(table, "ignore", source),
         dict(severity),
         source,
     )
 
 
-def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
+def _read_rule_names(
+    table: Mapping[str, object], key: str, source: str
+) -> tuple[str, ...]:
     """Return the list of rule ids under a key."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
-            f"{source}: {key} is {toml_text(value)}, a list of rule ids was expected"
+            f"{source}: {key} is {format_toml_value(value)}, a list of rule ids was expected"
         )
     return tuple(value)
 
@@ -192,7 +199,7 @@ class CheckedWindow(NamedTuple):
     unit: Unit
     tr: float
     td: float | None
-    place: Field
+    place: CardField
     cards: tuple[int, int | None]
 
     @property
@@ -218,7 +225,7 @@ class Checked(NamedTuple):
     solver: str = LS_DYNA
 
 
-def configuration_for(
+def find_configuration(
     deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
     """Return the configuration nearest to a deck, with the keys of ``override`` in place of its own.
@@ -230,7 +237,7 @@ def configuration_for(
     ConfigurationError
         If it cannot be read, or names a rule that does not exist.
     """
-    nearest = nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has none
+    nearest = find_nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has none
     nearest_configuration = read_configuration(
         nearest.table, nearest.source, other_keys
     )
@@ -278,8 +285,8 @@ def check_deck(
     """
     configuration = configuration or Configuration()
     configuration.verify(RULES)
-    case = _read(path, content, judge, restarts)
-    findings = _without_what_follows(list(_findings(case, configuration)))
+    case = _read_case(path, content, judge, restarts)
+    findings = _remove_consequences(list(_apply_rules(case, configuration)))
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
         order.setdefault(finding.file, len(order))
@@ -291,8 +298,8 @@ def check_deck(
             finding.rule,
         )
     )
-    windows = tuple(_told(case.windows.windows))
-    remarks = tuple(_remarks(case.deck))
+    windows = tuple(_strip_windows(case.windows.windows))
+    remarks = tuple(_list_remarks(case.deck))
     return Checked(
         path,
         windows,
@@ -304,7 +311,7 @@ def check_deck(
     )
 
 
-def _without_what_follows(findings: list[Finding]) -> list[Finding]:
+def _remove_consequences(findings: list[Finding]) -> list[Finding]:
     """Return the findings without those that follow from a mistake of units, or of one time, reported by another."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
@@ -322,7 +329,7 @@ def _without_what_follows(findings: list[Finding]) -> list[Finding]:
     ]
 
 
-def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
+def _strip_windows(windows: Iterable[SwitchWindow]) -> Iterator[CheckedWindow]:
     """Yield the windows without their deck."""
     numbers: dict[SwitchSet, int] = {}
     for unit, tr, td, opened, closed in windows:
@@ -332,7 +339,7 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
 
 
 @cache
-def _rules_for(
+def _select_rules(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
     """Return the selected rules for a solver; memoised, as there may be thousands of decks."""
@@ -347,11 +354,11 @@ def _rules_for(
     )
 
 
-def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
+def _apply_rules(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Yield the findings of the selected rules, except those that a comment in the deck silences."""
     solver = case.solver
     silences = case.deck.silences
-    for rule in _rules_for(solver, *configuration[:2], case.judge is not None):
+    for rule in _select_rules(solver, *configuration[:2], case.judge is not None):
         for field, message in rule.check(case):
             if silences(rule.id, field.file, field.line):
                 continue
@@ -367,12 +374,12 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
             )
 
 
-def _read(
+def _read_case(
     path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]
 ) -> Case:
     """Read a deck according to its content: a Radioss run, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
-    of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
+    of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
         from d2rpick.deck.radioss_run import read_run  # not above: start-up
 
@@ -386,7 +393,7 @@ def _read(
     return Case(deck, judge)
 
 
-def _remarks(deck: Deck) -> Iterator[str]:
+def _list_remarks(deck: Deck) -> Iterator[str]:
     """Yield remarks on comments that ignore rules that do not exist."""
     for card in deck.silencing:
         for name in card.block.silenced:
@@ -394,4 +401,4 @@ def _remarks(deck: Deck) -> Iterator[str]:
                 name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)
             ):
                 where = f"{card.file}: the comment before line {card.line}"
-                yield f"{where} ignores no rule: found {name!r}, {_expected_instead(name, RULES)}"
+                yield f"{where} ignores no rule: found {name!r}, {_describe_expected(name, RULES)}"

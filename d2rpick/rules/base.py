@@ -8,22 +8,22 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
+from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, format_in_one_line
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Field
+from d2rpick.deck.card import CardField
 from d2rpick.deck.ls_dyna_parts import (
     Constraint,
-    Parts,
+    DeckParts,
     read_constraints,
     read_parts,
     read_sections,
 )
 from d2rpick.deck.switching import (
     BY_SENSOR,
-    Event,
-    Header,
+    SwitchEvent,
+    SwitchHeader,
     SwitchSet,
-    Window,
+    SwitchWindow,
     Windows,
     find_windows,
     read_switching,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_rigid import Body
-    from d2rpick.deck.radioss_run import Run, RunWindows
+    from d2rpick.deck.radioss_run import RadiossRun, RunWindows
     from d2rpick.deck.radioss_sensors import Course
     from d2rpick.deck.reader import Deck, Unread
     from d2rpick.deck.unswitchable import Unswitchable
@@ -53,7 +53,7 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+def group_values(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
     """Collect the values of each key, in the order in which the keys first occur."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
@@ -105,8 +105,8 @@ class Unreadable(NamedTuple):
     def reason(self) -> str:
         """Return one line that names the deck and the error."""
         if self.code == INTERNAL_ERROR:
-            return f"{self.deck}: {one_line(self.error)}"
-        return one_line(self.error)
+            return f"{self.deck}: {format_in_one_line(self.error)}"
+        return format_in_one_line(self.error)
 
 
 @dataclass(eq=False, repr=False)
@@ -122,7 +122,7 @@ class Case:
         return LS_DYNA
 
     @cached_property
-    def parts(self) -> Parts:
+    def parts(self) -> DeckParts:
         """Return parts, part sets and rigid materials."""
         return read_parts(self.deck)
 
@@ -137,7 +137,7 @@ class Case:
         return len(self.sets)
 
     @cached_property
-    def headers(self) -> tuple[tuple[SwitchSet, Header], ...]:
+    def headers(self) -> tuple[tuple[SwitchSet, SwitchHeader], ...]:
         """Return the switching cards that have a header, with the header."""
         return tuple(
             (card, card.header) for card in self.sets if card.header is not None
@@ -148,7 +148,7 @@ class Case:
         """Return the rigid windows of all parts, including switches by a force if the history shows them."""
         timed = find_windows(self.sets, self.parts)
         if self.sensed:
-            by_sensor: list[tuple[float, Event]] = []
+            by_sensor: list[tuple[float, SwitchEvent]] = []
             for sensed_set in self.sensed:
                 by_sensor += sensed_set.events(timed.events)
             timed = find_windows(self.sets, self.parts, by_sensor)
@@ -214,7 +214,7 @@ class Case:
         ]
 
     @cached_property
-    def made_rigid(self) -> tuple[Event, ...]:
+    def made_rigid(self) -> tuple[SwitchEvent, ...]:
         """Return the events that make a known part rigid."""
         return tuple(
             event
@@ -259,7 +259,7 @@ class Case:
         return self.deck.unread
 
     @property
-    def untimed(self) -> tuple[tuple[Field, str], ...]:
+    def untimed(self) -> tuple[tuple[CardField, str], ...]:
         """Return the cards that no time switches, each with what switches it."""
         return ()
 
@@ -301,7 +301,7 @@ class Case:
 class RunCase(Case):
     """A Radioss run as input of the rules: starter deck, legs (engine files), and the windows that they make."""
 
-    run: Run
+    run: RadiossRun
 
     @property
     def solver(self) -> str:
@@ -331,10 +331,10 @@ class RunCase(Case):
         )
 
     @cached_property
-    def parts(self) -> Parts:
+    def parts(self) -> DeckParts:
         """Return the parts of the starter deck."""
         lines = self.run.starter.parts if self.run.starter else {}
-        return Parts(
+        return DeckParts(
             dict.fromkeys(lines, ""), {part: line.title for part, line in lines.items()}
         )
 
@@ -389,15 +389,17 @@ class RunCase(Case):
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
-    def untimed(self) -> tuple[tuple[Field, str], ...]:
+    def untimed(self) -> tuple[tuple[CardField, str], ...]:
         """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
-        from d2rpick.deck.radioss_sensors import active_spans  # not above: start-up
+        from d2rpick.deck.radioss_sensors import (
+            find_active_spans,  # not above: start-up
+        )
 
         starter = self.run.starter
         legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
         sensed = [body for body in starter.bodies if body.sensor] if starter else []
         spans = [
-            (body, active_spans(starter, body.sensor, self._find_course(body)))
+            (body, find_active_spans(starter, body.sensor, self._find_course(body)))
             for body in sensed
             if starter
         ]
@@ -435,12 +437,12 @@ class RunCase(Case):
         """Return what the starter does wrongly to the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
-        from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
+        from d2rpick.deck.radioss_flaws import find_flaws  # loads numpy
 
-        return flaws_of(self.run, self.run.named)
+        return find_flaws(self.run, self.run.named)
 
     @cached_property
-    def rigid_legs(self) -> list[tuple[int, list[Window]]]:
+    def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
         """Return the index of each leg in which something is rigid, with its windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
@@ -456,5 +458,5 @@ class RunCase(Case):
         return rigid_legs
 
 
-Objection = tuple[Field, str]
+Objection = tuple[CardField, str]
 """A field of the deck, and what is wrong there."""

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.switching import Event, SwitchSet, Window
+from d2rpick.deck.switching import SwitchEvent, SwitchSet, SwitchWindow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.switching import Header, Unit
+    from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
     Spans = tuple[tuple[float, float], ...]  # of time
@@ -49,7 +49,7 @@ class Forced(NamedTuple):
 
     place: Card
     cards: tuple[Card, ...]
-    windows: tuple[Window, ...]
+    windows: tuple[SwitchWindow, ...]
     contacts: Spans
     wait: str
     source: str = "momenta"
@@ -83,7 +83,7 @@ class _Seen(NamedTuple):
 
 
 def follow_forced_switches(
-    deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
+    deck: Deck, events: Sequence[SwitchEvent], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
     """Yield the switches by a force in an LS-DYNA deck with their windows; nothing if the history shows no contacts."""
     by_card = {
@@ -99,7 +99,7 @@ def follow_forced_switches(
         if not rigid.to_rigid:
             continue
         back_card = _find_pair(rigid_card, by_card, waiting)
-        windows: list[Window] = []
+        windows: list[SwitchWindow] = []
         last_seen: _Seen | None = None
         for event in by_card[rigid_card]:
             seen_contacts = _see_contacts(deck, rigid_card, event.unit, judge)
@@ -116,7 +116,9 @@ def follow_forced_switches(
                 rigid, deformable, seen_contacts.contacts, end, seen_back.contacts
             )
             windows += (
-                Window(event.unit, tr, td, event, closing if td is not None else None)
+                SwitchWindow(
+                    event.unit, tr, td, event, closing if td is not None else None
+                )
                 for tr, td in spans
             )
         if last_seen:
@@ -164,7 +166,7 @@ def _see_contacts(
     )
 
 
-def _can_trigger(deck: Deck, header: Header) -> bool:
+def _can_trigger(deck: Deck, header: SwitchHeader) -> bool:
     """Return True if the force of contact or rigid wall ENTNO may switch parts, or the deck does not define it."""
     kind, _ = _CODES[header.code.value]
     entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
@@ -237,7 +239,7 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
 
 def _find_pair(
     rigid_card: SwitchSet,
-    by_card: dict[SwitchSet, list[Event]],
+    by_card: dict[SwitchSet, list[SwitchEvent]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
     """Return the set that makes the same parts deformable as ``rigid_card`` makes rigid, or None."""
@@ -248,6 +250,6 @@ def _find_pair(
     return None
 
 
-def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
+def _find_event(unit: Unit, events: Sequence[SwitchEvent]) -> SwitchEvent | None:
     """Return the event of a unit, or None."""
     return next((event for event in events if event.unit == unit), None)

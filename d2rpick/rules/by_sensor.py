@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.deck.ls_dyna_sensors import Change, follow_control, read_controls
-from d2rpick.deck.switching import BY_SENSOR, Event, SwitchSet
+from d2rpick.deck.switching import BY_SENSOR, SwitchEvent, SwitchSet
 from d2rpick.rules.by_force import find_spans_of_force
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.switching import Header
+    from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
 
     Spans = tuple[tuple[float, float], ...]  # of time
@@ -25,7 +25,9 @@ class Sensed(NamedTuple):
     changes: tuple[Change, ...] = ()
     unknown: str = ""
 
-    def events(self, events: Sequence[Event]) -> Iterator[tuple[float, Event]]:
+    def events(
+        self, events: Sequence[SwitchEvent]
+    ) -> Iterator[tuple[float, SwitchEvent]]:
         """Yield time and event of each switch of its parts: rigid while the control is on, deformable again when it
         is off.
         """
@@ -40,7 +42,7 @@ class Sensed(NamedTuple):
 
 def follow_sensed_switches(
     deck: Deck,
-    headers: Sequence[tuple[SwitchSet, Header]],
+    headers: Sequence[tuple[SwitchSet, SwitchHeader]],
     judge: HistoryJudge | None,
     end: float,
 ) -> Iterator[Sensed]:

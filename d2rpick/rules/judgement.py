@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import Caution, DeckError, if_written, name_units
+from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at, verify_of
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.health import WRONG_ENERGY
@@ -23,14 +23,18 @@ from d2rpick.flight.contact_times import (
     narrow_to_states,
 )
 from d2rpick.histories.contact_forces import find_force
-from d2rpick.histories.digits import above, first_as_read, in_the_record
+from d2rpick.histories.digits import (
+    convert_to_unit_of_record,
+    format_above_limit,
+    round_to_first_as_read,
+)
 from d2rpick.histories.surroundings import UNKNOWN
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck.switching import Window
+    from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 
@@ -127,7 +131,7 @@ class HistoryJudge:
         return self._references[parts]
 
     def faults(
-        self, window: Window, together: Iterable[int], *, by_force: bool = False
+        self, window: SwitchWindow, together: Iterable[int], *, by_force: bool = False
     ) -> tuple[Fault, ...]:
         """Return all objections to a window; if it has no td, or td is not after tr, only tr is judged.
 
@@ -164,7 +168,7 @@ class HistoryJudge:
         chosen = [part for part in self.run.parts if part.id in parts]
         if len(chosen) < len(parts):
             return None
-        part_energies = if_written(lambda: self.run.part_energies(chosen))
+        part_energies = give_if_written(lambda: self.run.part_energies(chosen))
         if part_energies is None:
             return None
         return tuple(
@@ -237,9 +241,11 @@ class HistoryJudge:
         if outside:
             return
         if td is None:
-            yield from _of_load(history, tr, self.settings)
+            yield from _judge_open_window(history, tr, self.settings)
             return
-        if times_in_record := in_the_record(history.time, [td], history.time_unit):
+        if times_in_record := convert_to_unit_of_record(
+            history.time, [td], history.time_unit
+        ):
             problem = f"td = {td:.6g} lies within the first ten states of the history ({first:.6g} to {last:.6g})"
             yield Fault(
                 "D2R205",
@@ -253,7 +259,7 @@ class HistoryJudge:
         if parts and not history.energy.any():
             # Parts without energy lock in nothing, as a note of the reader reports: only the flight limits the times.
             yield from (
-                _of_flight(verdict)
+                _judge_flight(verdict)
                 if verdict.situation.flight.start is not None
                 else ()
             )
@@ -261,14 +267,14 @@ class HistoryJudge:
         for caution in verdict.cautions:
             if caution.code in _KEPT:
                 self._cautions.setdefault(caution, []).extend(parts)
-        yield from faults_of(verdict)
+        yield from find_faults(verdict)
 
 
-def faults_of(verdict: Verdict) -> Iterator[Fault]:
+def find_faults(verdict: Verdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not verified has at least one of severity
     error.
     """
-    faults = [*_of_flight(verdict), *_of_error(verdict)]
+    faults = [*_judge_flight(verdict), *_judge_error(verdict)]
     if not verdict.verified and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
@@ -285,7 +291,9 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R203", True, f"{problem} and no tr can keep it; {cure}")
 
 
-def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:
+def _judge_open_window(
+    history: History, tr: float, settings: Settings
+) -> Iterator[Fault]:
     """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
     tr.
     """
@@ -308,16 +316,18 @@ def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; choose a later tr")
 
 
-def _of_flight(verdict: Verdict) -> Iterator[Fault]:
+def _judge_flight(verdict: Verdict) -> Iterator[Fault]:
     """Yield objections to times outside the flight: tr before the end of the load, or td after the next contact."""
     situation = verdict.situation
     tr = verdict.candidate.tr
     earliest = situation.earliest_tr
     if earliest is None:
         yield Fault("D2R204", False, situation.flight.refusal or _UNKNOWN)
-    elif tr < first_as_read(earliest):
+    elif tr < round_to_first_as_read(earliest):
         end = f"before {end_of_load(situation)} ({situation.flight.source})"
-        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
+        yield Fault(
+            "D2R204", False, f"tr = {tr:.6g} lies {end}; {_suggest_cure(verdict)}"
+        )
     if situation.td > situation.latest_td:
         end = f"after {end_of_flight(situation)}"
         yield Fault(
@@ -325,7 +335,7 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
         )
 
 
-def _of_error(verdict: Verdict) -> Iterator[Fault]:
+def _judge_error(verdict: Verdict) -> Iterator[Fault]:
     """Yield an objection to the locked-in deformation: a wrong sign, or an error above the tolerance."""
     candidate = verdict.candidate
     situation = verdict.situation
@@ -334,7 +344,7 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
     if candidate.sign_match is False:
         quantity = "the deformation at tr has the opposite sign of that at td"
-        yield Fault("D2R202", False, f"{quantity}; {_way_out(verdict)}")
+        yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
         return
     if candidate.lock_in_error is not None:
         error = candidate.lock_in_error
@@ -351,13 +361,11 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         else:
             of_parts = ""
         levels = f"the energy{of_parts} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = (
-            f"{quantity} {above(error, tolerance)}, expected at most {tolerance:g}"
-        )
-        yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
+        expected = f"{quantity} {format_above_limit(error, tolerance)}, expected at most {tolerance:g}"
+        yield Fault("D2R201", False, f"{levels}: {expected}; {_suggest_cure(verdict)}")
 
 
-def _way_out(verdict: Verdict) -> str:
+def _suggest_cure(verdict: Verdict) -> str:
     """Return what to do: a tr that suits this td, else a better pair, else where to look for one."""
     suggestion = suggest_at(verdict.situation, with_better=False)
     if suggestion.recommended:

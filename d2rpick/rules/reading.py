@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import listing
+from d2rpick.base.errors import list_names
 from d2rpick.base.files import STDIN
-from d2rpick.deck.card import Field, Problem
-from d2rpick.deck.ls_dyna_parts import element_cards
-from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
-from d2rpick.deck.switching import SwitchSet, misspelt
+from d2rpick.deck.card import CardField, Problem
+from d2rpick.deck.ls_dyna_parts import find_element_cards
+from d2rpick.deck.reader import UNKNOWN_KIND, describe_cure, find_cuts
+from d2rpick.deck.switching import SwitchSet, find_misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Objection
 from d2rpick.rules.rule import (
     BACK,
@@ -20,11 +20,11 @@ from d2rpick.rules.rule import (
     PASS,
     THERE,
     Example,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
+    make_deck,
+    make_rule_decorator,
+    set_failing,
+    set_passing,
+    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _CURES: Final = {
 _INNER = THERE + BACK + END
 
 _PARAMETER = "*PARAMETER\nR tr           0.02\n"
-_BY_NAME = PARTS + automatic(1, "&tr", rigid=["1"]) + BACK + END
+_BY_NAME = PARTS + write_automatic_card(1, "&tr", rigid=["1"]) + BACK + END
 _CODES: Final = {
     1: "when the force of rigid wall {} is zero",
     2: "when the force of contact {} is zero",
@@ -57,31 +57,33 @@ _INERTIA: Final = """\
 """
 
 
-def _transformed(factor: str) -> Example:
+def _make_transformed(factor: str) -> Example:
     include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
     return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
 
 
-def _elements(keyword: str) -> Example:
-    cards = automatic(1, "0.02", rigid=["1", "2"]) + automatic(
+def _make_elements(keyword: str) -> Example:
+    cards = write_automatic_card(1, "0.02", rigid=["1", "2"]) + write_automatic_card(
         2, "0.09", deformable=["1", "2"]
     )
-    return deck(
+    return make_deck(
         keyword + "\n       1       1       1       2       3       4\n" + cards
     )
 
 
-@fails(
-    deck(automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK),
+@set_failing(
+    make_deck(write_automatic_card(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK),
     Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
-    deck(automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK),
-    deck(automatic(1, "0.02")),
-    deck("\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK),
-    deck("\n".join(THERE.split("\n")[:5]) + "\n" + BACK),
+    make_deck(write_automatic_card(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK),
+    make_deck(write_automatic_card(1, "0.02")),
+    make_deck("\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK),
+    make_deck("\n".join(THERE.split("\n")[:5]) + "\n" + BACK),
     Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
 )
-@rule("D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts")
-def _counts(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts"
+)
+def _check_counts(case: Case) -> Iterator[Objection]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
     follow it, one line per part. If a count is wrong, the solver reads a part from the wrong line, or reads a part line
     as the next card. If a line is missing, the solver reads the next line in its place. If both counts are 0, the card
@@ -98,11 +100,11 @@ def _counts(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{card.count_problem}; {cure}"
 
 
-@passes(PASS, Example(HEAD + _PARAMETER + _BY_NAME))
-@fails(
+@set_passing(PASS, Example(HEAD + _PARAMETER + _BY_NAME))
+@set_failing(
     Example(HEAD + _BY_NAME),
     Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
-    deck(automatic(0, "0.02", rigid=["1"])),
+    make_deck(write_automatic_card(0, "0.02", rigid=["1"])),
     Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
     Example(
         "*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"
@@ -118,13 +120,13 @@ def _counts(case: Case) -> Iterator[Objection]:
     Example(GOOD.replace("*DEFORM", "* DEFORM")),
     Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
 )
-@rule(
+@make_rule_decorator(
     "D2R002",
     ERROR,
     "a switching keyword, number or &parameter that cannot be read",
     BOTH,
 )
-def _fields(case: Case) -> Iterator[Objection]:
+def _check_fields(case: Case) -> Iterator[Objection]:
     """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. Text in the columns of a
     number, or an undefined parameter, stops the run or, worse, is read as something else. A keyword that resembles a
     switching card but is none is not read at all. ENDTIM and the DT of *DATABASE_GLSTAT and *DATABASE_MATSUM are
@@ -132,7 +134,7 @@ def _fields(case: Case) -> Iterator[Objection]:
 
     Fix: Move the value into its columns, define the parameter, or correct the keyword.
     """
-    for unknown, near in misspelt(case.deck):
+    for unknown, near in find_misspelt(case.deck):
         head = unknown.block.head.strip()
         yield (
             unknown.here,
@@ -142,7 +144,7 @@ def _fields(case: Case) -> Iterator[Objection]:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
     if case.sets:
-        for field, problem in (*case.parts.problems, *_unreadable_members(case)):
+        for field, problem in (*case.parts.problems, *_find_unreadable_members(case)):
             yield field, f"{problem}; it is needed to know which parts are switched"
         for support, value in case.supporting:
             if value.problem:
@@ -152,7 +154,7 @@ def _fields(case: Case) -> Iterator[Objection]:
                 )
 
 
-def _unreadable_members(case: Case) -> Iterator[Problem]:
+def _find_unreadable_members(case: Case) -> Iterator[Problem]:
     """Yield the unreadable fields of all part sets that the switching cards use, directly or through other sets."""
     used = dict.fromkeys(
         line.part.value for card in case.sets for line in card.switched if line.by_set
@@ -164,13 +166,15 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
         yield from content.problems if content else ()
 
 
-@passes(Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}))
-@fails(
+@set_passing(Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}))
+@set_failing(
     Example(HEAD + "*INCLUDE\nnowhere.k\n" + END),
     Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END),
 )
-@rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
-def _includes(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R003", ERROR, "an include file is missing or cannot be read", BOTH
+)
+def _check_includes(case: Case) -> Iterator[Objection]:
     """d2rpick looks for include files in the folder of the main deck, in the folders of *INCLUDE_PATH and in the folder
     of the including file. For Radioss it follows #include in the same way. A file that is missing, unreadable or
     includes itself is reported. It may contain switching cards, rigid bodies, parts or parameters, so the other
@@ -189,14 +193,16 @@ def _includes(case: Case) -> Iterator[Objection]:
         )
 
 
-@passes(Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME))
-@fails(Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME))
-@rule(
+@set_passing(Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME))
+@set_failing(
+    Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME)
+)
+@make_rule_decorator(
     "D2R109",
     WARNING,
     "a parameter used by a card is defined twice with different values",
 )
-def _ambiguous(case: Case) -> Iterator[Objection]:
+def _check_parameters(case: Case) -> Iterator[Objection]:
     """By default LS-DYNA warns and keeps the first definition. *PARAMETER_DUPLICATION and *PARAMETER_MUTABLE change
     that, and other programs that read decks keep the last definition. A switching time must not depend on this choice.
 
@@ -230,10 +236,12 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
                 )
 
 
-@passes(_transformed("1.0"), _transformed("0.0"))
-@fails(_transformed("0.5"))
-@rule("D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1")
-def _scaled(case: Case) -> Iterator[Objection]:
+@set_passing(_make_transformed("1.0"), _make_transformed("0.0"))
+@set_failing(_make_transformed("0.5"))
+@make_rule_decorator(
+    "D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1"
+)
+def _check_time_factor(case: Case) -> Iterator[Objection]:
     """*INCLUDE_TRANSFORM multiplies the times of the included file by FCTTIM (0 is read as 1). d2rpick applies this
     factor to the switching times too. No available source confirms that the solver does the same.
 
@@ -247,7 +255,7 @@ def _scaled(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{problem}; {why}: move the card to the main deck"
 
 
-@fails(
+@set_failing(
     Example(
         GOOD.replace(
             END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n"
@@ -255,8 +263,10 @@ def _scaled(case: Case) -> Iterator[Objection]:
         + END
     )
 )
-@rule("D2R303", INFO, "an encrypted block, which may contain switching cards")
-def _encrypted(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R303", INFO, "an encrypted block, which may contain switching cards"
+)
+def _report_encrypted(case: Case) -> Iterator[Objection]:
     """Models of vendors contain encrypted blocks, from BEGIN PGP MESSAGE to END PGP MESSAGE, that only the solver can
     read. d2rpick cannot check switching cards, parts or parameters in such a block.
 
@@ -266,32 +276,34 @@ def _encrypted(case: Case) -> Iterator[Objection]:
         problem = (
             "an encrypted block starts here; switching cards in it were not checked"
         )
-        yield Field("", block, 0, 1), problem
+        yield CardField("", block, 0, 1), problem
 
 
-@passes(Example(GOOD.removesuffix(END)))
-@fails(
+@set_passing(Example(GOOD.removesuffix(END)))
+@set_failing(
     Example(GOOD.removesuffix("      PART\n" + END)),
     Example(GOOD.removesuffix(END) + "*NODE\n       1\n"),
 )
-@rule("D2R011", WARNING, "a file of the deck seems to be truncated", BOTH)
-def _cut(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R011", WARNING, "a file of the deck seems to be truncated", BOTH
+)
+def _check_truncation(case: Case) -> Iterator[Objection]:
     """A file seems to be truncated if it has no *END (Radioss: /END) and its last line has no line end. A main deck
     without *END whose last lines are nodes or elements may be truncated too. The last number may have lost its end, and
     switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
 
     Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END) or a line end.
     """
-    for block, problem in cuts(case.deck):
+    for block, problem in find_cuts(case.deck):
         yield (
-            Field("", block, 0, 1),
-            f"{problem} The missing lines were not checked: {cure(block)}",
+            CardField("", block, 0, 1),
+            f"{problem} The missing lines were not checked: {describe_cure(block)}",
         )
 
 
-@fails(deck("*COMMENT c:" + THERE))
-@rule("D2R301", INFO, "a card disabled by *COMMENT")
-def _disabled(case: Case) -> Iterator[Objection]:
+@set_failing(make_deck("*COMMENT c:" + THERE))
+@make_rule_decorator("D2R301", INFO, "a card disabled by *COMMENT")
+def _report_disabled(case: Case) -> Iterator[Objection]:
     """All lines from *COMMENT to the next keyword are a comment, and so is the rest of the keyword line. A switching
     card in this block looks active but has no effect.
 
@@ -304,18 +316,18 @@ def _disabled(case: Case) -> Iterator[Objection]:
         )
 
 
-@fails(
-    deck(automatic(1, "0.0", rigid=["1"], code=2)),
+@set_failing(
+    make_deck(write_automatic_card(1, "0.0", rigid=["1"], code=2)),
     Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
     Example("*DEFORMABLE_TO_RIGID\n         1\n"),
 )
-@rule(
+@make_rule_decorator(
     "D2R302",
     INFO,
     "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
     BOTH,
 )
-def _untimed(case: Case) -> Iterator[Objection]:
+def _report_untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
     /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
@@ -331,7 +343,7 @@ def _untimed(case: Case) -> Iterator[Objection]:
     for field, how in case.untimed:
         yield field, f"{how}; not judged by time"
     for card in case.sets:
-        reason = _reason(card) if case.solver == LS_DYNA else ""
+        reason = _describe_trigger(card) if case.solver == LS_DYNA else ""
         forced = next(
             (switch for switch in case.forced if card.card in switch.cards), None
         )
@@ -341,19 +353,24 @@ def _untimed(case: Case) -> Iterator[Objection]:
             times = f"{forced.switches} times by the {forced.source} of the history"
             yield card.card.here, f"*{card.card.name} {reason}: {times}{first}"
         elif reason and sensed:
-            yield card.card.here, f"*{card.card.name} {reason}{_course_of(sensed)}"
+            yield (
+                card.card.here,
+                f"*{card.card.name} {reason}{_describe_course(sensed)}",
+            )
         elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 
-@passes(
+@set_passing(
     PASS,
-    _elements("*ELEMENT_SHELL_COMPOSITE"),
+    _make_elements("*ELEMENT_SHELL_COMPOSITE"),
     Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")),
 )
-@fails(_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID"))
-@rule("D2R304", INFO, "elements of a kind that is not searched for shared nodes")
-def _unread(case: Case) -> Iterator[Objection]:
+@set_failing(_make_elements("*ELEMENT_SHELL_DOF"), _make_elements("*ELEMENT_BEAM_PID"))
+@make_rule_decorator(
+    "D2R304", INFO, "elements of a kind that is not searched for shared nodes"
+)
+def _report_unread_elements(case: Case) -> Iterator[Objection]:
     """D2R108 searches the elements for nodes that separate rigid bodies share. Some options of element keywords put
     further integers on the element lines. d2rpick does not read such lines, so D2R108 may miss shared nodes.
 
@@ -364,7 +381,7 @@ def _unread(case: Case) -> Iterator[Objection]:
     if len(switched) < 2:
         return
     first: dict[str, Card] = {}
-    for card in element_cards(case.deck, searched=False):
+    for card in find_element_cards(case.deck, searched=False):
         first.setdefault(card.name, card)
     for card in first.values():
         yield (
@@ -373,11 +390,11 @@ def _unread(case: Case) -> Iterator[Objection]:
         )
 
 
-@fails(deck(_INERTIA + THERE + BACK), deck(_INERTIA))
-@rule(
+@set_failing(make_deck(_INERTIA + THERE + BACK), make_deck(_INERTIA))
+@make_rule_decorator(
     "D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch"
 )
-def _inertias(case: Case) -> Iterator[Objection]:
+def _report_inertias(case: Case) -> Iterator[Objection]:
     """The card replaces the mass properties that the solver computes from the mesh when it makes the part rigid. If the
     card comes from an earlier state of the model, mass and inertia are wrong, and the solver issues no message. Source:
     vendor keyword data.
@@ -400,14 +417,14 @@ def _inertias(case: Case) -> Iterator[Objection]:
         )
 
 
-@passes(Example(THERE + BACK), Example(GOOD, stdin=True))
-@fails(Example(THERE + BACK, stdin=True))
-@rule(
+@set_passing(Example(THERE + BACK), Example(GOOD, stdin=True))
+@set_failing(Example(THERE + BACK, stdin=True))
+@make_rule_decorator(
     "D2R306",
     INFO,
     "switching cards on standard input without parts: ids are not checked",
 )
-def _without_parts(case: Case) -> Iterator[Objection]:
+def _report_missing_parts(case: Case) -> Iterator[Objection]:
     """A file that contains only switching cards is meant to be included by another deck, and is checked with it. Cards
     from standard input, as in d2rpick card ... | d2rpick check -, come without a deck, so d2rpick cannot check that
     their parts exist.
@@ -426,19 +443,19 @@ def _without_parts(case: Case) -> Iterator[Objection]:
         yield case.sets[0].card.here, problem
 
 
-def _course_of(sensed: Sensed) -> str:
+def _describe_course(sensed: Sensed) -> str:
     """Return the text that says when a control is on, or why that is unknown."""
     if sensed.unknown:
         return f", by {sensed.unknown}; not judged by time"
     changes = sensed.changes
-    listed = listing(
+    listed = list_names(
         [f"{'on' if change.on else 'off'} at {change.time:.6g}" for change in changes],
         most=_MOST_LISTED,
     )
     return f": {listed}; its parts are assumed to be rigid while it is on, and deformable while it is off"
 
 
-def _reason(card: SwitchSet) -> str:
+def _describe_trigger(card: SwitchSet) -> str:
     """Return how a switching card is triggered if no time on the card decides; empty if a time does, or nothing is
     switched.
     """

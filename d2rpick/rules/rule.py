@@ -80,7 +80,7 @@ class Rule(NamedTuple):
 # Pieces of LS-DYNA decks and Radioss runs for the examples.
 
 
-def automatic(
+def write_automatic_card(
     swset: int,
     time1: str,
     *,
@@ -111,31 +111,37 @@ def automatic(
     return "\n".join(lines) + "\n"
 
 
-THERE = automatic(1, "0.02", rigid=["1"])
-BACK = automatic(2, "0.09", deformable=["1"])
+THERE = write_automatic_card(1, "0.02", rigid=["1"])
+BACK = write_automatic_card(2, "0.09", deformable=["1"])
 GOOD = HEAD + PARTS + THERE + BACK + END
 
 
-def deck(*cards: str) -> Example:
+def make_deck(*cards: str) -> Example:
     """Return an example deck that has two parts and these cards."""
     return Example(HEAD + PARTS + "".join(cards) + END)
 
 
-def window(tr: str, td: str, more: str = "") -> Example:
+def make_window(tr: str, td: str, more: str = "") -> Example:
     """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``, followed by the cards ``more``."""
-    return deck(automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"]), more)
+    return make_deck(
+        write_automatic_card(1, tr, rigid=["1"]),
+        write_automatic_card(2, td, deformable=["1"]),
+        more,
+    )
 
 
 PASS = Example(GOOD)
 
 
-def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
+def write_starter_deck(
+    group: str = GROUP, body: str = "      1808", more: str = ""
+) -> str:
     """Return a starter deck whose only part is one rigid body on a node group; the text ``more`` follows."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
 
 
-def engine_files(
+def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
     """Return the engine files of a run by file name; each leg is its end time and ON, OFF or nothing for /RBODY."""
@@ -149,15 +155,15 @@ def engine_files(
     return files
 
 
-def run_of(files: dict[str, str], deck: str = "") -> Example:
+def make_run(files: dict[str, str], deck: str = "") -> Example:
     """Return an example made of a starter deck and its engine files."""
-    return Example(deck or starter_deck(), files, name="box_0000.rad")
+    return Example(deck or write_starter_deck(), files, name="box_0000.rad")
 
 
-GOOD_RUN: Final = run_of(engine_files(*WINDOW))
+GOOD_RUN: Final = make_run(write_engine_files(*WINDOW))
 
 
-def rule(
+def make_rule_decorator(
     id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
 ) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
     """Return a decorator that turns a function that finds objections in a case into a rule.
@@ -176,11 +182,11 @@ def rule(
     return make_rule
 
 
-def passes(*examples: Example) -> Callable[[Rule], Rule]:
+def set_passing(*examples: Example) -> Callable[[Rule], Rule]:
     """Return a decorator that sets the passing decks of a rule; the default is `GOOD`, or `GOOD_RUN` for Radioss."""
     return lambda rule: rule._replace(passing=examples)
 
 
-def fails(*examples: Example) -> Callable[[Rule], Rule]:
+def set_failing(*examples: Example) -> Callable[[Rule], Rule]:
     """Return a decorator that sets the failing decks of a rule."""
     return lambda rule: rule._replace(failing=examples)

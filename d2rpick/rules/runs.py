@@ -12,18 +12,18 @@ from d2rpick.rules.rule import (
     GOOD_RUN,
     WINDOW,
     Example,
-    engine_files,
-    fails,
-    passes,
-    rule,
-    run_of,
-    starter_deck,
+    make_rule_decorator,
+    make_run,
+    set_failing,
+    set_passing,
+    write_engine_files,
+    write_starter_deck,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.radioss_deck import Leg
+    from d2rpick.deck.radioss_deck import RadiossLeg
     from d2rpick.deck.radioss_run import LeftRigid
 
 # Largest time step while rigid, as a fraction of the rigid window: the release is up to one step late.
@@ -32,12 +32,12 @@ _MOST_LISTED = 8  # main nodes that a message lists
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
-    for name, text in engine_files(*WINDOW).items()
+    for name, text in write_engine_files(*WINDOW).items()
 }
 
-_LEGS: Final = engine_files(*WINDOW)
+_LEGS: Final = write_engine_files(*WINDOW)
 _KEEPS: Final = (
-    starter_deck()
+    write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
 )  # Ikrem
@@ -45,90 +45,94 @@ _KEEPS: Final = (
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
-def _row(*fields: float | str, width: int = 10) -> str:
+def _write_row(*fields: float | str, width: int = 10) -> str:
     """Return a line of fields, right-aligned in columns of this width."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
-_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _row(1, 2, 3, 4)
-_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _row(1808)
+_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _write_row(1, 2, 3, 4)
+_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _write_row(1808)
 _PLACES: Final = "/NODE\n" + "".join(
-    _row(n)[:-1] + _row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
+    _write_row(n)[:-1] + _write_row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
 )
 
 
-def _wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
+def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
     """Return a rigid wall at z = 0 that acts on the nodes of group ``added`` and those within ``reach``, less
     ``left_out``.
     """
     text = (
         "/RWALL/PLANE/3\nground\n"
-        + _row(0, 0, added, left_out)
-        + _row(reach, 0.0, 0.0, width=20)
+        + _write_row(0, 0, added, left_out)
+        + _write_row(reach, 0.0, 0.0, width=20)
     )
-    return text + _row(0.0, 0.0, 0.0, width=20) + _row(0.0, 0.0, 1.0, width=20)
+    return (
+        text + _write_row(0.0, 0.0, 0.0, width=20) + _write_row(0.0, 0.0, 1.0, width=20)
+    )
 
 
-def _velocity(group: int, speed: float = 10.0) -> str:
+def _write_velocity(group: int, speed: float = 10.0) -> str:
     """Return an /INIVEL that gives the nodes of a group this speed."""
     return (
-        "/INIVEL/TRA/4\nthrown\n" + _row(speed, 0.0, 0.0, width=20)[:-1] + _row(group)
+        "/INIVEL/TRA/4\nthrown\n"
+        + _write_row(speed, 0.0, 0.0, width=20)[:-1]
+        + _write_row(group)
     )
 
 
-def _with(*more: str) -> Example:
+def _make_run_with(*more: str) -> Example:
     """Return a good run whose starter deck has these cards too."""
-    return run_of(_LEGS, starter_deck(more="".join(more)))
+    return make_run(_LEGS, write_starter_deck(more="".join(more)))
 
 
-def _start(state: str, *nodes: int) -> Example:
+def _make_started_run(state: str, *nodes: int) -> Example:
     """Return a run whose first engine file gives nodes an initial velocity while the body is ``state`` (ON or OFF)."""
-    files = engine_files(("0.02", state), ("0.2", "OFF"))
-    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _row(*nodes)
-    return run_of(files, starter_deck(_NODES.replace("NODE/8", "NODE/7")))
+    files = write_engine_files(("0.02", state), ("0.2", "OFF"))
+    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _write_row(*nodes)
+    return make_run(files, write_starter_deck(_NODES.replace("NODE/8", "NODE/7")))
 
 
-def _wheel(
+def _make_wheel_run(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
     """Return a run with a wheel as a second rigid body; ``further_nodes`` are added to /RBODY/OFF of the first
     engine file.
     """
-    mesh = f"/PART/{part}\nwheel\n{_row(1, 1)}/SHELL/{part}\n{_row(2, 5, 6, 7, 8)}"
-    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_row(*members)}"
-    body = "/RBODY/2\nwheel\n" + _row(1809, 0, 0, 0, "", 0, 6)
+    mesh = f"/PART/{part}\nwheel\n{_write_row(1, 1)}/SHELL/{part}\n{_write_row(2, 5, 6, 7, 8)}"
+    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_write_row(*members)}"
+    body = "/RBODY/2\nwheel\n" + _write_row(1809, 0, 0, 0, "", 0, 6)
     files = {
         **_LEGS,
         "box_0001.rad": _LEGS["box_0001.rad"].replace(
             "1808\n", f"1808 {further_nodes}\n"
         ),
     }
-    return run_of(files, starter_deck(more=wheel + body))
+    return make_run(files, write_starter_deck(more=wheel + body))
 
 
-def _switching_legs(case: RunCase) -> list[Leg]:
+def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     """Return the legs of a run if any of them switches a body, else none: other runs are not judged."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
-@passes(GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF"))))
-@fails(
-    run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
-    run_of(
+@set_passing(GOOD_RUN, make_run(write_engine_files(("0.05", "ON"), ("0.05", "OFF"))))
+@set_failing(
+    make_run(write_engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
+    make_run(
         {
             name: text
-            for name, text in engine_files(*WINDOW).items()
+            for name, text in write_engine_files(*WINDOW).items()
             if "0002" not in name
         }
     ),
 )
-@rule(
+@make_rule_decorator(
     "D2R401",
     ERROR,
     "engine files of a Radioss run that are not consecutive",
     (RADIOSS,),
 )
-def _order(case: RunCase) -> Iterator[Objection]:
+def _check_order(case: RunCase) -> Iterator[Objection]:
     """Each engine file continues the run from the end of the one before. The files are numbered from 1 without gaps,
     their /RUN lines have the same name, and no file ends before the one before it. Otherwise d2rpick cannot determine
     when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's help for /RUN, and
@@ -136,7 +140,7 @@ def _order(case: RunCase) -> Iterator[Objection]:
 
     Fix: Add the missing engine files, and correct their numbers, run names and end times.
     """
-    legs = _switching_legs(case)
+    legs = _find_switching_legs(case)
     for expected, leg in enumerate(legs, start=1):
         if leg.number != expected:
             yield (
@@ -167,18 +171,18 @@ def _order(case: RunCase) -> Iterator[Objection]:
             )
 
 
-@passes(GOOD_RUN, run_of(engine_files(*WINDOW, node="0")))
-@fails(
-    run_of(engine_files(*WINDOW, node="1")),
-    run_of(engine_files(*WINDOW, node="1808 77")),
+@set_passing(GOOD_RUN, make_run(write_engine_files(*WINDOW, node="0")))
+@set_failing(
+    make_run(write_engine_files(*WINDOW, node="1")),
+    make_run(write_engine_files(*WINDOW, node="1808 77")),
 )
-@rule(
+@make_rule_decorator(
     "D2R402",
     ERROR,
     "/RBODY/ON or /RBODY/OFF lists a node that is no main node",
     (RADIOSS,),
 )
-def _main_nodes(case: RunCase) -> Iterator[Objection]:
+def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
     """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
     other node without a message, so the part does not change its state. It also skips the main node of a body that
     /MERGE/RBODY merges into another one. A 0 is not reported. d2rpick applies this rule only if it could read the
@@ -213,15 +217,15 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
                 )
 
 
-@passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF"))))
-@fails(run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))))
-@rule(
+@set_passing(GOOD_RUN, make_run(write_engine_files(("0.09", "ON"), ("0.2", "OFF"))))
+@set_failing(make_run(write_engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))))
+@make_rule_decorator(
     "D2R403",
     WARNING,
     "/RBODY/ON in a later engine file for a body that is rigid from the start",
     (RADIOSS,),
 )
-def _never_off(case: RunCase) -> Iterator[Objection]:
+def _check_never_off(case: RunCase) -> Iterator[Objection]:
     """A rigid body is active by default from the first engine file on. If no earlier engine file has /RBODY/OFF for it,
     the part is rigid from time 0, during the load too. A node that D2R402 reports is not reported here. Source:
     Altair's help for /RBODY in engine files.
@@ -255,19 +259,23 @@ def _never_off(case: RunCase) -> Iterator[Objection]:
             switched_nodes.update(node.value for node in nodes)
 
 
-@passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF"))))
-@fails(
-    run_of(
-        engine_files(("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF"))
+@set_passing(
+    GOOD_RUN, make_run(write_engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF")))
+)
+@set_failing(
+    make_run(
+        write_engine_files(
+            ("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF")
+        )
     )
 )
-@rule(
+@make_rule_decorator(
     "D2R411",
     WARNING,
     "/RBODY/ON in a later engine file for a body that is rigid already",
     (RADIOSS,),
 )
-def _on_again(case: RunCase) -> Iterator[Objection]:
+def _check_on_again(case: RunCase) -> Iterator[Objection]:
     """A restart keeps a rigid body rigid. If /RBODY/ON activates it again, the motion stays the same, but the internal
     energy of its elements is added again: in one run the model had 173 J instead of 129 J after td. Source: runs
     computed with OpenRadioss.
@@ -288,24 +296,26 @@ def _on_again(case: RunCase) -> Iterator[Objection]:
             rigid_now = rigid_now | leg_nodes if rigid else rigid_now - leg_nodes
 
 
-@passes(
+@set_passing(
     GOOD_RUN,
-    run_of(
-        engine_files(*WINDOW, cap=""),
-        starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY"),
+    make_run(
+        write_engine_files(*WINDOW, cap=""),
+        write_starter_deck().replace(
+            "/RBODY", "/SHELL/2\n         2         1\n/RBODY"
+        ),
     ),
 )
-@fails(
-    run_of(engine_files(*WINDOW, cap="")),
-    run_of(engine_files(*WINDOW, cap="1e-5 1e-3")),
+@set_failing(
+    make_run(write_engine_files(*WINDOW, cap="")),
+    make_run(write_engine_files(*WINDOW, cap="1e-5 1e-3")),
 )
-@rule(
+@make_rule_decorator(
     "D2R404",
     WARNING,
     "no limit of the time step, or a large one, while parts are rigid",
     (RADIOSS,),
 )
-def _step(case: RunCase) -> Iterator[Objection]:
+def _check_step_limit(case: RunCase) -> Iterator[Objection]:
     """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td comes
     late. /DTIX limits the time step. A limit above 1 % of the rigid window is reported too. A missing limit is reported
     only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
@@ -331,32 +341,32 @@ def _step(case: RunCase) -> Iterator[Objection]:
         elif (
             leg.cap is None
             and window_lengths
-            and not _deformable_left(case, {window.unit.id for window in leg_windows})
+            and not _has_deformable(case, {window.unit.id for window in leg_windows})
         ):
             problem = f"nothing is deformable in engine file {leg.number}, so the time step grows without limit"
             yield leg.run.here, f"{problem}; add /DTIX"
 
 
-def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
+def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
     """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    from d2rpick.deck.mesh import parts_with_elements  # loads numpy
+    from d2rpick.deck.mesh import find_parts_with_elements  # loads numpy
 
-    parts = parts_with_elements(case.run.starter)
+    parts = find_parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)
 
 
-@fails(run_of(_MIXED))
-@rule("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
-def _versions(case: RunCase) -> Iterator[Objection]:
+@set_failing(make_run(_MIXED))
+@make_rule_decorator("D2R405", WARNING, "engine files with different /VERS", (RADIOSS,))
+def _check_versions(case: RunCase) -> Iterator[Objection]:
     """/VERS defines how the fields of an engine file are read. Source: Altair's help for /VERS. No run has shown that
     different versions do harm.
 
     Fix: Give all engine files of the run the same /VERS.
     """
     for previous, leg in pairwise(
-        [leg for leg in _switching_legs(case) if leg.version]
+        [leg for leg in _find_switching_legs(case) if leg.version]
     ):
         if leg.version != previous.version:
             problem = (
@@ -369,27 +379,27 @@ def _versions(case: RunCase) -> Iterator[Objection]:
             )
 
 
-def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
+def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
     """Yield the flaws of the run that have this code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
 
 
-@passes(
+@set_passing(
     GOOD_RUN,
-    _wheel("1809"),
-    _wheel(members=(5, 6, 7)),
-    run_of(engine_files(("0.2", "OFF")), _wheel().deck),
+    _make_wheel_run("1809"),
+    _make_wheel_run(members=(5, 6, 7)),
+    make_run(write_engine_files(("0.2", "OFF")), _make_wheel_run().deck),
 )
-@fails(_wheel())
-@rule(
+@set_failing(_make_wheel_run())
+@make_rule_decorator(
     "D2R408",
     WARNING,
     "a rigid body that no engine file switches, in a run that switches others",
     (RADIOSS,),
 )
-def _left_rigid(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
     """A rigid body is active from time 0 unless the first engine file has /RBODY/OFF for it. All its nodes stay rigid
     to the end of the run, for example the wheels of a car if the engine files list only the main node of the car body.
     A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports those that
@@ -398,7 +408,7 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
     Fix: Add the main node to the /RBODY/OFF of every engine file. If the body is meant to be rigid, silence the finding
     with a comment.
     """
-    left_bodies, deforming = _left_rigid_parts(case)
+    left_bodies, deforming = _find_left_rigid_parts(case)
     if left_bodies and deforming is None:
         yield (
             left_bodies.place,
@@ -406,22 +416,22 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
         )
 
 
-@passes(GOOD_RUN, _wheel(), _wheel()._replace(history=_SPRING))
-@fails(_wheel(part=3)._replace(history=_SPRING))
-@rule(
+@set_passing(GOOD_RUN, _make_wheel_run(), _make_wheel_run()._replace(history=_SPRING))
+@set_failing(_make_wheel_run(part=3)._replace(history=_SPRING))
+@make_rule_decorator(
     "D2R409",
     ERROR,
     "a rigid body that no engine file switches, although its parts deform in the history",
     (RADIOSS,),
 )
-def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
+def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
     """As D2R408, for a rigid body whose parts have internal energy in the history: they deform in the reference run,
     and cannot deform in this run. If the history has their energy and it is zero, they are meant to be rigid, and
     nothing is reported.
 
     Fix: Add the main node to the /RBODY/OFF of every engine file.
     """
-    left_bodies, deforming = _left_rigid_parts(case)
+    left_bodies, deforming = _find_left_rigid_parts(case)
     if left_bodies and deforming:
         yield (
             left_bodies.place,
@@ -429,53 +439,59 @@ def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
         )
 
 
-def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
+def _find_left_rigid_parts(
+    case: RunCase,
+) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
     """Return what no leg switches, and which of its parts deform; None for the parts if no history shows it."""
-    from d2rpick.deck.radioss_run import left_rigid  # not above: start-up
+    from d2rpick.deck.radioss_run import find_left_rigid  # not above: start-up
 
-    left_bodies = left_rigid(case.run, case.windows.windows)
+    left_bodies = find_left_rigid(case.run, case.windows.windows)
     return left_bodies, case.judge.deforming(
         left_bodies.parts
     ) if left_bodies and case.judge else None
 
 
-@passes(GOOD_RUN, _with(_NODES, _wall(8)))
-@fails(
-    _with("/GRNOD/BOX/8\nbox\n", _row(1), _wall(8)),
-    _with(_velocity(8)),
-    _with(_PLACES, "/TRANSFORM/TRA/1\n", _wall(0, 0, 0.1)),
+@set_passing(GOOD_RUN, _make_run_with(_NODES, _write_wall(8)))
+@set_failing(
+    _make_run_with("/GRNOD/BOX/8\nbox\n", _write_row(1), _write_wall(8)),
+    _make_run_with(_write_velocity(8)),
+    _make_run_with(_PLACES, "/TRANSFORM/TRA/1\n", _write_wall(0, 0, 0.1)),
 )
-@rule(
+@make_rule_decorator(
     "D2R307",
     INFO,
     "a rigid wall, an initial velocity or a rigid body whose nodes are unknown",
     (RADIOSS,),
 )
-def _d2r307(case: RunCase) -> Iterator[Objection]:
+def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
     """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They follow node
     groups by nodes, parts and subsets, and the distance from a wall. They do not follow other groups, nodes moved by
     /TRANSFORM and ids of a //SUBMODEL.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
-    return _flaws(case, code=NOT_FOLLOWED)
+    return _report_flaws(case, code=NOT_FOLLOWED)
 
 
-@passes(
+@set_passing(
     GOOD_RUN,
-    _with(_NODES, _wall(8, 8)),
-    run_of(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_wall(7)}/END\n"),
-    _with(_PLACES, _wall(0, 0, 0.01)),
-    run_of({}, starter_deck(more=_NODES + _wall(8))),
+    _make_run_with(_NODES, _write_wall(8, 8)),
+    make_run(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_write_wall(7)}/END\n"),
+    _make_run_with(_PLACES, _write_wall(0, 0, 0.01)),
+    make_run({}, write_starter_deck(more=_NODES + _write_wall(8))),
 )
-@fails(_with(_NODES, _wall(8)), _with(_PLACES, _wall(0, 0, 0.1)), _with(_wall(7)))
-@rule(
+@set_failing(
+    _make_run_with(_NODES, _write_wall(8)),
+    _make_run_with(_PLACES, _write_wall(0, 0, 0.1)),
+    _make_run_with(_write_wall(7)),
+)
+@make_rule_decorator(
     "D2R406",
     ERROR,
     "a rigid wall that does not act on the nodes of a switched rigid body",
     (RADIOSS,),
 )
-def _d2r406(case: RunCase) -> Iterator[Objection]:
+def _check_walls(case: RunCase) -> Iterator[Objection]:
     """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
     body in the first engine file (warning 446). These nodes go through the wall. OpenRadioss applies the Ikrem of the
     /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
@@ -484,24 +500,28 @@ def _d2r406(case: RunCase) -> Iterator[Objection]:
 
     Fix: Give every /RBODY Ikrem 1, and deactivate the body before it touches the wall.
     """
-    return _flaws(case, code=THROUGH_WALL)
+    return _report_flaws(case, code=THROUGH_WALL)
 
 
-@passes(
+@set_passing(
     GOOD_RUN,
-    _with(_NODES, _velocity(8), _MAIN, _velocity(9)),
-    _with(_NODES, _velocity(8, 0.0)),
-    _start("OFF", 1, 4),
-    _start("ON", 1, 1808),
+    _make_run_with(_NODES, _write_velocity(8), _MAIN, _write_velocity(9)),
+    _make_run_with(_NODES, _write_velocity(8, 0.0)),
+    _make_started_run("OFF", 1, 4),
+    _make_started_run("ON", 1, 1808),
 )
-@fails(_with(_NODES, _velocity(8)), _with(_velocity(7)), _start("ON", 1, 4))
-@rule(
+@set_failing(
+    _make_run_with(_NODES, _write_velocity(8)),
+    _make_run_with(_write_velocity(7)),
+    _make_started_run("ON", 1, 4),
+)
+@make_rule_decorator(
     "D2R407",
     ERROR,
     "an initial velocity for the nodes of a switched rigid body but not for its main node",
     (RADIOSS,),
 )
-def _d2r407(case: RunCase) -> Iterator[Objection]:
+def _check_velocities(case: RunCase) -> Iterator[Objection]:
     """The starter gives all nodes of an /RBODY the velocity of its main node, even if the engine deactivates the body
     in the first engine file. If the node group of /INIVEL lacks the main node, the body begins at rest, and the solver
     issues no message. An /INIV in an engine file moves an active body by its main node alone, and an inactive body by
@@ -509,27 +529,31 @@ def _d2r407(case: RunCase) -> Iterator[Objection]:
 
     Fix: Add the main node to the node group of the initial velocity.
     """
-    return _flaws(case, code=AT_REST)
+    return _report_flaws(case, code=AT_REST)
 
 
-def _sensed(*lines: str) -> Example:
+def _make_sensed_run(*lines: str) -> Example:
     """Return a run in which a /SENSOR/TIME with these lines switches the body."""
-    deck = starter_deck().replace(_row(1808, 0)[:-1], _row(1808, 5)[:-1])
-    return run_of(
-        engine_files(("0.2", "")),
+    deck = write_starter_deck().replace(
+        _write_row(1808, 0)[:-1], _write_row(1808, 5)[:-1]
+    )
+    return make_run(
+        write_engine_files(("0.2", "")),
         deck.replace("/END", f"/SENSOR/TIME/5\nclock\n{''.join(lines)}/END"),
     )
 
 
-@passes(GOOD_RUN, _sensed(_row(0.02, width=20), _row(0.09, width=20)))
-@fails(_sensed(_row(0.02, 0.09, width=20)))
-@rule(
+@set_passing(
+    GOOD_RUN, _make_sensed_run(_write_row(0.02, width=20), _write_row(0.09, width=20))
+)
+@set_failing(_make_sensed_run(_write_row(0.02, 0.09, width=20)))
+@make_rule_decorator(
     "D2R412",
     WARNING,
     "a /SENSOR/TIME with a second number on the line of Tdelay",
     (RADIOSS,),
 )
-def _d2r412(case: RunCase) -> Iterator[Objection]:
+def _check_sensor_stop(case: RunCase) -> Iterator[Objection]:
     """Tstop has a line of its own below Tdelay. Radioss does not read a number after Tdelay on the same line, so the
     sensor stays active to the end, and the body that it switches stays deformable. Source: the format files of
     OpenRadioss, and runs computed with it.

@@ -5,21 +5,21 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
-from d2rpick.base.errors import listing
+from d2rpick.base.errors import list_names
 from d2rpick.deck.force_switching import find_delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
-from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Unit
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME, SwitchHeader, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
     Example,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
+    make_deck,
+    make_rule_decorator,
+    set_failing,
+    set_passing,
+    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -47,43 +47,47 @@ _CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n      
 _LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
 
 
-def _pair(
+def _make_paired_deck(
     codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1
 ) -> Example:
-    rigid_card = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0]))
-    back_card = automatic(
+    rigid_card = write_automatic_card(
+        1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0])
+    )
+    back_card = write_automatic_card(
         2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1])
     )
-    return deck(rigid_card + back_card)
+    return make_deck(rigid_card + back_card)
 
 
-def _force(code: int, entno: int, time3: str = "1.0e-3", contact: str = "") -> Example:
-    card = automatic(1, "0.0", rigid=["1"], code=code)
+def _make_force_deck(
+    code: int, entno: int, time3: str = "1.0e-3", contact: str = ""
+) -> Example:
+    card = write_automatic_card(1, "0.0", rigid=["1"], code=code)
     old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}{0:10d}"
     assert old in card
     card = card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{time3:>10s}{entno:10d}", 1)
-    return deck(contact + card)
+    return make_deck(contact + card)
 
 
-def _contact(name: str, number: int = 7) -> str:
+def _write_contact(name: str, number: int = 7) -> str:
     zeros = f"{0:10d}" * 8 + "\n"
     return f"*CONTACT_AUTOMATIC_{name}_ID\n{number:10d}floor\n" + 3 * zeros
 
 
-_FLOOR: Final = _contact("SURFACE_TO_SURFACE")
+_FLOOR: Final = _write_contact("SURFACE_TO_SURFACE")
 
 
-_with_floor = partial(_force, contact=_FLOOR)
+_with_floor = partial(_make_force_deck, contact=_FLOOR)
 
 
-@fails(deck(THERE + automatic(1, "0.09", deformable=["1"])))
-@rule("D2R004", ERROR, "SWSET used twice")
-def _unique(case: Case) -> Iterator[Objection]:
+@set_failing(make_deck(THERE + write_automatic_card(1, "0.09", deformable=["1"])))
+@make_rule_decorator("D2R004", ERROR, "SWSET used twice")
+def _check_unique_ids(case: Case) -> Iterator[Objection]:
     """Each *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with its own id, to which RELSW refers.
 
     Fix: Give every switch set its own SWSET.
     """
-    first: dict[int, Header] = {}
+    first: dict[int, SwitchHeader] = {}
     for _, header in case.headers:
         if header.swset.problem:
             continue
@@ -93,14 +97,18 @@ def _unique(case: Case) -> Iterator[Objection]:
             yield header.swset.field, f"{problem}; give every switch set its own id"
 
 
-@passes(_pair((2, 4)), _pair((1, 3)))
-@fails(_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4)))
-@rule(
+@set_passing(_make_paired_deck((2, 4)), _make_paired_deck((1, 3)))
+@set_failing(
+    _make_paired_deck((2, 4), back=7),
+    _make_paired_deck((2, 4), signs=(1, 1)),
+    _make_paired_deck((1, 4)),
+)
+@make_rule_decorator(
     "D2R005",
     ERROR,
     "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
 )
-def _mutual(case: Case) -> Iterator[Objection]:
+def _check_pairs(case: Case) -> Iterator[Objection]:
     """Paired sets act in turn as a contact or wall force begins and ends. Each set names the other in RELSW. PAIRED is
     1 for the set that acts first and -1 for the other. Their CODEs are 1 and 3 (rigid wall) or 2 and 4 (contact). Sets
     with CODE 3 or 4 on the D2R side and 1 or 2 on the R2D side, paired or not, are the wrong way round: the parts are
@@ -112,7 +120,7 @@ def _mutual(case: Case) -> Iterator[Objection]:
     """
     by_id = {header.swset.value: header for _, header in reversed(case.headers)}
     for _, header in case.headers:
-        problem = _alone(header)
+        problem = _describe_lone_problem(header)
         partner = by_id.get(header.relsw.value)
         if (
             not problem
@@ -128,17 +136,17 @@ def _mutual(case: Case) -> Iterator[Objection]:
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
             elif first:
-                problem = _mismatch(header, partner)
+                problem = _describe_mismatch(header, partner)
         if problem:
             yield (
                 header.relsw.field,
                 f"{problem}; check RELSW, PAIRED and CODE of both sets",
             )
-    for header, problem in _swapped(case):
+    for header, problem in _find_swapped(case):
         yield header.code.field, f"{problem}; exchange the CODEs"
 
 
-def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
+def _find_swapped(case: Case) -> Iterator[tuple[SwitchHeader, str]]:
     """Yield the header of each set that makes parts rigid under a force, if another set makes them deformable
     without one.
     """
@@ -155,7 +163,7 @@ def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
     for rigid_card, header in rigid_sets:
         for back_card, back_header in back_sets:
             family = {header.code.value, back_header.code.value} in _FAMILIES
-            if family and _units(case, rigid_card, to_rigid=True) & _units(
+            if family and _find_units(case, rigid_card, to_rigid=True) & _find_units(
                 case, back_card, to_rigid=False
             ):
                 ids = f"sets {header.swset.value} and {back_header.swset.value}"
@@ -165,7 +173,7 @@ def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
                 break
 
 
-def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
+def _find_units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
     """Return the units that a card makes rigid, or deformable."""
     return {
         event.unit
@@ -174,7 +182,7 @@ def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
     }
 
 
-def _alone(header: Header) -> str:
+def _describe_lone_problem(header: SwitchHeader) -> str:
     """Return what is wrong with RELSW and PAIRED of one header; empty if nothing is."""
     relsw = header.relsw.value
     paired = header.paired.value
@@ -185,7 +193,7 @@ def _alone(header: Header) -> str:
     return f"PAIRED is {paired}" if paired not in {-1, 0, 1} else ""
 
 
-def _mismatch(first: Header, second: Header) -> str:
+def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
     """Return what is wrong with the signs of PAIRED, or with the CODEs, of two sets that name each other; empty if
     nothing is.
     """
@@ -200,10 +208,12 @@ def _mismatch(first: Header, second: Header) -> str:
     return ""
 
 
-@passes(PASS, _pair((2, 4)))
-@fails(deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK))
-@rule("D2R006", WARNING, "PAIRED together with CODE 0")
-def _timed_pair(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _make_paired_deck((2, 4)))
+@set_failing(
+    make_deck(write_automatic_card(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK)
+)
+@make_rule_decorator("D2R006", WARNING, "PAIRED together with CODE 0")
+def _check_timed_pairs(case: Case) -> Iterator[Objection]:
     """A pair acts in turn by a force. Two unpaired sets are enough for a window that is defined by times (CODE 0).
 
     Fix: Set PAIRED and RELSW to 0.
@@ -221,7 +231,7 @@ def _timed_pair(case: Case) -> Iterator[Objection]:
             )
 
 
-def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
+def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
     """Yield the readable headers with one of these CODEs."""
     for _, header in case.headers:
         if (
@@ -232,20 +242,22 @@ def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
             yield header
 
 
-@passes(
+@set_passing(
     _with_floor(4, 7),
-    _force(4, 1, contact=_BY_ORDER),
-    _force(3, 3, contact=_WALL),
+    _make_force_deck(4, 1, contact=_BY_ORDER),
+    _make_force_deck(3, 3, contact=_WALL),
     Example(THERE + BACK),
 )
-@fails(
+@set_failing(
     _with_floor(4, 8),
-    _force(4, 7),
-    _force(3, 4, contact=_WALL),
-    _force(2, 2, contact=_BY_ORDER),
+    _make_force_deck(4, 7),
+    _make_force_deck(3, 4, contact=_WALL),
+    _make_force_deck(2, 2, contact=_BY_ORDER),
 )
-@rule("D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck")
-def _there(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck"
+)
+def _check_entity_exists(case: Case) -> Iterator[Objection]:
     """CODE 2 and 4 wait for the force of contact ENTNO, CODE 1 and 3 for the force of rigid wall ENTNO. If it does not
     exist, it never has a force. ENTNO is the id of *CONTACT_..._ID. Contacts without ids are counted in the order of
     their definition (no available source confirms this). d2rpick applies this rule only if it could read the whole deck
@@ -254,7 +266,9 @@ def _there(case: Case) -> Iterator[Objection]:
     Fix: Set ENTNO to the id of a contact or rigid wall of the deck.
     """
     for codes, kind, keyword in _ENTITIES:
-        headers = [header for header in _by_force(case, codes) if header.entno.value]
+        headers = [
+            header for header in _find_force_headers(case, codes) if header.entno.value
+        ]
         entities = read_entities(case.deck, keyword) if headers else None
         if entities is None or not (entities.all_known and case.whole):
             continue
@@ -262,7 +276,7 @@ def _there(case: Case) -> Iterator[Objection]:
             if entities.named(header.entno.value) is None:
                 entno = f"ENTNO is {header.entno.value}, but"
                 if entities.found:
-                    problem = f"{entno} no {kind} has this id (the deck has {_listed(entities)})"
+                    problem = f"{entno} no {kind} has this id (the deck has {_list_entities(entities)})"
                     yield (
                         header.entno.field,
                         f"{problem}, so the set never switches; give the id of one of them",
@@ -274,17 +288,19 @@ def _there(case: Case) -> Iterator[Objection]:
                     )
 
 
-@passes(
+@set_passing(
     _with_floor(4, 7),
-    _force(2, 1, contact=_BY_ORDER),
-    _force(3, 7, contact=_contact("GENERAL") + _WALL),
+    _make_force_deck(2, 1, contact=_BY_ORDER),
+    _make_force_deck(3, 7, contact=_write_contact("GENERAL") + _WALL),
 )
-@fails(
-    _force(4, 7, contact=_contact("GENERAL")),
-    _force(2, 7, contact=_contact("SINGLE_SURFACE")),
+@set_failing(
+    _make_force_deck(4, 7, contact=_write_contact("GENERAL")),
+    _make_force_deck(2, 7, contact=_write_contact("SINGLE_SURFACE")),
 )
-@rule("D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch")
-def _able(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch"
+)
+def _check_entity_triggers(case: Case) -> Iterator[Objection]:
     """Only the force of surface-to-surface and nodes-to-surface contacts triggers a switch. A contact of type GENERAL
     or SINGLE_SURFACE never does, so the part keeps its state, and the solver issues no message. Source: Vol I, Remark
     1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not tried with the
@@ -292,7 +308,11 @@ def _able(case: Case) -> Iterator[Objection]:
 
     Fix: Define a surface-to-surface or nodes-to-surface contact for the impact, and set ENTNO to its id.
     """
-    headers = [header for header in _by_force(case, _OF_CONTACT) if header.entno.value]
+    headers = [
+        header
+        for header in _find_force_headers(case, _OF_CONTACT)
+        if header.entno.value
+    ]
     entities = read_entities(case.deck, "CONTACT") if headers else None
     for header in headers:
         entity = entities.named(header.entno.value) if entities else None
@@ -301,9 +321,7 @@ def _able(case: Case) -> Iterator[Objection]:
                 candidate for candidate in entities.found if candidate.triggers
             ]
             if able_entities:
-                able = (
-                    f" (here: {_listed(entities._replace(found=tuple(able_entities)))})"
-                )
+                able = f" (here: {_list_entities(entities._replace(found=tuple(able_entities)))})"
             else:
                 able = ""
             problem = f"ENTNO {header.entno.value} is *{entity.keyword}, whose force triggers no switch"
@@ -313,32 +331,36 @@ def _able(case: Case) -> Iterator[Objection]:
             )
 
 
-def _listed(entities: Entities) -> str:
+def _list_entities(entities: Entities) -> str:
     """Return the contacts or walls as text, each with its id, keyword and title."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found
     ]
-    return listing(texts, most=_MOST_LISTED)
+    return list_names(texts, most=_MOST_LISTED)
 
 
-def _sensed(control: str) -> Example:
+def _make_sensor_deck(control: str) -> Example:
     """Return a deck whose switch set has CODE 5, with this *SENSOR_CONTROL."""
-    return deck(control + automatic(20, "0.0", rigid=["1"], code=BY_SENSOR))
+    return make_deck(
+        control + write_automatic_card(20, "0.0", rigid=["1"], code=BY_SENSOR)
+    )
 
 
-@passes(
+@set_passing(
     PASS,
-    _sensed(_CONTROL.format(20)),
-    _sensed("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]),
+    _make_sensor_deck(_CONTROL.format(20)),
+    _make_sensor_deck("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]),
 )
-@fails(
-    _sensed(""),
-    _sensed(_CONTROL.format(21)),
-    _sensed(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")),
+@set_failing(
+    _make_sensor_deck(""),
+    _make_sensor_deck(_CONTROL.format(21)),
+    _make_sensor_deck(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")),
 )
-@rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
-def _uncontrolled(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set"
+)
+def _check_sensor_control(case: Case) -> Iterator[Objection]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
     never switches. d2rpick applies this rule only if it could read the whole deck and the deck has parts. D2R302
     reports when the sensor switches. Source: vendor keyword data.
@@ -350,7 +372,7 @@ def _uncontrolled(case: Case) -> Iterator[Objection]:
     controlled = {
         number
         for card in case.deck.named("SENSOR_CONTROL")
-        for number in _controlled(card)
+        for number in _find_controlled(card)
     }
     for _, header in case.headers:
         if (
@@ -365,27 +387,29 @@ def _uncontrolled(case: Case) -> Iterator[Objection]:
             )
 
 
-def _controlled(card: Card) -> Iterator[int]:
+def _find_controlled(card: Card) -> Iterator[int]:
     """Yield the id of the switch set that a *SENSOR_CONTROL switches, if it switches one."""
     for row in card.data[:1]:
         if card.word(row, 1).value == "DEF2RIG":
             yield card.integer(row, 2).value + card.transform.rest
 
 
-def _delayed(wait: str) -> Example:
+def _make_delayed_deck(wait: str) -> Example:
     """Return a deck with a pair of sets; ``wait`` is TIME3 of the set that makes parts deformable."""
-    rigid_card = automatic(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
-    back_card = automatic(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
+    rigid_card = write_automatic_card(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
+    back_card = write_automatic_card(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
     old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}"
-    return deck(
+    return make_deck(
         rigid_card + back_card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1)
     )
 
 
-@passes(PASS, _with_floor(4, 7), _delayed("0.01"))
-@fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"), _delayed("0.0"))
-@rule("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
-def _delay(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _with_floor(4, 7), _make_delayed_deck("0.01"))
+@set_failing(
+    _with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"), _make_delayed_deck("0.0")
+)
+@make_rule_decorator("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
+def _check_delay(case: Case) -> Iterator[Objection]:
     """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
     many times in one impact, so with TIME3 = 0 the parts switch back and forth. Of a pair, one set must wait. Source:
     vendor keyword data for the meaning. A public drop tool reports the repeated switches.
@@ -395,7 +419,7 @@ def _delay(case: Case) -> Iterator[Objection]:
     waiting = {
         header.swset.value for _, header in case.headers if header.time3.value > 0
     }
-    for header in _by_force(case, _OF_CONTACT):
+    for header in _find_force_headers(case, _OF_CONTACT):
         if (
             not header.time3.problem
             and header.time3.value == 0
@@ -408,32 +432,38 @@ def _delay(case: Case) -> Iterator[Objection]:
             )
 
 
-@passes(PASS, _with_floor(4, 7))
-@fails(_with_floor(4, 0), _force(3, 0))
-@rule("D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)")
-def _unnamed(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _with_floor(4, 7))
+@set_failing(_with_floor(4, 0), _make_force_deck(3, 0))
+@make_rule_decorator(
+    "D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)"
+)
+def _check_entity_named(case: Case) -> Iterator[Objection]:
     """The set waits for a force that is not zero. If ENTNO is 0, no contact or rigid wall is named, so there is no
     force to wait for. Source: vendor keyword data. It is not confirmed what the solver does with 0.
 
     Fix: Set ENTNO to the id of the contact or rigid wall.
     """
-    for header in _by_force(case, _WITH_FORCE):
+    for header in _find_force_headers(case, _WITH_FORCE):
         if header.entno.value == 0:
             kind = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
             problem = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {kind}"
             yield header.entno.field, f"{problem}; give its id"
 
 
-def _landed(wait: str) -> Example:
+def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
-    landed = _delayed(wait).deck.replace("       0.2", "       0.7", 1)  # ENDTIM
+    landed = _make_delayed_deck(wait).deck.replace(
+        "       0.2", "       0.7", 1
+    )  # ENDTIM
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 
-@passes(PASS, _landed("0.07"))
-@fails(_landed("0.0"))
-@rule("D2R208", WARNING, "a switch by a force that chatters in the history", BOTH)
-def _chatters(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _make_landing_deck("0.07"))
+@set_failing(_make_landing_deck("0.0"))
+@make_rule_decorator(
+    "D2R208", WARNING, "a switch by a force that chatters in the history", BOTH
+)
+def _check_chatter(case: Case) -> Iterator[Objection]:
     """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
     if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
     history. Rigid windows below 10 % of the longest one are not flights but chatter. They disappear if TIME3 of the set

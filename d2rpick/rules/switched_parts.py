@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import are, name_units
-from d2rpick.base.graph import reached
-from d2rpick.deck.ls_dyna_parts import Parts, element_cards
-from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, grouped
+from d2rpick.base.errors import choose_verb, name_units
+from d2rpick.base.graph import find_reachable
+from d2rpick.deck.ls_dyna_parts import DeckParts, find_element_cards
+from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, group_values
 from d2rpick.rules.rule import (
     BACK,
     PASS,
     THERE,
     Example,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
+    make_deck,
+    make_rule_decorator,
+    set_failing,
+    set_passing,
+    write_automatic_card,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
-    from d2rpick.deck.card import Field
-    from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit
+    from d2rpick.deck.card import CardField
+    from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
 _NEAREST = 3  # ids of the deck that a message lists next to an unknown id
 
@@ -54,14 +54,16 @@ _JOINING: Final = (
 )
 
 
-def _both(*lines: str) -> Example:
+def _make_touching_deck(*lines: str) -> Example:
     """Return a deck whose two parts share nodes; ``lines`` are the D2R lines of the first card."""
-    rigid_card = automatic(1, "0.02", rigid=lines)
-    return deck(_TOUCHING + rigid_card + automatic(2, "0.09", deformable=["1", "2"]))
+    rigid_card = write_automatic_card(1, "0.02", rigid=lines)
+    return make_deck(
+        _TOUCHING + rigid_card + write_automatic_card(2, "0.09", deformable=["1", "2"])
+    )
 
 
 _LAYERS, _BEAMS = (
-    Example(_both("1", "2").deck.replace(_TOUCHING, text))
+    Example(_make_touching_deck("1", "2").deck.replace(_TOUCHING, text))
     for text in (
         _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace(
             "       4\n", "       4\n         1       0.5\n"
@@ -75,31 +77,37 @@ _LAYERS, _BEAMS = (
 )
 
 
-def _constrained(text: str, flags: str = "         0         0") -> Example:
+def _make_constrained_deck(text: str, flags: str = "         0         0") -> Example:
     """Return a deck with a constraint on a node of part 1; ``flags`` holds NRBF and NCSF of the card that makes it
     rigid.
     """
     rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
-    return deck(_MESH + _SET + text + rigid_card + BACK)
+    return make_deck(_MESH + _SET + text + rigid_card + BACK)
 
 
-def _solid(elform: str, tr: str = "0.02") -> Example:
+def _make_solid_deck(elform: str, tr: str = "0.02") -> Example:
     """Return a deck whose part 1 is a solid with this ELFORM, made rigid at ``tr``."""
-    cards = automatic(1, tr, rigid=["1"]) + BACK
-    return deck(f"*SECTION_SOLID\n         1{elform:>10s}\n" + cards)
+    cards = write_automatic_card(1, tr, rigid=["1"]) + BACK
+    return make_deck(f"*SECTION_SOLID\n         1{elform:>10s}\n" + cards)
 
 
-def _by_card(events: Iterable[Event]) -> Iterator[tuple[SwitchSet, Field, str]]:
+def _group_by_card(
+    events: Iterable[SwitchEvent],
+) -> Iterator[tuple[SwitchSet, CardField, str]]:
     """Yield each card with the field of its first event and the names of all units that it switches."""
-    for card, card_events in grouped((event.by, event) for event in events).items():
-        by_kind = grouped((event.unit.kind, event.unit.id) for event in card_events)
+    for card, card_events in group_values(
+        (event.by, event) for event in events
+    ).items():
+        by_kind = group_values(
+            (event.unit.kind, event.unit.id) for event in card_events
+        )
         unit_names = " and ".join(
             name_units(ids, kind) for kind, ids in sorted(by_kind.items())
         )
         yield card, card_events[0].line.part.field, unit_names
 
 
-def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
+def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
     """Return True if a part set that cannot be resolved is switched: it may contain any part."""
     return any(
         event.unit.is_set and event.line.to_rigid == to_rigid
@@ -107,15 +115,15 @@ def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
     )
 
 
-@fails(deck(BACK), deck(THERE + BACK.replace("  1  ", "  2  ")))
-@rule("D2R103", ERROR, "a part switched back that nothing made rigid")
-def _never_rigid(case: Case) -> Iterator[Objection]:
+@set_failing(make_deck(BACK), make_deck(THERE + BACK.replace("  1  ", "  2  ")))
+@make_rule_decorator("D2R103", ERROR, "a part switched back that nothing made rigid")
+def _check_never_rigid(case: Case) -> Iterator[Objection]:
     """An R2D line for a part that no D2R line has made rigid before has no effect. Usually a part id is wrong on one of
     the two cards.
 
     Fix: Add the D2R line, correct the part id, or remove the R2D line.
     """
-    if _unknown_members(case, to_rigid=True):
+    if _has_unknown_members(case, to_rigid=True):
         return
     orphans = [
         event
@@ -123,54 +131,54 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
         if event.unit not in case.windows.other_rigid
         and not case.parts.is_rigid(event.unit.id)
     ]
-    for _, field, unit_names in _by_card(orphans):
+    for _, field, unit_names in _group_by_card(orphans):
         yield (
             field,
             f"{unit_names} switched back, but no card makes it rigid before; add a D2R line or remove this R2D line",
         )
 
 
-@passes(PASS, Example(_RESTART.format(1, 2)))
-@fails(Example(_RESTART.format(1, 1)))
-@rule("D2R117", ERROR, "a part made rigid and deformable in one restart")
-def _both_ways(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, Example(_RESTART.format(1, 2)))
+@set_failing(Example(_RESTART.format(1, 1)))
+@make_rule_decorator("D2R117", ERROR, "a part made rigid and deformable in one restart")
+def _check_both_ways(case: Case) -> Iterator[Objection]:
     """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part that
     both name has no rigid window, or stays rigid to the end: no available source says which.
 
     Fix: Move one of the two cards to another restart.
     """
     of_restarts = [event for event in case.windows.events if event.by.kind == "restart"]
-    for file, events in grouped(
+    for file, events in group_values(
         (event.by.card.file, event) for event in of_restarts
     ).items():
         rigid = {event.unit for event in events if event.line.to_rigid}
         back_events = [
             event for event in events if not event.line.to_rigid and event.unit in rigid
         ]
-        for _, field, unit_names in _by_card(back_events):
+        for _, field, unit_names in _group_by_card(back_events):
             problem = (
                 f"{unit_names} made rigid and deformable when the restart {file} begins"
             )
             yield field, f"{problem}; move one of the two to another restart"
 
 
-@fails(deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n"))
-@rule("D2R104", INFO, "a part made rigid and never switched back", BOTH)
-def _never_back(case: Case) -> Iterator[Objection]:
+@set_failing(make_deck(THERE), make_deck("*DEFORMABLE_TO_RIGID\n         1\n"))
+@make_rule_decorator("D2R104", INFO, "a part made rigid and never switched back", BOTH)
+def _check_never_back(case: Case) -> Iterator[Objection]:
     """The part stays rigid to the end of the run, unless a restart deck switches it back. Its deformation in the next
     contact is missing from the result.
 
     Fix: Add an R2D line at td, before the next contact. If the part is meant to stay rigid, silence the finding with a
     comment.
     """
-    if _unknown_members(case, to_rigid=False):
+    if _has_unknown_members(case, to_rigid=False):
         return
     opened = {
         window.opened: window.tr
         for window in case.windows.windows
         if window.closed is None and window.unit not in case.windows.other_deformable
     }
-    for card, field, unit_names in _by_card([*opened]):
+    for card, field, unit_names in _group_by_card([*opened]):
         times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             field,
@@ -178,39 +186,41 @@ def _never_back(case: Case) -> Iterator[Objection]:
         )
 
 
-@passes(PASS, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK))
-@fails(
-    deck(automatic(1, "0.02", rigid=["7"])),
+@set_passing(PASS, Example(THERE + BACK), make_deck("*INCLUDE\nmore_parts.k\n" + BACK))
+@set_failing(
+    make_deck(write_automatic_card(1, "0.02", rigid=["7"])),
     *(
-        deck(text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n")
+        make_deck(text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n")
         for text in (
             "",
             "*SET_PART\n         3\n",
             "*SET_PART\n         3\n         1         7\n",
         )
     ),
-    deck(_LAYERED + automatic(1, "0.02", rigid=["8"])),
+    make_deck(_LAYERED + write_automatic_card(1, "0.02", rigid=["8"])),
 )
-@rule(
+@make_rule_decorator(
     "D2R106",
     ERROR,
     "part or part set not in the deck (only when every include was read)",
 )
-def _exists(case: Case) -> Iterator[Objection]:
+def _check_ids_exist(case: Case) -> Iterator[Objection]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a part set without
     parts. d2rpick applies this rule only if it could read the whole deck and the deck has parts.
 
     Fix: Correct the id, and check the id offsets of *INCLUDE_TRANSFORM.
     """
     for card in case.sets if case.whole else ():
-        missing = grouped(
-            absent for line in card.switched for absent in _absent(line, case.parts)
+        missing = group_values(
+            absent
+            for line in card.switched
+            for absent in _find_absent(line, case.parts)
         )
         for kind in sorted(missing, key=["part set", "part", "lead part"].index):
             if kind == "part set":
                 nearest_ids = ""
             else:
-                nearest_ids = _nearest(missing[kind][0], case.parts)
+                nearest_ids = _list_nearest(missing[kind][0], case.parts)
             problem = f"{name_units(missing[kind], kind)} not in the deck{nearest_ids}"
             yield (
                 card.card.here,
@@ -230,7 +240,7 @@ def _exists(case: Case) -> Iterator[Objection]:
             )
 
 
-def _nearest(number: int, parts: Parts) -> str:
+def _list_nearest(number: int, parts: DeckParts) -> str:
     """Return the nearest part ids of the deck with their titles, as text in brackets."""
     from heapq import nsmallest  # not above: start-up
 
@@ -244,7 +254,7 @@ def _nearest(number: int, parts: Parts) -> str:
     return f" (nearest to {number}: {', '.join(listed)})"
 
 
-def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
+def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
     """Yield what a line of a card names but the deck does not define, as kind (part set, part or lead part) and id."""
     if line.by_set and not line.part.problem:
         yield from (
@@ -262,9 +272,9 @@ def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
         yield "lead part", line.lead.value
 
 
-@fails(deck(_RIGID + BACK))
-@rule("D2R107", WARNING, "a *MAT_RIGID part switched to deformable")
-def _always_rigid(case: Case) -> Iterator[Objection]:
+@set_failing(make_deck(_RIGID + BACK))
+@make_rule_decorator("D2R107", WARNING, "a *MAT_RIGID part switched to deformable")
+def _check_always_rigid(case: Case) -> Iterator[Objection]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable.
 
     Fix: Give the part its deformable material, and make it rigid with a D2R line.
@@ -276,7 +286,7 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
         and not event.unit.is_set
         and case.parts.is_rigid(event.unit.id)
     ]
-    for _, field, unit_names in _by_card(back_events):
+    for _, field, unit_names in _group_by_card(back_events):
         problem = f"{unit_names} has *MAT_RIGID and cannot become deformable"
         yield (
             field,
@@ -284,10 +294,12 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
         )
 
 
-@passes(_both("1", "         2         1      PART"))
-@fails(_both("1", "2"), _LAYERS, _BEAMS)
-@rule("D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes")
-def _torn(case: Case) -> Iterator[Objection]:
+@set_passing(_make_touching_deck("1", "         2         1      PART"))
+@set_failing(_make_touching_deck("1", "2"), _LAYERS, _BEAMS)
+@make_rule_decorator(
+    "D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes"
+)
+def _check_shared_nodes(case: Case) -> Iterator[Objection]:
     """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, each prescribes the motion
     of these nodes, which they cannot both obey.
 
@@ -297,13 +309,13 @@ def _torn(case: Case) -> Iterator[Objection]:
     if len(first) < 2:
         return
     bodies = _find_bodies(first)
-    cards = element_cards(case.deck, searched=True)
+    cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import first_shared_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import find_shared_nodes  # loads numpy
 
-    for (low, high), node in first_shared_nodes(cards, bodies).items():
-        if _together(case, first[low].unit, first[high].unit):
+    for (low, high), node in find_shared_nodes(cards, bodies).items():
+        if _is_rigid_together(case, first[low].unit, first[high].unit):
             field = (first[high].line.lead or first[high].line.part).field
             lines = ((part, first[part].line) for part in (low, high))
             low_name, high_name = (
@@ -314,7 +326,7 @@ def _torn(case: Case) -> Iterator[Objection]:
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
 
 
-def _find_bodies(first: Mapping[int, Event]) -> dict[int, int]:
+def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
     """Return the lead part of the rigid body of each part, by the event that makes it rigid: the end of its LRB chain.
 
     A part that is not merged leads itself.
@@ -327,10 +339,10 @@ def _find_bodies(first: Mapping[int, Event]) -> dict[int, int]:
         lead = leads.get(part)
         return [lead] if lead else []
 
-    return {part: reached([part], find_lead)[-1] for part in first}
+    return {part: find_reachable([part], find_lead)[-1] for part in first}
 
 
-def _together(case: Case, first: Unit, second: Unit) -> bool:
+def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
     """Return True if two units may be rigid at the same time, or if this is unknown because of a switch by force."""
     if {first, second} & case.windows.other_rigid:
         return True
@@ -346,15 +358,15 @@ def _together(case: Case, first: Unit, second: Unit) -> bool:
     return any(a < d and c < b for a, b in spans[first] for c, d in spans[second])
 
 
-def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
+def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
     """Yield constraints on parts that cards make rigid without deleting the constraints."""
-    switched = _left_active(case, nodal=nodal)
+    switched = _find_left_active(case, nodal=nodal)
     constraints = [
         constraint
         for constraint in (case.constraints if switched else ())
         if (constraint.kind == "nodal rigid body") == nodal
     ]
-    owner = _owners(case, switched) if constraints else {}
+    owner = _find_owners(case, switched) if constraints else {}
     for constraint in constraints:
         part_of_nodes = (
             owner[node] for node in sorted(constraint.nodes) if node in owner
@@ -374,14 +386,14 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
         yield constraint.place, f"{problem}, so it stays active; {cure}"
 
 
-def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
+def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     """Return the first of ``parts`` that contains each node, by node id."""
-    cards = element_cards(case.deck, searched=True)
+    cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
-    from d2rpick.deck.ls_dyna_inventory import first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
 
-    return first_parts(cards, parts)
+    return find_first_parts(cards, parts)
 
 
 class _Flags(NamedTuple):
@@ -389,7 +401,7 @@ class _Flags(NamedTuple):
 
     nrbf: int
     ncsf: int
-    place: Field
+    place: CardField
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
@@ -414,7 +426,7 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
     return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
 
 
-def _left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
+def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
     """Return the flags of the first card that makes each part rigid without deleting constraints, by part id."""
     first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
@@ -424,12 +436,12 @@ def _left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
     return first_flags
 
 
-@passes(PASS, _solid("0"), _solid("2", "0.0"))
-@fails(_solid("2"), _solid(""), _solid("13"))
-@rule(
+@set_passing(PASS, _make_solid_deck("0"), _make_solid_deck("2", "0.0"))
+@set_failing(_make_solid_deck("2"), _make_solid_deck(""), _make_solid_deck("13"))
+@make_rule_decorator(
     "D2R116", WARNING, "solids whose stresses do not rotate with the rigid body", BOTH
 )
-def _unturned(case: Case) -> Iterator[Objection]:
+def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
     """While a part is rigid its elements are not computed. Formulations without a co-rotational frame keep their
     stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid from the
     start hold no stress and are not reported. Source for Radioss: Altair's help (bricks with Isolid 1 or 2 without
@@ -450,7 +462,7 @@ def _unturned(case: Case) -> Iterator[Objection]:
         for window in loaded
         if window.part in formulations
     )
-    for formulation, affected_parts in grouped(
+    for formulation, affected_parts in group_values(
         (formulations[part], (part, field))
         for part, field in affected
         if part is not None
@@ -461,7 +473,7 @@ def _unturned(case: Case) -> Iterator[Objection]:
         yield affected_parts[0][1], f"{problem}: {why}; use a co-rotational formulation"
 
 
-def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
+def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
     """Yield the parts that a card makes rigid at any time although they must not be switched."""
     if case.sets:
         reasons = {
@@ -477,7 +489,7 @@ def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
         if event.line.to_rigid and event.unit.part in reasons
     ]
     first = {event.unit.id: event for event in reversed(opened)}
-    for reason, parts in grouped(
+    for reason, parts in group_values(
         (reasons[part], part) for part in sorted(first)
     ).items():
         yield (
@@ -486,33 +498,37 @@ def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
         )
 
 
-def _of_law(law: str) -> Example:
+def _make_law_deck(law: str) -> Example:
     """Return a deck whose part 1 has the material law of this keyword."""
-    return deck(f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK)
+    return make_deck(
+        f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK
+    )
 
 
-@passes(PASS, _solid("1"))
-@fails(_solid("5"), _solid("11"), _solid("12"))
-@rule("D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH)
-def _flows(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _make_solid_deck("1"))
+@set_failing(_make_solid_deck("5"), _make_solid_deck("11"), _make_solid_deck("12"))
+@make_rule_decorator(
+    "D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH
+)
+def _check_flowing_material(case: Case) -> Iterator[Objection]:
     """Material flows through ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT,
     /EULER/MAT), so there is no body to make rigid. Source: the vendor's keyword data and Altair's help.
 
     Fix: Remove the part from the switching cards.
     """
-    return _unswitchable(case, flows=True)
+    return _report_unswitchable(case, flows=True)
 
 
-@passes(PASS, _of_law("*MAT_ELASTIC"))
-@fails(
-    _of_law("*MAT_MOONEY-RIVLIN_RUBBER"),
-    _of_law("*MAT_077_O"),
-    _of_law("*MAT_ORTHOTROPIC_ELASTIC"),
+@set_passing(PASS, _make_law_deck("*MAT_ELASTIC"))
+@set_failing(
+    _make_law_deck("*MAT_MOONEY-RIVLIN_RUBBER"),
+    _make_law_deck("*MAT_077_O"),
+    _make_law_deck("*MAT_ORTHOTROPIC_ELASTIC"),
 )
-@rule(
+@make_rule_decorator(
     "D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH
 )
-def _with_reference(case: Case) -> Iterator[Objection]:
+def _check_reference_laws(case: Case) -> Iterator[Objection]:
     """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
     stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
     not have before. For Radioss: hyperelastic laws, and solids with Ismstr 10 to 12. Source: the theory of the laws,
@@ -520,39 +536,46 @@ def _with_reference(case: Case) -> Iterator[Objection]:
 
     Fix: Keep the part deformable, or compare its stress after td with the reference run.
     """
-    return _unswitchable(case, flows=False)
+    return _report_unswitchable(case, flows=False)
 
 
-@passes(
+@set_passing(
     PASS,
-    _constrained(_NODAL, "         1         0"),
-    _constrained(_NODAL.replace("   5\n", "   6\n")),
+    _make_constrained_deck(_NODAL, "         1         0"),
+    _make_constrained_deck(_NODAL.replace("   5\n", "   6\n")),
 )
-@fails(_constrained(_NODAL), _constrained(_NODAL, "         2         1"))
-@rule("D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)")
-def _d2r112(case: Case) -> Iterator[Objection]:
+@set_failing(
+    _make_constrained_deck(_NODAL),
+    _make_constrained_deck(_NODAL, "         2         1"),
+)
+@make_rule_decorator(
+    "D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)"
+)
+def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
     """A node cannot belong to two rigid bodies. The card that makes a part rigid must delete the nodal rigid bodies on
     it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
     tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
 
     Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
-    return _held(case, nodal=True)
+    return _find_active_constraints(case, nodal=True)
 
 
-def _joined(*lines: str) -> Example:
+def _make_joined_deck(*lines: str) -> Example:
     """Return a deck in which a nodal rigid body joins two parts; ``lines`` are the D2R lines of the first card."""
-    rigid_card = automatic(1, "0.02", rigid=lines)
-    back_card = automatic(2, "0.09", deformable=["1", "2"][: len(lines)])
+    rigid_card = write_automatic_card(1, "0.02", rigid=lines)
+    back_card = write_automatic_card(2, "0.09", deformable=["1", "2"][: len(lines)])
     deleting = rigid_card.replace(_COUNTS[:40], f"{1:10d}{_COUNTS[10:40]}", 1)
     activating = back_card.replace(_COUNTS[:40], f"{2:10d}{_COUNTS[10:40]}", 1)
-    return deck(_TWO + _JOINING + deleting + activating)
+    return make_deck(_TWO + _JOINING + deleting + activating)
 
 
-@passes(PASS, _joined("1", "         2         1      PART"))
-@fails(_joined("1", "2"), _joined("1"))
-@rule("D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies")
-def _come_apart(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, _make_joined_deck("1", "         2         1      PART"))
+@set_failing(_make_joined_deck("1", "2"), _make_joined_deck("1"))
+@make_rule_decorator(
+    "D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies"
+)
+def _check_separated_parts(case: Case) -> Iterator[Objection]:
     """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
     separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
@@ -569,7 +592,7 @@ def _come_apart(case: Case) -> Iterator[Objection]:
         for constraint in (case.constraints if deleting else ())
         if constraint.kind == "nodal rigid body"
     ]
-    cards = element_cards(case.deck, searched=True) if joining else ()
+    cards = find_element_cards(case.deck, searched=True) if joining else ()
     if not cards:
         return
     from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
@@ -584,9 +607,10 @@ def _come_apart(case: Case) -> Iterator[Objection]:
             continue
         problem = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
         if unswitched_parts := parts - switched:
+            verb = choose_verb(unswitched_parts)
             yield (
                 constraint.place,
-                f"{problem}, but {name_units(unswitched_parts)} {are(unswitched_parts)} not made rigid; switch all",
+                f"{problem}, but {name_units(unswitched_parts)} {verb} not made rigid; switch all",
             )
         else:
             yield (
@@ -595,22 +619,22 @@ def _come_apart(case: Case) -> Iterator[Objection]:
             )
 
 
-@passes(
+@set_passing(
     PASS,
-    _constrained(_EXTRA, "         0         1"),
-    _constrained(_JOINT, "         1         0"),
+    _make_constrained_deck(_EXTRA, "         0         1"),
+    _make_constrained_deck(_JOINT, "         1         0"),
 )
-@fails(
-    _constrained(_EXTRA),
-    _constrained(_JOINT),
-    _constrained(_EXTRA.replace("  8  ", "  1  ")),
+@set_failing(
+    _make_constrained_deck(_EXTRA),
+    _make_constrained_deck(_JOINT),
+    _make_constrained_deck(_EXTRA.replace("  8  ", "  1  ")),
 )
-@rule(
+@make_rule_decorator(
     "D2R113",
     WARNING,
     "extra nodes or a joint on a switched part stay active (NRBF, NCSF)",
 )
-def _d2r113(case: Case) -> Iterator[Objection]:
+def _check_extra_nodes(case: Case) -> Iterator[Objection]:
     """Extra nodes and joints attach nodes to a rigid body. On a part that a card makes rigid, these nodes belong to two
     rigid bodies. The vendor asks to delete such constraints on switched parts and to activate them again when the parts
     are switched back. It is not confirmed whether NRBF or NCSF does this for joints and extra nodes, so either value of
@@ -618,4 +642,4 @@ def _d2r113(case: Case) -> Iterator[Objection]:
 
     Fix: Set NRBF and NCSF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
-    return _held(case, nodal=False)
+    return _find_active_constraints(case, nodal=False)

@@ -8,8 +8,14 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Window
-from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection, grouped
+from d2rpick.deck.switching import (
+    BY_SENSOR,
+    BY_TIME,
+    SwitchHeader,
+    SwitchSet,
+    SwitchWindow,
+)
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection, group_values
 from d2rpick.rules.rule import (
     BACK,
     END,
@@ -19,12 +25,12 @@ from d2rpick.rules.rule import (
     PASS,
     THERE,
     Example,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
-    window,
+    make_deck,
+    make_rule_decorator,
+    make_window,
+    set_failing,
+    set_passing,
+    write_automatic_card,
 )
 
 if TYPE_CHECKING:
@@ -40,7 +46,7 @@ _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 _THOUSAND = 1000.0
 _FEW = 2  # With so few cards D2R102 and D2R105 report the same mistake.
-_SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(
+_SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
@@ -54,19 +60,19 @@ _GOOD_PAIR: Final = (".0135867", ".0687534")
 _WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
 
 
-@fails(
-    window("0.02", "0.2"),
-    window("-0.02", "0.09"),
+@set_failing(
+    make_window("0.02", "0.2"),
+    make_window("-0.02", "0.09"),
     Example(
         PARTS
-        + automatic(1, "0.02", rigid=["1"], code=2).replace(
+        + write_automatic_card(1, "0.02", rigid=["1"], code=2).replace(
             "       0.0", "      0.01", 1
         )
         + END
     ),
 )
-@rule("D2R101", ERROR, "switch time outside [0, ENDTIM)")
-def _in_run(case: Case) -> Iterator[Objection]:
+@make_rule_decorator("D2R101", ERROR, "switch time outside [0, ENDTIM)")
+def _check_times_in_run(case: Case) -> Iterator[Objection]:
     """TIME1 is the switching time for CODE 0, and the earliest switching time for CODE 1 to 4. If TIME1 is at or after
     ENDTIM of *CONTROL_TERMINATION, the set never switches. With CODE 1 to 4 it does not switch after TIME2 either.
 
@@ -101,33 +107,37 @@ def _in_run(case: Case) -> Iterator[Objection]:
             yield latest.field, f"{problem}; give a later time, or 0 for no limit"
 
 
-def _closed(case: Case) -> dict[tuple[SwitchSet, SwitchSet], list[Window]]:
+def _group_closed_windows(
+    case: Case,
+) -> dict[tuple[SwitchSet, SwitchSet], list[SwitchWindow]]:
     """Return the windows with both ends, by the cards that open and close them."""
-    return grouped(
+    return group_values(
         ((window.opened.by, window.closed.by), window)
         for window in case.windows.windows
         if window.closed is not None
     )
 
 
-def _named(windows: Sequence[Window]) -> str:
+def _name_parts(windows: Sequence[SwitchWindow]) -> str:
     """Return the ids of the parts in some windows as text."""
     return name_units(window.unit.id for window in windows)
 
 
-def _lost(window: Window) -> bool:
+def _is_lost(window: SwitchWindow) -> bool:
     """Return True if both times of a window are 0."""
     return window.tr == 0 == window.td
 
 
-@fails(window("0.09", "0.02"), window("0.02", "0.02"))
-@rule("D2R102", ERROR, "switched back before (or when) it was switched to rigid", BOTH)
-def _order(case: Case) -> Iterator[Objection]:
+@set_failing(make_window("0.09", "0.02"), make_window("0.02", "0.02"))
+@make_rule_decorator(
+    "D2R102", ERROR, "switched back before (or when) it was switched to rigid", BOTH
+)
+def _check_times_in_order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch. The solver does not sort the switches by time.
 
     Fix: Make td later than tr. The two times may be swapped.
     """
-    for (opening, closing), windows in _closed(case).items():
+    for (opening, closing), windows in _group_closed_windows(case).items():
         first = windows[0]
         together = (
             opening.kind == closing.kind == "restart"
@@ -136,43 +146,45 @@ def _order(case: Case) -> Iterator[Objection]:
         if (
             first.td is not None
             and first.td <= first.tr
-            and not _lost(first)
+            and not _is_lost(first)
             and not together
         ):
-            problem = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
+            problem = f"{_name_parts(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
             cure = f"({opening.time_field.at}); give a later time here, unless the two times are swapped"
             yield closing.time_field, f"{problem} {cure}"
 
 
-@passes(PASS, window("0.0", "0.09"))
-@fails(window("0.0", "0.0"))
-@rule("D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)")
-def _zero(case: Case) -> Iterator[Objection]:
+@set_passing(PASS, make_window("0.0", "0.09"))
+@set_failing(make_window("0.0", "0.0"))
+@make_rule_decorator(
+    "D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)"
+)
+def _check_zero_times(case: Case) -> Iterator[Objection]:
     """Programs that print times with one decimal write every time below 0.05 as 0.0. Two sets that both switch at 0 are
     a sign of this.
 
     Fix: Print the times with more decimals, for example as 0.0135867.
     """
-    for (opening, closing), windows in _closed(case).items():
-        if _lost(windows[0]) and opening.kind == "automatic":
-            problem = f"both times of {_named(windows)} are 0 (the other at {opening.time_field.at})"
+    for (opening, closing), windows in _group_closed_windows(case).items():
+        if _is_lost(windows[0]) and opening.kind == "automatic":
+            problem = f"both times of {_name_parts(windows)} are 0 (the other at {opening.time_field.at})"
             yield (
                 closing.time_field,
                 f"{problem}; print times below 0.05 with more than one decimal",
             )
 
 
-@passes(PASS, Example(THERE + BACK))
-@fails(
+@set_passing(PASS, Example(THERE + BACK))
+@set_failing(
     Example(PARTS + THERE + BACK + END),
     Example(GOOD.replace("    0.0001", "      0.01")),
 )
-@rule(
+@make_rule_decorator(
     "D2R111",
     WARNING,
     "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
 )
-def _sampling(case: Case) -> Iterator[Objection]:
+def _check_sampling(case: Case) -> Iterator[Objection]:
     """Switching times are chosen from the internal energy of a reference run: glstat has the energy of the whole model,
     matsum that of each part. If the output interval is too long, the energy at tr and td is not known well enough.
     Decks that contain only switching cards, and checks with --history, are not judged.
@@ -213,7 +225,7 @@ def _sampling(case: Case) -> Iterator[Objection]:
         yield first.opened.by.card.here, f"{problem}; add what is missing"
 
 
-def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
+def _find_timed(case: Case) -> list[tuple[SwitchSet, SwitchHeader]]:
     """Return the cards with CODE 0 whose time is known, with their headers."""
     return [
         (card, header)
@@ -222,20 +234,25 @@ def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
     ]
 
 
-@passes(PASS, deck(THERE + automatic(3, "0.02", rigid=["2"])))
-@fails(
-    window("0.1", "0.1", _SECOND),
-    deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"])),
+@set_passing(PASS, make_deck(THERE + write_automatic_card(3, "0.02", rigid=["2"])))
+@set_failing(
+    make_window("0.1", "0.1", _SECOND),
+    make_deck(
+        write_automatic_card(1, "0.0", rigid=["1"])
+        + write_automatic_card(2, "0.0", deformable=["2"])
+    ),
 )
-@rule("D2R114", ERROR, "all switching times are equal (decimals lost in writing)")
-def _equal(case: Case) -> Iterator[Objection]:
+@make_rule_decorator(
+    "D2R114", ERROR, "all switching times are equal (decimals lost in writing)"
+)
+def _check_equal_times(case: Case) -> Iterator[Objection]:
     """Programs that print times with one decimal write 0.0 for every time below 0.05, and 0.1 for 0.07 and 0.13. Cards
     that make parts rigid and cards that make them deformable, all at the same time, are a sign of this. Source: a
     public drop tool wrote such decks.
 
     Fix: Print the times with more decimals.
     """
-    timed = _timed(case)
+    timed = _find_timed(case)
     times = {card.time for card, _ in timed}
     ways = {line.to_rigid for card, _ in timed for line in card.switched}
     inverted = any(
@@ -256,7 +273,7 @@ def _equal(case: Case) -> Iterator[Objection]:
     yield timed[0][1].time1.field, f"{problem}; print them with more decimals"
 
 
-def _mixed(times: list[float], end: float, run_end: str) -> str | None:
+def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | None:
     """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000, else None.
 
     ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
@@ -276,52 +293,54 @@ def _mixed(times: list[float], end: float, run_end: str) -> str | None:
     return f"{problem}? give both in the same unit"
 
 
-@passes(
+@set_passing(
     PASS,
     Example(THERE + BACK),
-    window("-0.01", "0.07"),
-    window("-0.02", "-0.01"),
-    window("0.0", "0.07"),
+    make_window("-0.01", "0.07"),
+    make_window("-0.02", "-0.01"),
+    make_window("0.0", "0.07"),
 )
-@fails(window("20.0", "90.0"), window("2.0e-5", "9.0e-5"))
-@rule(
+@set_failing(make_window("20.0", "90.0"), make_window("2.0e-5", "9.0e-5"))
+@make_rule_decorator(
     "D2R115",
     ERROR,
     "the switching times are about 1000 times the termination time, or a thousandth of it",
 )
-def _thousand(case: Case) -> Iterator[Objection]:
+def _check_units_of_deck(case: Case) -> Iterator[Objection]:
     """Seconds and milliseconds are mixed: divided or multiplied by 1000, the switching times lie in the run, and as
     they are they lie outside, or only in its first 1/1000. Files contain no unit names, so d2rpick infers this from the
     magnitudes. D2R101, which also reports times after the end, is then left out.
 
     Fix: Write the switching times and ENDTIM in the same time unit.
     """
-    times = [card.time for card, _ in _timed(case) if card.time is not None]
+    times = [card.time for card, _ in _find_timed(case) if card.time is not None]
     if case.end is None:
         return
-    if problem := _mixed(times, case.end, f"the run ends at {case.end:g} (ENDTIM)"):
-        yield _timed(case)[0][1].time1.field, problem
+    if problem := _find_mixed_units(
+        times, case.end, f"the run ends at {case.end:g} (ENDTIM)"
+    ):
+        yield _find_timed(case)[0][1].time1.field, problem
 
 
-def _pair(
+def _make_pair_deck(
     tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY
 ) -> Example:
     """Return a deck with one window for part 1, checked by a history of `d2rpick replay` with these arguments."""
-    rigid_card = automatic(1, tr, rigid=["1"])
-    back_card = automatic(2, td, deformable=["1"])
+    rigid_card = write_automatic_card(1, tr, rigid=["1"])
+    back_card = write_automatic_card(2, td, deformable=["1"])
     return Example(
         head + PARTS + rigid_card + back_card + END, history=history, options=options
     )
 
 
-_PASSING: Final = (_pair(*_GOOD_PAIR),)
+_PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
-def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
+def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
     """Yield the objections of the energy history for one rule; parts of one card with the same objection share one."""
     assert case.judge is not None
     windows = case.windows.windows
-    parts_by_times = grouped(
+    parts_by_times = group_values(
         ((window.tr, window.td), window.part)
         for window in windows
         if window.part is not None
@@ -336,19 +355,21 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
             if event and fault.rule == rule_id:
                 key = event.by, judged_window.unit.kind, fault.message
                 objections.append((key, judged_window.unit.id))
-    for (card, kind, message), ids in grouped(objections).items():
+    for (card, kind, message), ids in group_values(objections).items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
 
 
-@passes(*_PASSING, PASS)
-@fails(_pair("13586.7", "68753.4", head=HEAD.replace("       0.2", "  150000.0")))
-@rule(
+@set_passing(*_PASSING, PASS)
+@set_failing(
+    _make_pair_deck("13586.7", "68753.4", head=HEAD.replace("       0.2", "  150000.0"))
+)
+@make_rule_decorator(
     "D2R206",
     WARNING,
     "deck and history seem to have different time units (their ends differ by a power of 1000)",
     BOTH,
 )
-def _units(case: Case) -> Iterator[Objection]:
+def _check_units_of_history(case: Case) -> Iterator[Objection]:
     """Decks in microseconds or milliseconds are often checked with a history in seconds. Files contain no unit names,
     so d2rpick compares the two end times. The finding is left out if D2R115 or D2R207 reports the same mistake.
 
@@ -368,18 +389,20 @@ def _units(case: Case) -> Iterator[Objection]:
         )
 
 
-@passes(*_PASSING, PASS)
-@fails(
-    _pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")),
-    _pair("1.0e-5", "6.0e-5", head=_WITHOUT_END),
+@set_passing(*_PASSING, PASS)
+@set_failing(
+    _make_pair_deck(
+        "13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")
+    ),
+    _make_pair_deck("1.0e-5", "6.0e-5", head=_WITHOUT_END),
 )
-@rule(
+@make_rule_decorator(
     "D2R207",
     ERROR,
     "the switching times are about 1000 times those of the history, or a thousandth of them",
     BOTH,
 )
-def _thousand_of_history(case: Case) -> Iterator[Objection]:
+def _check_times_of_history(case: Case) -> Iterator[Objection]:
     """Deck and history have different time units: divided or multiplied by 1000, the windows lie in the history. Files
     contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the history are reported by
     D2R205.
@@ -396,16 +419,21 @@ def _thousand_of_history(case: Case) -> Iterator[Objection]:
     assert case.judge is not None
     if not case.judge.end > 0:
         return
-    if problem := _mixed(
+    if problem := _find_mixed_units(
         times, case.judge.end, f"the history ends at {case.judge.end:g}"
     ):
         yield windows[0].opened.by.time_field, problem
 
 
-@passes(*_PASSING, PASS)
-@fails(_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05"))
-@rule("D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH)
-def _d2r201(case: Case) -> Iterator[Objection]:
+@set_passing(*_PASSING, PASS)
+@set_failing(
+    _make_pair_deck("0.017", ".0687534"),
+    _make_pair_deck("0.0135", ".0687534", "--tolerance 0.05"),
+)
+@make_rule_decorator(
+    "D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH
+)
+def _check_locked_in_error(case: Case) -> Iterator[Objection]:
     """While a part is rigid it keeps the deformation that it had at tr, and it springs back at td. This deformation
     should be the one that the part would have at td: same energy, same direction. d2rpick judges the parts that share a
     window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in error
@@ -413,45 +441,47 @@ def _d2r201(case: Case) -> Iterator[Objection]:
 
     Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
     """
-    return _faults(case, "D2R201")
+    return _report_faults(case, "D2R201")
 
 
-@passes(*_PASSING)
-@fails(_pair(".0122659", "0.064"))
-@rule(
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(".0122659", "0.064"))
+@make_rule_decorator(
     "D2R202", ERROR, "the deformation at tr has the opposite sign of that at td", BOTH
 )
-def _d2r202(case: Case) -> Iterator[Objection]:
+def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
     wrong sign is locked in, the vibration after td is worse than with no locked-in energy. The sign is known only if an
     oscillator describes the history.
 
     Fix: Replace tr by the time in the finding, which has the right sign.
     """
-    return _faults(case, "D2R202")
+    return _report_faults(case, "D2R202")
 
 
-@passes(*_PASSING)
-@fails(_pair(".0128853", "0.064"))
-@rule(
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(".0128853", "0.064"))
+@make_rule_decorator(
     "D2R203",
     WARNING,
     "poor td: more than half of the vibration energy is kinetic",
     BOTH,
 )
-def _d2r203(case: Case) -> Iterator[Objection]:
+def _check_kinetic_share(case: Case) -> Iterator[Objection]:
     """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
     Near a maximum of the internal energy hardly any vibration energy is kinetic.
 
     Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """
-    return _faults(case, "D2R203")
+    return _report_faults(case, "D2R203")
 
 
-@passes(*_PASSING)
-@fails(_pair(*_GOOD_PAIR, "--after 0.03"))
-@rule("D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH)
-def _d2r204(case: Case) -> Iterator[Objection]:
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(*_GOOD_PAIR, "--after 0.03"))
+@make_rule_decorator(
+    "D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH
+)
+def _check_flight(case: Case) -> Iterator[Objection]:
     """Before the load is over, equal energy is a coincidence, and the motion of the body becomes wrong. After the next
     contact the part should have deformed. d2rpick finds the begin and end of the flight from the momentum or the energy
     of the history, or uses the time given by --after. A history that does not show the flight is reported too.
@@ -459,16 +489,16 @@ def _d2r204(case: Case) -> Iterator[Objection]:
     Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
     --after.
     """
-    return _faults(case, "D2R204")
+    return _report_faults(case, "D2R204")
 
 
-@passes(*_PASSING)
-@fails(_pair(".0135867", "0.16"))
-@rule("D2R205", ERROR, "tr or td outside the reference history", BOTH)
-def _d2r205(case: Case) -> Iterator[Objection]:
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(".0135867", "0.16"))
+@make_rule_decorator("D2R205", ERROR, "tr or td outside the reference history", BOTH)
+def _check_in_history(case: Case) -> Iterator[Objection]:
     """The energy outside the history is unknown, and so is the energy of a part that the history does not contain. A td
     within the first ten states is reported if 1000 times this td lies in the history: it seems to have another unit.
 
     Fix: Correct the time or the part id, or run the reference longer.
     """
-    return _faults(case, "D2R205")
+    return _report_faults(case, "D2R205")

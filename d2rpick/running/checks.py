@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError, RangeError, name_units
 from d2rpick.deck.model import DISCRETE
-from d2rpick.deck.pieces import supports_of
-from d2rpick.deck.radioss_deck import number_of
+from d2rpick.deck.pieces import find_supports
+from d2rpick.deck.radioss_deck import get_number
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
 from d2rpick.flight.window import FEWEST
@@ -29,7 +29,7 @@ def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"
         )
-    held = supports_of(inventory)[0]
+    held = find_supports(inventory)[0]
     for part in sorted(held.keys() & set(parts)):
         raise DeckError(
             f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out"
@@ -41,9 +41,9 @@ def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
             # /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
-            yield "INTER", number_of(card, 2) or number_of(card, 3)
+            yield "INTER", get_number(card, 2) or get_number(card, 3)
     for card in starter.named("RWALL"):
-        yield "RWALL", number_of(card, -1)
+        yield "RWALL", get_number(card, -1)
 
 
 def check_driven(

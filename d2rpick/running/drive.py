@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import Caution, D2RPickError
-from d2rpick.base.files import append_whole, record_of, signed, write_whole
+from d2rpick.base.files import (
+    add_checksum,
+    append_as_a_whole,
+    parse_record,
+    write_as_a_whole,
+)
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import Evidence
@@ -121,10 +126,10 @@ class Driver:
         folder = self.solver.folder
         for name, content in self.deck.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            write_whole(folder / name, content)
+            write_as_a_whole(folder / name, content)
         # The starter reads /RBODY/OFF from the first engine file.
         first_engine_file = self.solver.file(1, ".rad")
-        write_whole(first_engine_file, self.deck.leg(1, self.deck.end, None))
+        write_as_a_whole(first_engine_file, self.deck.leg(1, self.deck.end, None))
         self._start_solver("starter", 0)
         self._wait_for_end()
         if not self.solver.started_well():
@@ -194,7 +199,7 @@ class Driver:
         already_rigid = order.rigid and len(collect_joined_legs(order, self.legs)) > 1
         largest_step = self._limit_rigid_step() if order.rigid else None
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
-        write_whole(self.solver.file(number, ".rad"), text)
+        write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
         self._start_solver("engine", number)
         self.told(
@@ -471,16 +476,16 @@ class Journal:
         self.path = path
         content = path.read_bytes() if path.exists() else b""
         self.records = [
-            record for line in content.split(b"\n") if (record := record_of(line))
+            record for line in content.split(b"\n") if (record := parse_record(line))
         ]
         self._line_end = b"\n" if content and not content.endswith(b"\n") else b""
 
     def add(self, event: str, **values: Any) -> dict[str, Any]:
         """Append a record; D2RPickError if the disk has no room for it."""
         record = {"event": event, **values}
-        line = signed(json.dumps(record, allow_nan=False)).encode()
+        line = add_checksum(json.dumps(record, allow_nan=False)).encode()
         try:
-            append_whole(self.path, self._line_end + line + b"\n", durable=True)
+            append_as_a_whole(self.path, self._line_end + line + b"\n", durable=True)
         except OSError as error:
             raise D2RPickError(
                 f"{self.path}: cannot be written ({error.strerror}); make room, then --resume"

@@ -16,7 +16,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import ConfigurationError, D2RPickError, FormatError, printable
+from d2rpick.base.errors import (
+    ConfigurationError,
+    D2RPickError,
+    FormatError,
+    make_printable,
+)
 from d2rpick.histories.formats.radioss_th import TimeHistory
 
 if TYPE_CHECKING:
@@ -300,7 +305,7 @@ class Solver:
         texts = [" ".join(line.split()) for line in lines if line.strip(" -*")]
         texts = texts[:_MOST_LINES] if has_errors else texts[-_MOST_LINES:]
         ended = f"ended by signal {self._signal}; " if self._signal else ""
-        return ended + (printable(" | ".join(texts)) or "nothing was printed")
+        return ended + (make_printable(" | ".join(texts)) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
         """Remove the restarts of all legs except these and the starter."""

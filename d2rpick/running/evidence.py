@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.momentum import complete, laws_of
+from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
-from d2rpick.histories.history import EXACT, rows_of
-from d2rpick.histories.samples import stretches
+from d2rpick.histories.history import EXACT, select_states
+from d2rpick.histories.samples import find_stretches
 from d2rpick.running.record import Column, GrowingRecord, find_momenta
 from d2rpick.running.witness import Quiet, Witness
 
@@ -80,15 +80,15 @@ class Evidence:
         A witness ends at a state at which the parts lack momentum of the model, as when a rigid body has taken it.
         """
         assert momenta.parts is not None
-        is_complete = complete(momenta, of_model, self._largest_momentum)
+        are_complete = is_complete(momenta, of_model, self._largest_momentum)
         if of_model is not None:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
         origin = self._complete.size
         moved = self._add_moved(momenta)
-        self._complete.add(is_complete)
+        self._complete.add(are_complete)
         part_numbers = range(len(momenta.parts))
-        for stretch in stretches(is_complete):
+        for stretch in find_stretches(are_complete):
             if stretch.start > 0:
                 self._going_on.clear()
             for members in dict.fromkeys(_list_sets(momenta)):
@@ -101,7 +101,7 @@ class Evidence:
                     contact=_get_contact_energy(balance, momenta.time, stretch),
                     alone=np.asarray(~moved[stretch][:, other_parts].any(axis=1)),
                 )
-        if is_complete.size and not is_complete[-1]:
+        if are_complete.size and not are_complete[-1]:
             self._going_on.clear()
 
     def _begin(self, members: tuple[int, ...], momenta: Momenta, origin: int) -> None:
@@ -132,9 +132,9 @@ class Evidence:
         )
         changes = 1 + np.flatnonzero((states[1:] != states[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), count]):
-            *moved, is_complete = states[begin].tolist()
+            *moved, are_complete = states[begin].tolist()
             moving = tuple(number for number, moves in enumerate(moved) if moves)
-            yield slice(begin, end), moving, is_complete
+            yield slice(begin, end), moving, are_complete
 
     def _add_model(self, momenta: Momenta | None, balance: Balance | None) -> None:
         """Append momentum and contact energy of the whole model to its witness, if one of them is written."""
@@ -193,11 +193,11 @@ class Evidence:
             count = min(end - begin + 1, _GRAVITY_STATES)
             states = np.linspace(begin, end, count).round().astype(np.intp)
             is_used[witness.origin + states] = True
-        so_far = rows_of(momenta, is_used)
+        so_far = select_states(momenta, is_used)
         if so_far.change(witness.members) <= so_far.noise(witness.members):
             return 0.0
         start = int(np.searchsorted(so_far.time, witness.time[first]))
-        laws = laws_of(so_far, witness.members, history.balance)
+        laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(start, so_far.time.size - 1)
 
     def free_since(self, time: float) -> float:
@@ -257,7 +257,7 @@ class Evidence:
                 float(time[stretch.start + FEWEST - 1]),
                 float(time[min(stretch.stop, time.size - 1)]),
             )
-            for stretch in stretches(is_rigid, FEWEST)
+            for stretch in find_stretches(is_rigid, FEWEST)
         )
 
 

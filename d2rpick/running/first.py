@@ -10,22 +10,27 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
-from d2rpick.deck.engine_files import capped, listed, off
+from d2rpick.deck.engine_files import write_bodies_off, write_numbers, write_step_limit
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.pieces import inner_period
+from d2rpick.deck.pieces import find_inner_period
 from d2rpick.deck.printed_card import (
     PHYSICS,
     PrintedCard,
     Printing,
     check_ids,
-    comments,
-    shortest,
+    write_comments,
+    write_number,
 )
-from d2rpick.deck.radioss_bodies import bodies_for
-from d2rpick.deck.radioss_deck import kept_off
-from d2rpick.deck.radioss_run import parts_off, read_run
+from d2rpick.deck.radioss_bodies import find_bodies
+from d2rpick.deck.radioss_deck import find_bodies_kept_off
+from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.reader import read_deck
-from d2rpick.deck.switch_sets import Waiting, header, to_deformable, to_rigid
+from d2rpick.deck.switch_sets import (
+    Waiting,
+    write_deformable_lines,
+    write_header,
+    write_rigid_lines,
+)
 from d2rpick.running.checks import NO_CONTACT, contacts_of, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
@@ -33,9 +38,9 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.model import Inventory
-    from d2rpick.deck.radioss_bodies import Bodies
+    from d2rpick.deck.radioss_bodies import SwitchedBodies
     from d2rpick.deck.radioss_deck import Starter
-    from d2rpick.deck.radioss_run import Run
+    from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
 # The starter of OpenRadioss reads /RBODY/OFF in so many engine files.  A leg after the end of the run takes one step.
@@ -112,7 +117,7 @@ def first_card(
     inventory = read_inventory(path)
     chosen = tuple(parts)
     if inventory.solver == "radioss":
-        chosen = chosen or parts_off(read_run(path))
+        chosen = chosen or find_parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(
             f"no parts were given, and {path} keeps no body off; name them with `parts`"
@@ -129,7 +134,7 @@ def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     if given is not None:
         check_wait(given, wait_of_deck(inventory), path)
         return Wait(given, "given", "as given")
-    period = inner_period(inventory)
+    period = find_inner_period(inventory)
     if period is None:
         raise ArgumentError(
             f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
@@ -152,7 +157,7 @@ def _make_radioss_card(
     after: float | None,
 ) -> First:
     """Print the engine files and sensors of a Radioss run; DeckError if a flight would not show by contact forces."""
-    run, bodies = read_run(path), bodies_for(path, parts)
+    run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
@@ -172,7 +177,7 @@ def _make_radioss_card(
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
     of_walls = (_OF_WALLS,) if run.starter.named("RWALL") else ()
     notes = (reason, *bodies.notes, *_OF_ALL, *of_radioss, *of_walls)
-    head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
+    head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
     card = PrintedCard(head, (), files, starter=bodies.cards + sensors.text)
     return First(card, wait, notes)
 
@@ -183,7 +188,9 @@ def _refuse_loads(starter: Starter) -> None:
         raise DeckError(f"{card.at}: /{card.name} {_UNSEEN}")
 
 
-def _falls_from_rest(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
+def _falls_from_rest(
+    run: RadiossRun, inventory: Inventory, parts: Collection[int]
+) -> bool:
     """Return True if the parts are at rest at first and gravity acts on them; no support holds them."""
     if run.starter is None or run.starter.named("INIVEL"):
         return False
@@ -208,7 +215,7 @@ def _write_sensors(
     for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
         row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
         cards.append(
-            f"/SENSOR/{kind}/{sensor}\nforce, or shortly after\n{shortest(wait, 20):>20}\n{row}\n"
+            f"/SENSOR/{kind}/{sensor}\nforce, or shortly after\n{write_number(wait, 20):>20}\n{row}\n"
         )
     any_force, next_id = first_id, first_id + len(contacts)
     for sensor in range(first_id + 1, first_id + len(contacts)):
@@ -217,7 +224,7 @@ def _write_sensors(
         )
         any_force, next_id = next_id, next_id + 1
     no_force, late_enough, flight = next_id, next_id + 1, next_id + 2
-    start = f"{shortest(first_switch, 20):>20}"
+    start = f"{write_number(first_switch, 20):>20}"
     cards += [
         f"/SENSOR/NOT/{no_force}\nno force\n{0:20d}\n{any_force:10d}\n",
         f"/SENSOR/TIME/{late_enough}\nfrom then on\n{start}\n",
@@ -227,11 +234,18 @@ def _write_sensors(
 
 
 def _write_legs(
-    run: Run, bodies: Bodies, sensors: _Sensors, largest_step: float, *, at_rest: bool
+    run: RadiossRun,
+    bodies: SwitchedBodies,
+    sensors: _Sensors,
+    largest_step: float,
+    *,
+    at_rest: bool,
 ) -> dict[str, str]:
     """Write the engine files, deformable and rigid in turn; rigid first if the parts fall from rest."""
     (leg,) = run.legs
-    other_nodes = tuple(node for node in kept_off(run.legs) if node not in bodies.nodes)
+    other_nodes = tuple(
+        node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
+    )
     leg_count = _MOST_LEGS - at_rest
     files = {}
     for number in range(1, leg_count + 1):
@@ -241,10 +255,14 @@ def _write_legs(
             sensor = sensors.contact if rigid else sensors.flight
             lines += ["/STOP/LSENSOR", str(sensor), "0 0 0 0 0 0"]
         if rigid:
-            lines += ["/RBODY/ON", *listed(bodies.nodes), *capped(largest_step)]
-            lines += off(other_nodes)
+            lines += [
+                "/RBODY/ON",
+                *write_numbers(bodies.nodes),
+                *write_step_limit(largest_step),
+            ]
+            lines += write_bodies_off(other_nodes)
         else:
-            lines += off((*bodies.nodes, *other_nodes))
+            lines += write_bodies_off((*bodies.nodes, *other_nodes))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     return files
 
@@ -283,23 +301,23 @@ def _make_ls_dyna_card(
             "TIME1 is 0: give the time of the last push (--after) where it is known."
         )
     delay = wait.time / _DELAYS_PER_WAIT
-    lines = [f"$ {line}" for line in comments([*notes, *PHYSICS])]
-    lines += header(
+    lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
+    lines += write_header(
         rigid_set,
-        shortest(after or 0.0),
-        shortest(delay),
+        write_number(after or 0.0),
+        write_number(delay),
         (len(part_ids), 0),
         Waiting(2, contact, delay, deformable_set, 1),
     )
-    lines += to_rigid(part_ids, printing)
-    lines += header(
+    lines += write_rigid_lines(part_ids, printing)
+    lines += write_header(
         deformable_set,
         "0.0",
         "0.0",
         (0, len(part_ids)),
         Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
     )
-    lines += to_deformable(part_ids)
+    lines += write_deformable_lines(part_ids)
     text = "\n".join(lines) + "\n"
     return First(PrintedCard(text, (), {"switches.k": text}), wait, tuple(notes))
 
@@ -329,7 +347,7 @@ def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
         (section.thickness for section in sections if section.thickness), default=0.0
     )
     if keyword.startswith("CONTACT_AUTOMATIC_") and thickest > 0:
-        offset = float(shortest(_OFFSET_THICKNESSES * thickest))
+        offset = float(write_number(_OFFSET_THICKNESSES * thickest))
         note = (
             f"OFFSET {offset:g}: the parts are deformable before the contact, "
             f"{_OFFSET_THICKNESSES} shell thicknesses from it."

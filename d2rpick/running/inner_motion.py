@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.deck.pieces import inner_period
+from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
-from d2rpick.histories.samples import window
+from d2rpick.histories.samples import find_window
 from d2rpick.running.evidence import Evidence
 from d2rpick.running.record import Column
 
@@ -409,7 +409,7 @@ class InnerMotion:
         if balance := history.balance:
             terms = (balance.internal, balance.kinetic, balance.external_work)
             energies += [term for term in terms if term is not None]
-        inside = window(history.time, start, now)
+        inside = find_window(history.time, start, now)
         largest = [float(np.abs(energy[inside]).max()) for energy in energies]
         return largest[0] <= _ROUND_OFF * max(largest)
 
@@ -435,7 +435,7 @@ class InnerMotion:
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
     """Return half of the longest period of the springs of a deck; None if the deck does not define it."""
-    period = inner_period(inventory)
+    period = find_inner_period(inventory)
     if period is None:
         return None
     reason = f"half of the period {period.time:.3g} of {period.reason}"

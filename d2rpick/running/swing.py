@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.position_error import MOST_OF_PATH, drift_in_flight
-from d2rpick.histories.samples import integral, window
+from d2rpick.flight.position_error import MOST_OF_PATH, find_drift_in_flight
+from d2rpick.histories.samples import find_window, integrate_by_trapezia
 from d2rpick.running.record import find_momenta
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
     if momenta is None or momenta.parts is None:
         return None
     moving_parts = tuple(momenta.parts[number] for number in momenta.moving)
-    drift = drift_in_flight(history, Flight(start, tr, "momentum", moving_parts))
+    drift = find_drift_in_flight(history, Flight(start, tr, "momentum", moving_parts))
     if drift is None:
         return _find_swing_of_two(momenta, start, tr)
     error = float(np.max(drift.errors(drift.time, float(drift.time[-1]))))
@@ -59,7 +59,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
 
 def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | None:
     """Return the upper limit that follows from the momenta of two parts alone; None if other parts move too."""
-    inside = window(momenta.time, start, tr)
+    inside = find_window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
     if momenta.parts is None or masses is None or time.size < 2:
         return None
@@ -73,9 +73,9 @@ def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | Non
     light, heavy = sorted(pair, key=lambda number: float(masses[number]))
     velocity = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
     relative = momenta.values[inside][:, heavy] / masses[heavy] - velocity
-    displacement = integral(time, relative)
+    displacement = integrate_by_trapezia(time, relative)
     error = np.linalg.norm(displacement - displacement[-1], axis=1).max()
-    path = integral(time, np.linalg.norm(velocity, axis=1))[-1]
+    path = integrate_by_trapezia(time, np.linalg.norm(velocity, axis=1))[-1]
     name = momenta.parts[light].name
     return _make_swing(name, float(error), float(path), tr - start, at_most=True)
 

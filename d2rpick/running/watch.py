@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError
-from d2rpick.histories.listings import WITH_AN_ERROR, ending
-from d2rpick.histories.source import expand, later_legs
+from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
+from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
 from d2rpick.running.evidence import Evidence
 from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
@@ -158,7 +158,7 @@ class Watch:
 
     def _check_end(self, name: str) -> Iterator[Event]:
         """Report once that the run has ended, if the listing next to its last file says so."""
-        self.ended = _PACKED if name.endswith(".gz") else ending(name)
+        self.ended = _PACKED if name.endswith(".gz") else find_ending(name)
         if self.ended:
             event = "failed" if self.ended == WITH_AN_ERROR else "ended"
             yield self._make_event(event, f"the run has ended {self.ended}")
@@ -216,7 +216,7 @@ def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
         if "several runs" in str(error):
             raise
         return
-    for path in (*paths, *later_legs(paths)):
+    for path in (*paths, *find_later_legs(paths)):
         with suppress(OSError):  # not there yet, or no longer
             status = Path(path).stat()
             if status.st_size:

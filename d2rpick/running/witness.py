@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
-from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
+from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, find_farthest
 from d2rpick.running.record import Column
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ class Witness:
 
     def last_without(self, first: int) -> int:
         """Return the last state up to which no force shows from ``first`` on."""
-        return farthest(
+        return find_farthest(
             first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
         )
 

@@ -59,32 +59,37 @@ if TYPE_CHECKING:
     Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
 
 
-def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
+def _find_parts(history: History, within: Span, _: Together) -> SignedModel | None:
     """Read the signs of single parts if their energies are written."""
     time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
         return None
-    from d2rpick.histories.samples import window
+    from d2rpick.histories.samples import find_window
     from d2rpick.vibration.part_signs import SignedParts
 
     return SignedParts(
-        time, history.part_energies[window(history.time, *within)], history.part_names
+        time,
+        history.part_energies[find_window(history.time, *within)],
+        history.part_names,
     )
 
 
-def _modal(history: History, within: Span, together: Together) -> SignedModel | None:
+def _find_modal(
+    history: History, within: Span, together: Together
+) -> SignedModel | None:
     """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
     if not together.complete:
         return None
-    from d2rpick.vibration.modal import confirm, identify_modal
+    from d2rpick.vibration.modal import confirm_by_kinetic_energy, identify_modal
 
-    internal, kinetic = identify_modal(*history.between(*within)), together.kinetic
-    return confirm(
+    internal = identify_modal(*history.between(*within))
+    kinetic = together.kinetic
+    return confirm_by_kinetic_energy(
         internal, identify_modal(*kinetic, kinetic=True) if kinetic else None
     )
 
 
-def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
+def _find_swings(history: History, within: Span, _: Together) -> SignedModel | None:
     """Count the swings of the energy if they come down to a floor."""
     from d2rpick.vibration.swings import count_swings
 
@@ -93,10 +98,10 @@ def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
 
 # Models by name, with the function that finds each; None for those that are found for each td in another way.
 MODELS: Final[dict[str, Finder | None]] = {
-    "parts": _parts,
+    "parts": _find_parts,
     "oscillator": None,
-    "modal": _modal,
-    "swings": _swings,
+    "modal": _find_modal,
+    "swings": _find_swings,
     "energy": None,
 }
 
@@ -115,24 +120,22 @@ def find_models(
     The window ``around`` td is used, for models after the oscillator the ``flight`` if one is known, and for swings
     also the time before it, from when the energy has ``settled``.
     """
-    found: dict[str, SignedModel] = {}
-    within = around
+    models: dict[str, SignedModel] = {}
+    span = around
     for basis, find in MODELS.items():
         if basis == "oscillator":
             if flight is None or not doubtful():
                 break
-            within = flight
+            span = flight
         if basis == "swings" and settled is not None:
-            within = settled
+            span = settled
         if find and (
-            model := memory.once(
-                (basis, *within), partial(find, history, within, together)
-            )
+            model := memory.once((basis, *span), partial(find, history, span, together))
         ):
-            found[basis] = model
+            models[basis] = model
             if model.signed and not _is_vague(model):
                 break
-    return _of_vague(found)
+    return _rely_on_vague(models)
 
 
 def _is_vague(model: SignedModel) -> bool:
@@ -142,7 +145,7 @@ def _is_vague(model: SignedModel) -> bool:
     return isinstance(model, ModalVibration) and model.is_vague
 
 
-def _of_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
+def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
     """Rely on vague or doubtful modes, with a wide band, only if no other model tells the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import integral
-from d2rpick.vibration.modes import BLOCK, energy_and_jacobian
+from d2rpick.histories.samples import integrate_by_trapezia
+from d2rpick.vibration.modes import BLOCK, compute_energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -66,6 +66,17 @@ _USUAL: Final = 10  # usual number of steps; a good start needs 4 to 8
 # Rate over the record that counts as a drift, 1/50 period: of 2,000 fits stopped at 5 times that none reached a period.
 _DRIFT: Final = 0.02 * 2 * np.pi
 
+# A parameter whose derivatives are smaller, for energies of about 1, has no effect; squares below it underflow.
+_NO_EFFECT: Final = 1e-100
+MAX_STRUCTURE: Final = (
+    0.02  # share of std(E), 30 times what one real solver leaves with one mode
+)
+# Standard deviations of white noise's covariance beyond which a rest has structure, and is surely structured.
+_DEVIATIONS: Final = 3.0
+_BEYOND_DOUBT: Final = 6.0
+# Samples farther apart may share more of a slow structure than neighbours, at most twice its variance.
+_BEYOND_STRUCTURE: Final = 2.0
+
 
 def fit_few(
     poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float
@@ -74,11 +85,11 @@ def fit_few(
 
     None if the fit leaves more than ``worst`` of the variance.
     """
-    few = _few(s, e)
+    few_states = _take_few(s, e)
     return refine(
-        _starts(poles, *few, size=size),
-        partial(energy_and_jacobian, size=size),
-        *few,
+        _find_starts(poles, *few_states, size=size),
+        partial(compute_energy_and_jacobian, size=size),
+        *few_states,
         worst,
     )
 
@@ -87,7 +98,9 @@ def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
     """Return the parameters for all samples from those of `fit_few`; None under the conditions of `fit_all`."""
-    best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst, slice(1))
+    best = fit_all(
+        few, partial(compute_energy_and_jacobian, size=size), s, e, worst, slice(1)
+    )
     if best is None:
         return None
     if best[5] < 0:  # q and -q have the same energy; the preload is made positive
@@ -111,30 +124,33 @@ def fit_all(
     some of the samples are left with too much structure.  A fit that leaves far too much is not refined for all
     samples, since it will be refused and would converge slowly; so would a drift that follows the samples.
     """
-    quick, few = np.isfinite(worst), _few(s, e)
-    if best is None or (quick and _structured(best, model, *few)):
+    quick = np.isfinite(worst)
+    few_states = _take_few(s, e)
+    if best is None or (quick and _is_structured(best, model, *few_states)):
         return None
-    if few[0].size == s.size:
+    if few_states[0].size == s.size:
         return best
-    some = _few(s, e, _MEDIUM)
-    if some[0].size < s.size:
-        best, left = minimise(best, model, *some, near=_NEAR)
-        if quick and _structured(best, model, *some):
+    some_states = _take_few(s, e, _MEDIUM)
+    if some_states[0].size < s.size:
+        best, steps_left = refine_parameters(best, model, *some_states, near=_NEAR)
+        if quick and _is_structured(best, model, *some_states):
             return None
-        if left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some[0].size * float(np.var(some[1])):
+        if steps_left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some_states[0].size * float(
+            np.var(some_states[1])
+        ):
             return best
 
     def doomed(found: Samples) -> bool:
         """Return True if these parameters will be refused."""
         if not quick or np.abs(found[rates]).min() > _DRIFT:
             return False
-        rest = e - evaluated(found, model, s)[0]
-        return structure_of(rest) < MAX_STRUCTURE * float(np.std(e))
+        remainder = e - evaluate_energies(found, model, s)[0]
+        return measure_structure(remainder) < MAX_STRUCTURE * float(np.std(e))
 
-    return minimise(best, model, s, e, doomed=doomed)[0]
+    return refine_parameters(best, model, s, e, doomed=doomed)[0]
 
 
-def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
+def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
     """Return ``most`` of the samples, evenly spaced; by default those on which starts are compared."""
     stride = -(-s.size // most)
     return s[::stride], e[::stride]
@@ -145,19 +161,20 @@ def refine(
 ) -> Samples | None:
     """Return the best of the refined starts; None if all leave more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
-    best, least = None, worst * variance
+    best = None
+    least_cost = worst * variance
     for start in starts:
-        found, cost = minimise(start, model, s, e, worst * variance)
-        if cost <= least:
-            best, least = found, cost
-        if least < CERTAIN * variance:
+        parameters, cost = refine_parameters(start, model, s, e, worst * variance)
+        if cost <= least_cost:
+            best, least_cost = parameters, cost
+        if least_cost < CERTAIN * variance:
             break
     return best
 
 
-def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
+def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
     """Return True if the rest of the best fit to evenly spaced samples refuses the fit to all of them."""
-    return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
+    return has_clear_structure(e - model(parameters, s)[0], float(np.std(e)))
 
 
 class Pencil(NamedTuple):
@@ -174,8 +191,8 @@ class Pencil(NamedTuple):
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
         """Compute the vectors, those with the largest share of E first."""
-        running = integral(s, e)
-        fine = cell_means(s, running, min(s.size - 1, _MAX_CELLS))
+        running = integrate_by_trapezia(s, e)
+        fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
         periods = int(
             np.argmax(power * np.arange(power.size))
@@ -183,7 +200,7 @@ class Pencil(NamedTuple):
         count = min(
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
-        cells = cell_means(s, running, count)
+        cells = average_cells(s, running, count)
         hankel = np.lib.stride_tricks.sliding_window_view(
             cells, min(_LAGS, count // 2) + 1
         )
@@ -194,11 +211,11 @@ class Pencil(NamedTuple):
 
         ``orders`` are the numbers of exponentials to try.
         """
-        z = np.concatenate([factors_of(self.vectors[:, :order]) for order in orders])
+        z = np.concatenate([find_factors(self.vectors[:, :order]) for order in orders])
         return np.asarray(np.log(z[z.imag > 0]) * self.cells)
 
 
-def factors_of(vectors: Samples) -> NDArray[np.complex128]:
+def find_factors(vectors: Samples) -> NDArray[np.complex128]:
     """Return the factors z of exponentials z**k from ``vectors`` that span their windows over k, shape (n, order).
 
     A shift by one maps the space of the windows to itself; the factors are the eigenvalues.
@@ -207,14 +224,14 @@ def factors_of(vectors: Samples) -> NDArray[np.complex128]:
     return np.linalg.eigvals(shift).astype(np.complex128)
 
 
-def cell_means(s: Samples, running: Samples, count: int) -> Samples:
+def average_cells(s: Samples, running: Samples, count: int) -> Samples:
     """Return means over equal cells of [0, 1], from the ``running`` integral over s."""
     return np.asarray(
         np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count
     )
 
 
-def _starts(
+def _find_starts(
     poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int
 ) -> list[Samples]:
     """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
@@ -223,12 +240,11 @@ def _starts(
     Im p).  For given rates E is linear in products of the other parameters, and their fit ranks the rates and gives the
     parameters.
     """
-    omega, alpha = poles.imag / 2, -poles.real
+    omega = poles.imag / 2
+    alpha = -poles.real
     if size == WITH_PRELOAD:
-        omega, alpha = (
-            np.concatenate((omega, 2 * omega)),
-            np.concatenate((alpha, 2 * alpha)),
-        )
+        omega = np.concatenate((omega, 2 * omega))
+        alpha = np.concatenate((alpha, 2 * alpha))
     alpha = np.maximum(
         alpha, -1.0
     )  # growth is refused later; this keeps exp from overflowing
@@ -247,9 +263,10 @@ def _starts(
     )
     norm = np.linalg.norm(basis, axis=2)
     normal = basis @ basis.transpose(0, 2, 1) / (norm[:, :, None] * norm[:, None, :])
-    right = (basis @ e / norm)[..., None]
+    projections = (basis @ e / norm)[..., None]
     linear = (
-        np.linalg.solve(normal + 1e-10 * np.eye(norm.shape[1]), right)[..., 0] / norm
+        np.linalg.solve(normal + 1e-10 * np.eye(norm.shape[1]), projections)[..., 0]
+        / norm
     )
     misfit = np.sum((e - (linear[:, None] @ basis)[:, 0]) ** 2, axis=1)
     linear = np.pad(linear, ((0, 0), (0, 6 - linear.shape[1])))
@@ -262,15 +279,16 @@ def _starts(
     for start in table[np.argsort(misfit)]:
         # two starts within half a radian over the record lie in the same valley
         if all(
-            abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5
-            for other in best
+            abs(start[0] - start_before[0]) > 0.5
+            or abs(start[1] - start_before[1]) > 0.5
+            for start_before in best
         ):
             best.append(start)
     return best[:STARTS]
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far is rejected
-def minimise(
+def refine_parameters(
     parameters: Samples,
     model: Model,
     s: Samples,
@@ -286,9 +304,9 @@ def minimise(
     ``doomed``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
-    cost, normal, gradient = _normal_equations(parameters, model, s, e)
+    cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
     free = gradient.size
-    for left in range(_MAX_STEPS, 0, -1):
+    for steps_left in range(_MAX_STEPS, 0, -1):
         scale = np.sqrt(normal.diagonal()) + 1e-150
         damped = normal / (scale * scale[:, None])
         damped.flat[:: free + 1] += damping
@@ -296,41 +314,44 @@ def minimise(
         trial = parameters.copy()
         trial[:free] += step
         expected = float(step @ gradient)
-        trial_cost, *trial_equations = _normal_equations(trial, model, s, e)
+        trial_cost, *trial_equations = _build_normal_equations(trial, model, s, e)
         if trial_cost <= cost:
             parameters, cost, (normal, gradient) = trial, trial_cost, trial_equations
             damping = max(damping / 10, 1e-10)
-            if left * expected < cost - hopeless:
+            if steps_left * expected < cost - hopeless:
                 break
         else:
             damping *= 10
         if expected <= near * cost + 1e-31 * e.size or (
-            left == _MAX_STEPS - _USUAL and doomed(parameters)
+            steps_left == _MAX_STEPS - _USUAL and doomed(parameters)
         ):
             break
     return parameters, cost
 
 
-def _normal_equations(
+def _build_normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
     """Return the sum of squares of the rest, J J^T and J rest, computed block by block."""
-    cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
+    cost = 0.0
+    normal = np.zeros(())
+    gradient = np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
         energy, jacobian = model(parameters, s[block])
-        rest = e[block] - energy
-        cost, normal, gradient = (
-            cost + float(rest @ rest),
-            normal + jacobian @ jacobian.T,
-            gradient + jacobian @ rest,
-        )
+        remainder = e[block] - energy
+        cost = cost + float(remainder @ remainder)
+        normal = normal + jacobian @ jacobian.T
+        gradient = gradient + jacobian @ remainder
     return cost, normal, gradient
 
 
-def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, Samples]:
+def evaluate_energies(
+    parameters: Samples, model: Model, s: Samples
+) -> tuple[Samples, Samples]:
     """Return energies (n,) and J J^T (p, p) of their derivatives, block by block to save memory."""
-    energy, normal = np.empty(s.size), np.zeros(())
+    energy = np.empty(s.size)
+    normal = np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
         energy[block], jacobian = model(parameters, s[block])
@@ -338,11 +359,7 @@ def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, S
     return energy, normal
 
 
-# A parameter whose derivatives are smaller, for energies of about 1, has no effect; squares below it underflow.
-_NO_EFFECT: Final = 1e-100
-
-
-def covariance(normal: Samples, rest: Samples) -> Samples:
+def compute_covariance(normal: Samples, rest: Samples) -> Samples:
     """Return s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
     norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
@@ -351,18 +368,7 @@ def covariance(normal: Samples, rest: Samples) -> Samples:
     return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
 
 
-MAX_STRUCTURE: Final = (
-    0.02  # share of std(E), 30 times what one real solver leaves with one mode
-)
-
-# Standard deviations of white noise's covariance beyond which a rest has structure, and is surely structured.
-_DEVIATIONS: Final = 3.0
-_BEYOND_DOUBT: Final = 6.0
-# Samples farther apart may share more of a slow structure than neighbours, at most twice its variance.
-_BEYOND_STRUCTURE: Final = 2.0
-
-
-def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
+def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
     """Return the root of the neighbours' covariance in ``rest`` beyond ``deviations`` of white noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
@@ -374,15 +380,16 @@ def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
             np.linalg.norm(products)
         )
 
-    most = max(0.0, *(excess(rest[:-lag] * rest[lag:]) for lag in (1, 2)))
-    return float(np.sqrt(most / rest.size))
+    largest_excess = max(0.0, *(excess(rest[:-lag] * rest[lag:]) for lag in (1, 2)))
+    return float(np.sqrt(largest_excess / rest.size))
 
 
-def surely_structured(rest: Samples, spread: float) -> bool:
+def has_clear_structure(rest: Samples, spread: float) -> bool:
     """Return True if the rest on evenly spaced samples shows that all samples leave too much structure.
 
     ``spread`` is the standard deviation of the energy there.
     """
     return (
-        structure_of(rest, _BEYOND_DOUBT) > _BEYOND_STRUCTURE * MAX_STRUCTURE * spread
+        measure_structure(rest, _BEYOND_DOUBT)
+        > _BEYOND_STRUCTURE * MAX_STRUCTURE * spread
     )

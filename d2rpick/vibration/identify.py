@@ -11,7 +11,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import Memory
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.modes import Mode, energy_and_jacobian
+from d2rpick.vibration.modes import Mode, compute_energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -146,33 +146,35 @@ def identify(
     >>> identify(t, np.ones(121)).reason
     'the energy is constant, 1: nothing vibrates'
     """
-    if lacking := _lacking(time, energy):
+    if lacking := _refuse_short_record(time, energy):
         return lacking
     record = _Record.scaled(time, energy)
     poles = record.pencil(memory).rates()
     if poles.size == 0:
-        return _nothing(
+        return _refuse_without_fit(
             time, "the energy does not oscillate: nothing vibrates, or it is overdamped"
         )
     worst = HOPELESS if quick else np.inf
-    few = cache(lambda size: fitting.fit_few(poles, record.s, record.e, size, worst))
+    fit_some = cache(
+        lambda size: fitting.fit_few(poles, record.s, record.e, size, worst)
+    )
     if (
-        quick and few(fitting.WITH_PRELOAD) is None
+        quick and fit_some(fitting.WITH_PRELOAD) is None
     ):  # others leave more than the richest model
-        return _out_of_reach(time)
+        return _is_out_of_reach(time)
     fits = (
-        (fitting.fit(few(size), record.s, record.e, size, worst), size, periods)
+        (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
         for size, periods in _MODELS
     )
     attempts = (
-        (_attempt(found, size, record), most)
-        for found, size, most in fits
-        if found is not None
+        (_evaluate_attempt(parameters, size, record), most_periods)
+        for parameters, size, most_periods in fits
+        if parameters is not None
     )
-    return _first_to_follow(attempts, record)
+    return _choose_first_to_follow(attempts, record)
 
 
-def _first_to_follow(
+def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
     """Judge fits with their least number of periods, the simplest first; else return the refused fit that is nearest.
@@ -181,18 +183,17 @@ def _first_to_follow(
     """
     refused: list[Identification] = []
     for attempt, least_periods in attempts:
-        found = _judged(attempt, least_periods, record)
-        if found.follows:
-            return _through_zero(found, [one for one in refused if one.plausible])
-        refused.append(found)
-    return (
-        min(refused, key=lambda one: one.rms)
-        if refused
-        else _out_of_reach(np.array([record.start, record.end]))
-    )
+        identification = _judge_attempt(attempt, least_periods, record)
+        if identification.follows:
+            plausible = [refusal for refusal in refused if refusal.plausible]
+            return _prefer_through_zero(identification, plausible)
+        refused.append(identification)
+    if refused:
+        return min(refused, key=lambda identification: identification.rms)
+    return _is_out_of_reach(np.array([record.start, record.end]))
 
 
-def _through_zero(
+def _prefer_through_zero(
     found: Identification, simple: list[Identification]
 ) -> Identification:
     """Give for a vibration that a preload keeps off zero the one of half its rate that passes zero, if it is near.
@@ -201,28 +202,26 @@ def _through_zero(
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
     residuals are twice as large, which counts like a hidden mode.
     """
-    mode, near = (
-        found.mode,
-        [
-            one
-            for one in simple
-            if one.misfit is not None and one.misfit < MAX_OF_SPRING
-        ],
-    )
+    mode = found.mode
+    near = [
+        identification
+        for identification in simple
+        if identification.misfit is not None and identification.misfit < MAX_OF_SPRING
+    ]
     if (
         not near
         or mode is None
         or mode.preload**2 <= float(mode.vibration_energy(found.start))
     ):
         return found
-    best = min(near, key=lambda one: one.rms)
+    best = min(near, key=lambda identification: identification.rms)
     return best._replace(
         describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD
     )
 
 
-def _out_of_reach(time: Samples) -> Identification:
-    return _nothing(
+def _is_out_of_reach(time: Samples) -> Identification:
+    return _refuse_without_fit(
         time,
         f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}",
     )
@@ -235,13 +234,13 @@ def judge_given(
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
     """
-    if lacking := _lacking(time, energy):
+    if lacking := _refuse_short_record(time, energy):
         return lacking
-    few = slice(None, None, -(-time.size // fitting.COARSE))
-    if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(
-        energy[few]
-    ):
-        return _out_of_reach(time)
+    every_so_many = slice(None, None, -(-time.size // fitting.COARSE))
+    if quick and np.var(
+        energy[every_so_many] - mode.energy(time[every_so_many])
+    ) > HOPELESS * np.var(energy[every_so_many]):
+        return _is_out_of_reach(time)
     record = _Record.scaled(time, energy)
     start = record.start
     cosine = mode.deformation(start) - mode.preload
@@ -249,8 +248,10 @@ def judge_given(
     parameters = np.array(
         [mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload]
     )
-    held = _judged(
-        _attempt(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record
+    held = _judge_attempt(
+        _evaluate_attempt(parameters / record.units, fitting.WITH_PRELOAD, record),
+        0.0,
+        record,
     )
     reason = None if held.follows else held.reason
     return held._replace(
@@ -272,7 +273,9 @@ class _Record(NamedTuple):
 
     @classmethod
     def scaled(cls, time: Samples, energy: Samples) -> _Record:
-        start, end, scale = float(time[0]), float(time[-1]), float(np.ptp(energy))
+        start = float(time[0])
+        end = float(time[-1])
+        scale = float(np.ptp(energy))
         # older versions of numpy report an overflow where they divide numbers this small, and divide rightly
         with np.errstate(over="ignore"):
             scaled = energy / scale
@@ -287,21 +290,23 @@ class _Record(NamedTuple):
     @property
     def units(self) -> Samples:
         """Return the units of the fit's parameters in those of the record."""
-        rate, root = 1 / (self.end - self.start), self.scale**0.5
+        rate = 1 / (self.end - self.start)
+        root = self.scale**0.5
         return np.array([rate, rate, root, root, self.scale, root])
 
 
-def _lacking(time: Samples, energy: Samples) -> Identification | None:
+def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
     """Return a refusal of a record that has too little for any judgement, else None."""
     if time.size < MIN_SAMPLES:
-        found = "1 state" if time.size == 1 else f"{time.size} states"
-        return _nothing(
-            time, f"there are only {found} to fit, at least {MIN_SAMPLES} are needed"
+        states_text = "1 state" if time.size == 1 else f"{time.size} states"
+        return _refuse_without_fit(
+            time,
+            f"there are only {states_text} to fit, at least {MIN_SAMPLES} are needed",
         )
     if float(np.ptp(energy)) <= 1e-12 * float(
         np.max(np.abs(energy))
     ):  # rounding of a constant
-        return _nothing(
+        return _refuse_without_fit(
             time, f"the energy is constant, {energy[0]:g}: nothing vibrates"
         )
     return None
@@ -317,40 +322,39 @@ class _Attempt(NamedTuple):
     units: Samples
 
 
-def _attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
+def _evaluate_attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
     """Evaluate the fit of one mode with its first ``size`` parameters free."""
-    fitted, normal = fitting.evaluated(
-        parameters, partial(energy_and_jacobian, size=size), record.s
+    fitted, normal = fitting.evaluate_energies(
+        parameters, partial(compute_energy_and_jacobian, size=size), record.s
     )
-    scaled, mode = (
-        _mode(parameters, 0.0),
-        _mode(parameters * record.units, record.start),
-    )
+    scaled = _make_mode(parameters, 0.0)
+    mode = _make_mode(parameters * record.units, record.start)
     return _Attempt(scaled, mode, fitted, normal, record.units[:size])
 
 
-def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identification:
+def _judge_attempt(
+    attempt: _Attempt, least_periods: float, record: _Record
+) -> Identification:
     """Return a fit with its verdict."""
-    s, e = record.s, record.e
-    density = samples_per_period(
+    s = record.s
+    e = record.e
+    density = count_samples_per_period(
         s, attempt.scaled
     )  # first, since it needs as much memory as everything after it
-    rest = e - attempt.energy
-    rms, spread, structure = (
-        float(np.sqrt(np.mean(rest**2))),
-        float(np.std(e)),
-        fitting.structure_of(rest),
-    )
+    remainder = e - attempt.energy
+    rms = float(np.sqrt(np.mean(remainder**2)))
+    spread = float(np.std(e))
+    structure = fitting.measure_structure(remainder)
     local = attempt.scaled.vibration_energy(s)
     vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
     # if noise exceeds the vibration, a rest does not show a further mode
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
-    local_structure = fitting.structure_of(np.divide(rest, local, out=local))
-    loose = _loose(rms / spread, structure / spread, local_structure)
-    wrong = _implausible(
+    local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))
+    loose = _explain_misfit(rms / spread, structure / spread, local_structure)
+    objection = _explain_implausible(
         attempt.scaled, density, least_periods, record.end - record.start
     )
-    reason = loose or wrong
+    reason = loose or objection
     return Identification(
         mode=attempt.mode,
         describes_record=reason is None,
@@ -360,29 +364,37 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identif
         structure=structure * record.scale,
         start=record.start,
         end=record.end,
-        covariance=fitting.covariance(attempt.normal, rest)
+        covariance=fitting.compute_covariance(attempt.normal, remainder)
         * attempt.units
         * attempt.units[:, None],
         vibration=vibration * record.scale,
         follows=loose is None,
-        plausible=wrong is None,
+        plausible=objection is None,
     )
 
 
-def _loose(misfit: float, structure: float, local_structure: float) -> str | None:
+def _explain_misfit(
+    misfit: float, structure: float, local_structure: float
+) -> str | None:
     """Return the reason why the fit does not follow the samples, None if it does."""
     if misfit > MAX_MISFIT:
         return f"one oscillator misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > fitting.MAX_STRUCTURE:
-        found = f"one oscillator deviates systematically by {structure:.2g} of the standard deviation of the energy"
-        return f"{found}, more than {fitting.MAX_STRUCTURE}"
+        deviation_text = (
+            f"one oscillator deviates systematically by {structure:.2g} of the standard "
+            "deviation of the energy"
+        )
+        return f"{deviation_text}, more than {fitting.MAX_STRUCTURE}"
     if local_structure > MAX_LOCAL_STRUCTURE:
-        found = f"one oscillator deviates systematically by {local_structure:.2g} of the vibration energy at the time"
-        return f"{found}, more than {MAX_LOCAL_STRUCTURE}"
+        deviation_text = (
+            f"one oscillator deviates systematically by {local_structure:.2g} of the "
+            "vibration energy at the time"
+        )
+        return f"{deviation_text}, more than {MAX_LOCAL_STRUCTURE}"
     return None
 
 
-def samples_per_period(time: Samples, mode: Mode) -> float:
+def count_samples_per_period(time: Samples, mode: Mode) -> float:
     """Return the number of samples per energy period of the fastest mode, in four digits.
 
     The energy has two periods per vibration period.  A record is often written with a round number of states per
@@ -393,35 +405,35 @@ def samples_per_period(time: Samples, mode: Mode) -> float:
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
 
-def _implausible(
+def _explain_implausible(
     mode: Mode, density: float, least_periods: float, span: float
 ) -> str | None:
     """Return the reason why a scaled fit that follows the samples is no evidence of one free vibration, else None."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
-        found = f"the record shows {periods:.3g} vibration periods"
-        return f"{found}, fewer than the {least_periods} needed to tell a vibration from a drift"
+        finding = f"the record shows {periods:.3g} vibration periods"
+        return f"{finding}, fewer than the {least_periods} needed to tell a vibration from a drift"
     if mode.alpha < -MAX_GROWTH:
-        found = f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}"
-        return f"{found}: something drives it"
+        finding = f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}"
+        return f"{finding}: something drives it"
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
         # 10 % finer than the limit, so that rounding to two digits stays on the safe side
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
-        found = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
-        return f"{found}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
+        finding = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
+        return f"{finding}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
     return None
 
 
-def _mode(parameters: Samples, origin: float) -> Mode:
+def _make_mode(parameters: Samples, origin: float) -> Mode:
     """Return the mode of some parameters."""
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, origin, plastic, preload)
 
 
-def _nothing(time: Samples, reason: str) -> Identification:
+def _refuse_without_fit(time: Samples, reason: str) -> Identification:
     """Refuse a record to which nothing was fitted."""
     start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
     return Identification(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import median
+from d2rpick.histories.samples import compute_median
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,7 +83,7 @@ class Grid(NamedTuple):
         return np.where(np.abs(half) < 1e-12, 1.0, gain)
 
 
-def even_grid(time: Samples, energy: Samples) -> Grid:
+def make_even_grid(time: Samples, energy: Samples) -> Grid:
     """Bring an energy to an even grid that keeps every line that matters.
 
     Parameters
@@ -103,7 +103,7 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
     # white noise has as much power at the highest rates as anywhere
-    noise = _ABOVE_NOISE * float(median(power[power.size // 2 :]))
+    noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(
         running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
@@ -211,7 +211,7 @@ def predict(grid: Grid) -> Prediction | None:
     if not swing > 0:
         return None
     first = grid.first(int(FIRST_PART * grid.time.size))
-    behind = slice(first.time.size, None)
+    rest_of_grid = slice(first.time.size, None)
     space = _SignalSpace.of(first)
     tried: list[tuple[float, int, bool, Spectrum]] = []
     for order in _ORDERS:
@@ -220,9 +220,11 @@ def predict(grid: Grid) -> Prediction | None:
         poles = space.poles(order)
         for every_decay in (False, True):
             spectrum = fit_spectrum(first, poles, grid.span, every_decay=every_decay)
-            predicted = _block_means(spectrum, grid.time[behind], grid)
-            off = float(np.sqrt(np.mean((predicted - grid.energy[behind]) ** 2)))
-            missed = float(np.hypot(off, spectrum.error)) / swing
+            predicted = _average_blocks(spectrum, grid.time[rest_of_grid], grid)
+            error = float(
+                np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
+            )
+            missed = float(np.hypot(error, spectrum.error)) / swing
             if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
         if tried[-1][0] < _PERFECT:
@@ -259,8 +261,8 @@ class _SignalSpace:
         factors = np.linalg.eigvals(
             np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
         )
-        kept = np.isfinite(factors) & (np.abs(factors) > 1e-6)
-        return np.asarray(np.log(factors[kept].astype(np.complex128)) / self.step)
+        is_usable = np.isfinite(factors) & (np.abs(factors) > 1e-6)
+        return np.asarray(np.log(factors[is_usable].astype(np.complex128)) / self.step)
 
 
 def fit_spectrum(
@@ -271,29 +273,31 @@ def fit_spectrum(
     ``every_decay``: the mean has that of each line as it is, which noise allows of few lines alone.
     """
     lines, mean = _split(poles, span, every_decay=every_decay)
-    every = np.concatenate([lines, mean])
-    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(
-        every
+    all_poles = np.concatenate([lines, mean])
+    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], all_poles)) * grid.gain(
+        all_poles
     )
-    swinging = every.imag > 0
+    swinging = all_poles.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
-    found = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
-    weights = found[: every.size].astype(np.complex128)
-    weights[swinging] += 1j * found[every.size :]
-    origin, count = float(grid.time[0]), lines.size
-    rest = grid.energy - design @ found
+    solution = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
+    weights = solution[: all_poles.size].astype(np.complex128)
+    weights[swinging] += 1j * solution[all_poles.size :]
+    origin = float(grid.time[0])
+    count = lines.size
+    remainder = grid.energy - design @ solution
     return Spectrum(
         Exponentials(lines, weights[:count], origin),
         Exponentials(mean, weights[count:], origin),
-        rest,
+        remainder,
     )
 
 
-def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
+def _average_blocks(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
     """Return the means of a spectrum over blocks centred at some times [energy]."""
-    both = (spectrum.lines, spectrum.mean)
+    waves_and_mean = (spectrum.lines, spectrum.mean)
     means = [
-        (one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both
+        (waves.waves(time) @ (waves.weights * grid.gain(waves.poles))).real
+        for waves in waves_and_mean
     ]
     return np.asarray(means[0] + means[1])
 

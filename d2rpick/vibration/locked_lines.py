@@ -38,31 +38,34 @@ def find_stretches(
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
     """
-    size, rate = np.abs(lines.weights), lines.poles.imag
+    size = np.abs(lines.weights)
+    rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
     strongest = float(size.max(initial=0.0))
     order = np.argsort(-size).tolist()
-    found: list[Stretch] = []
+    stretches: list[Stretch] = []
     for line in order:
         if size[line] < max(NOTABLE * strongest, ABOVE_SCATTER * scatter):
             continue
-        for own in order:
-            if own == line or size[own] < max(
+        for own_line in order:
+            if own_line == line or size[own_line] < max(
                 _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
             ):
                 continue
-            if abs(rate[own] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
+            if abs(rate[own_line] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
                 continue
-            unsure = 3 * min(scatter / size[own] + 2 * scatter / size[line], 0.1)
+            unsure = 3 * min(scatter / size[own_line] + 2 * scatter / size[line], 0.1)
             if (
-                abs(_wrap(phase[own] - 2 * phase[line], 2 * np.pi))
+                abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
                 < _SAME_PHASE + unsure
             ):
-                found.append(
-                    Stretch(line, own, float(size[line] ** 2 / (8 * size[own])))
+                stretches.append(
+                    Stretch(
+                        line, own_line, float(size[line] ** 2 / (8 * size[own_line]))
+                    )
                 )
                 break
-    return tuple(found)
+    return tuple(stretches)
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
@@ -70,7 +73,8 @@ def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
-    size, rate = np.abs(lines.weights), lines.poles.imag
+    size = np.abs(lines.weights)
+    rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
     if size.size < 3:
         return 0.0

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.histories.samples import first_above, narrow
+from d2rpick.histories.samples import find_first_above, narrow_brackets
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     # Function that returns the stated, lowest and highest residual of each tr, from the residual of the deformations,
     # tr and td [-].
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
+
+# Growth of the lock-in error that ``timing_tolerance`` allows.
+TOLERATED_GROWTH = 0.05
+# By so many damping ratios R^2 depends on the phases at td, at most by two.
+_PHASES_COUNT = 1.5
 
 
 class Deformation(Protocol):
@@ -109,10 +114,6 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 def compared(columns: Columns) -> NDArray[np.bool_]:
     """Return for each time whether its deformation can be compared with that at td."""
     return ~np.isnan(columns["sign_match"])
-
-
-# Growth of the lock-in error that ``timing_tolerance`` allows.
-TOLERATED_GROWTH = 0.05
 
 
 def level_error(energy: Samples | float, level: Samples | float) -> Samples:
@@ -195,13 +196,10 @@ def band_about(
     It may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No square is
     below zero: where it may reach there, the middle of what remains is stated.
     """
-    low, high = np.maximum(squared - off, 0.0), squared + off
+    low = np.maximum(squared - off, 0.0)
+    high = squared + off
     lowest = np.maximum(low - left_out, 0.0)
     return np.sqrt((low + high) / 2), np.sqrt(lowest), np.sqrt(high + hidden)
-
-
-# By so many damping ratios R^2 depends on the phases at td, at most by two.
-_PHASES_COUNT = 1.5
 
 
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
@@ -270,7 +268,8 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(
         mode.vibration_energy(td)
     )
-    half, still = np.pi / mode.omega, mode.standstill_after(tr)
+    half = np.pi / mode.omega
+    still = mode.standstill_after(tr)
     # standstills between which q is monotone, on both sides of tr, in columns side by side
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
@@ -287,18 +286,20 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     outside[0] = False  # tr itself is inside, whatever rounding gives
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
-    inner, outer = edges[first[column] - 1, column], edges[first[column], column]
+    inner = edges[first[column] - 1, column]
+    outer = edges[first[column], column]
     # beyond the band on the side where q leaves it
-    middle, most = wanted[column], room[column]
+    middle = wanted[column]
+    tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
-    found = narrow(
-        lambda t: most - side * (mode.deformation(t) - middle),
+    leaving_time = narrow_brackets(
+        lambda t: tolerated - side * (mode.deformation(t) - middle),
         inner,
         outer,
         slope=lambda t: -side * mode.velocity(t),
     )
     distances = np.full(room.size, np.inf)
-    distances[column] = np.abs(found.at - edges[0, column])
+    distances[column] = np.abs(leaving_time.at - edges[0, column])
     return distances
 
 
@@ -306,13 +307,12 @@ def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
     """Return times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
-    before, after = time[at] - time[at - 1], time[at + 1] - time[at]
-    fall, rise = (
-        (values[at] - values[at - 1]) / before,
-        (values[at + 1] - values[at]) / after,
-    )
-    bend = (rise - fall) / (before + after)
-    slope = (fall * after + rise * before) / (before + after)
+    step_before = time[at] - time[at - 1]
+    step_after = time[at + 1] - time[at]
+    fall = (values[at] - values[at - 1]) / step_before
+    rise = (values[at + 1] - values[at]) / step_after
+    bend = (rise - fall) / (step_before + step_after)
+    slope = (fall * step_after + rise * step_before) / (step_before + step_after)
     # beside an unbounded value a sample is its own vertex, like on a straight line
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
@@ -330,14 +330,15 @@ class Profile(NamedTuple):
     @classmethod
     def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
         """Compute the profile at the times before ``td``."""
-        before = time[
+        time_before = time[
             : np.searchsorted(time, td)
         ]  # views: a copy for each td would fill the memory
-        return cls(before, lock_in_error(vibration, before, td))
+        return cls(time_before, lock_in_error(vibration, time_before, td))
 
     def minima(self) -> tuple[float, ...]:
         """Return the times of the local minima, from parabolas through three squares, since L^2 is smooth [time]."""
-        t, square = self.time, self.error**2
+        t = self.time
+        square = self.error**2
         if t.size < 3:
             return ()
         at = (
@@ -350,29 +351,31 @@ class Profile(NamedTuple):
         """Interval between the two times around each of ``at``; infinite without two times [time]."""
         if self.time.size < 2:
             return np.full(np.shape(at), np.inf)
-        after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
-        return np.asarray(self.time[after] - self.time[after - 1])
+        next_state = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
+        return np.asarray(self.time[next_state] - self.time[next_state - 1])
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
         """Return how far each tr (n,) may be off before its error grows by 0.05; at most the profile's length [time].
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
-        limit, middle, last = (
-            errors + TOLERATED_GROWTH,
-            np.searchsorted(self.time, tr),
-            self.time.size - 1,
+        limit = errors + TOLERATED_GROWTH
+        middle = np.searchsorted(self.time, tr)
+        last = self.time.size - 1
+        first_after = find_first_above(self.error, middle, limit)
+        last_before = last - find_first_above(
+            self.error[::-1], last + 1 - middle, limit
         )
-        after = first_above(self.error, middle, limit)
-        before = last - first_above(self.error[::-1], last + 1 - middle, limit)
-        most = np.full(tr.shape, self.time[-1] - self.time[0])
-        for outside, inwards in ((after, -1), (before, 1)):
-            there = np.flatnonzero((outside >= 0) & (outside <= last))
-            most[there] = np.fmin(
-                most[there],
-                self._leaving(outside[there], inwards, tr[there], limit[there]),
+        tolerance = np.full(tr.shape, self.time[-1] - self.time[0])
+        for outside, inwards in ((first_after, -1), (last_before, 1)):
+            is_inside = np.flatnonzero((outside >= 0) & (outside <= last))
+            tolerance[is_inside] = np.fmin(
+                tolerance[is_inside],
+                self._leaving(
+                    outside[is_inside], inwards, tr[is_inside], limit[is_inside]
+                ),
             )
-        return most
+        return tolerance
 
     def _leaving(
         self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples

@@ -81,9 +81,10 @@ class Reading:
 
     def level(self, t: Samples | float) -> Samples:
         """Return H, the energy of all modes without its changes within a period, of the shape of ``t`` [energy]."""
-        level = (
-            2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
-        )
+        if self.no_static:
+            level = 2 * self.spectrum.mean.at(t)
+        else:
+            level = self.level_of_modes(t)
         return np.maximum(level, self.tiny)
 
     def vibration_energy(self, t: Samples | float) -> Samples:

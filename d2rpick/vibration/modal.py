@@ -16,7 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
-from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
+from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
     ABOVE_SCATTER,
     NOTABLE,
@@ -235,16 +235,16 @@ class ModalVibration:
         """Return what a choice rests on, in words: the modes by their rates."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
-        span = (
-            f"omega {rates[0]:.4g}"
-            if rates.size == 1
-            else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
-        )
+        if rates.size == 1:
+            span = f"omega {rates[0]:.4g}"
+        else:
+            span = f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
         """Return the modes with their energy at ``td``, the slowest first."""
-        poles, energies = self.reading.modes.poles, self.reading.energies_of_modes(td)
+        poles = self.reading.modes.poles
+        energies = self.reading.energies_of_modes(td)
         rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
         return sorted(ModeAtTd(*map(float, row)) for row in rows)
 
@@ -324,25 +324,25 @@ class ModalVibration:
             / level
         )
         scatter = self.noise / level * np.sqrt(5 * self.systematic + 0.5)
-        beside = (
-            0.0
-            if self.second is None
-            else np.abs(self.second.residual_squared(tr, td) - squared)
-        )
+        width_of_neglected = np.zeros_like(squared)
+        if self.second is not None:
+            width_of_neglected = np.abs(self.second.residual_squared(tr, td) - squared)
         return np.asarray(
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
             + np.minimum(lines, 1.0)
             + _NOISE_COUNTS * scatter
             + self._phase_share * squared
-            + beside
+            + width_of_neglected
             + self._of_other_readings(tr, td, squared)
         )
 
     @cached_property
     def is_vague(self) -> bool:
         """Return True if the band of most pairs is so wide that it hardly separates them."""
-        some = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
-        widths = [self.half_width(some, td) for td in some[:: _SOME_TIMES // 8]]
+        some_times = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
+        widths = [
+            self.half_width(some_times, td) for td in some_times[:: _SOME_TIMES // 8]
+        ]
         return bool(np.mean(np.array(widths) > _VAGUE_HALF) > 0.5)
 
     def residual_band(
@@ -365,7 +365,8 @@ class ModalVibration:
     def _phase_share(self) -> float:
         """Share of R^2 that depends on the phases at td, of all modes [-]."""
         modes = self.reading.modes
-        poles, sizes = modes.poles, np.abs(modes.weights)
+        poles = modes.poles
+        sizes = np.abs(modes.weights)
         shares = measures.phase_share(-poles.real, poles.imag / 2)
         return float(sizes @ shares / max(float(sizes.sum()), 1e-300))
 
@@ -386,12 +387,13 @@ class ModalVibration:
     ) -> Samples:
         """Return how far R^2 may be off because the lines can be interpreted in another way [-]."""
         apart = [
-            np.abs(other.residual_squared(tr, td) - squared) for other in self.others
+            np.abs(reading.residual_squared(tr, td) - squared)
+            for reading in self.others
         ]
         if self.reading.no_static or self.is_ambiguous:
-            return (
-                np.asarray(np.max(apart, axis=0)) if apart else np.zeros(squared.shape)
-            )
+            if apart:
+                return np.asarray(np.max(apart, axis=0))
+            return np.zeros(squared.shape)
         # lines hidden in the rest have at most this energy beside the identified ones
         hidden = (
             2
@@ -441,7 +443,7 @@ def identify_modal(
     """
     if time.size < _FEWEST_STATES:
         return None
-    grid = even_grid(time, energy)
+    grid = make_even_grid(time, energy)
     prediction = predict(grid)
     if prediction is None or prediction.swing <= _RESOLVED * float(
         np.abs(energy).max()
@@ -455,7 +457,7 @@ def identify_modal(
     return _read(grid, prediction, window)
 
 
-def confirm(
+def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
     """Return the result of the internal energy, its band widened to that of the kinetic energy, else the latter."""
@@ -465,10 +467,10 @@ def confirm(
         return kinetic
     if internal.signed:
         return replace(internal, second=kinetic.reading)
-    return kinetic if _may_decide(internal, kinetic) else internal
+    return kinetic if _can_decide(internal, kinetic) else internal
 
 
-def _may_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
+def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """Return True if the kinetic energy may decide because plastic flow or a damper's work refuses the internal energy.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
@@ -491,20 +493,25 @@ def _read(
 
     ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
     """
-    spectrum, tiny = prediction.spectrum, _TINY * prediction.swing
-    noise, rest = spectrum.error, spectrum.rest
+    spectrum = prediction.spectrum
+    tiny = _TINY * prediction.swing
+    noise = spectrum.error
+    remainder = spectrum.rest
     scatter = noise * np.sqrt(2 / grid.time.size)
-    shared = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-300))
+    shared = float(
+        np.sum(remainder[1:] * remainder[:-1])
+        / max(float(np.sum(remainder**2)), 1e-300)
+    )
     systematic = float(np.clip(shared, 0.0, 1.0))
     stretches = find_stretches(spectrum.lines, grid.span, scatter)
-    is_mode = _without(spectrum.lines, stretches)
+    is_mode = _mask_modes(spectrum.lines, stretches)
 
     plain = Reading(
         spectrum,
         np.ones(is_mode.shape, dtype=bool),
         True,
         grid.time,
-        systematic * rest,
+        systematic * remainder,
         tiny,
     )
     with_static = replace(plain, is_mode=is_mode, no_static=False)
@@ -521,24 +528,21 @@ def _read(
     )
     no_static = abs(share) < _NO_STATIC and not stretches and not kinetic
     reading = plain if no_static else with_static
-    others = (
-        (plain,)
-        if ambiguous
-        else ()
-        if stretches or kinetic
-        else (with_static if no_static else plain,)
-    )
+    other_readings: tuple[Reading, ...] = ()
+    if ambiguous:
+        other_readings = (plain,)
+    elif not stretches and not kinetic:
+        other_readings = (with_static if no_static else plain,)
 
     first = prediction.of_first_part
-    first_stretches = (
-        find_stretches(first.lines, FIRST_PART * grid.span, scatter)
-        if stretches
-        else ()
-    )
+    if stretches:
+        first_stretches = find_stretches(first.lines, FIRST_PART * grid.span, scatter)
+    else:
+        first_stretches = ()
     of_first_part = replace(
         reading,
         spectrum=first,
-        is_mode=_without(first.lines, first_stretches),
+        is_mode=_mask_modes(first.lines, first_stretches),
         rest=np.zeros(grid.time.size),
     )
     held = sum(stretch.energy for stretch in stretches) / mean
@@ -547,7 +551,7 @@ def _read(
         misfit=noise / prediction.swing,
         negative=max(-share, 0.0),
         drift=float(np.std(static)) / mean,
-        beyond=_beyond_bounds(reading, grid),
+        beyond=_measure_beyond_bounds(reading, grid),
         harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
         unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)),
         coarse=grid.strong,
@@ -558,7 +562,7 @@ def _read(
     return ModalVibration(
         _close_times(reading, window, grid.time.size),
         reading,
-        others,
+        other_readings,
         of_first_part,
         doubts,
         noise,
@@ -577,23 +581,24 @@ def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
     return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
 
 
-def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
+def _mask_modes(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
     """Return a mask of the lines that do not belong to a stretch."""
-    kept = np.ones(lines.poles.size, dtype=bool)
-    kept[[stretch.line for stretch in stretches]] = False
-    return kept
+    is_kept = np.ones(lines.poles.size, dtype=bool)
+    is_kept[[stretch.line for stretch in stretches]] = False
+    return is_kept
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
     """Return times over a window so close that a parabola through three of them finds a minimum [time]."""
-    rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
+    rates = reading.modes.poles.imag
+    sizes = np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
     start, end = window
     periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
     return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
 
 
-def _beyond_bounds(reading: Reading, grid: Grid) -> float:
+def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
     """Return how far the overlap exceeds its bounds, relative to the vibration energy: rms over pairs of times [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])

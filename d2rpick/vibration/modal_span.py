@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import median
+from d2rpick.histories.samples import compute_median
 from d2rpick.vibration.modal import ModalVibration, identify_modal
 from d2rpick.vibration.span import Span
 
@@ -49,10 +49,10 @@ def find_described(
     memory : Memory
         Of the record: what was identified in a window is looked for once.
     """
-    for window in _windows(history, td, guess):
-        found = _described_from(history, window, memory)
-        if found is not None:
-            return found
+    for window in _list_windows(history, td, guess):
+        described = _described_from(history, window, memory)
+        if described is not None:
+            return described
     return None
 
 
@@ -66,32 +66,33 @@ def _described_from(history: History, window: Span, memory: Memory) -> Described
 
 
 def _look_in(history: History, window: Span, memory: Memory) -> Described | None:
-    vibration = _identified(history, window, memory)
+    vibration = _identify_window(history, window, memory)
     if vibration is None or not vibration.convinces:
         return None
-    return _grown(history, Described(vibration, window), memory)
+    return _grow_window(history, Described(vibration, window), memory)
 
 
-def inner_window(history: History, guess: Span) -> Span:
+def get_inner_window(history: History, guess: Span) -> Span:
     """Return the whole parts of a record within a guessed window, so that guesses of many td share few windows."""
-    first, last = float(history.time[0]), float(history.time[-1])
+    first = float(history.time[0])
+    last = float(history.time[-1])
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
-    end = (
-        last
-        if guess.end >= last
-        else first + part * np.floor((guess.end - first) / part)
-    )
+    if guess.end >= last:
+        end = last
+    else:
+        end = first + part * np.floor((guess.end - first) / part)
     return Span(float(start), float(end))
 
 
-def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
+def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
     """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
     if guess is not None:
-        inner = inner_window(history, guess)
+        inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
             yield inner
-    first, last = float(history.time[0]), float(history.time[-1])
+    first = float(history.time[0])
+    last = float(history.time[-1])
     yield from (
         Span(first + share * (last - first), last)
         for share in _BEGINNINGS
@@ -99,7 +100,7 @@ def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
     )
 
 
-def _identified(
+def _identify_window(
     history: History, window: Span, memory: Memory
 ) -> ModalVibration | None:
     return memory.once(
@@ -107,43 +108,44 @@ def _identified(
     )
 
 
-def _grown(history: History, found: Described, memory: Memory) -> Described:
+def _grow_window(history: History, described: Described, memory: Memory) -> Described:
     """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
     for _ in range(_MOST_REFITS):
-        span = _reach(history, found)
-        if span == found.span:
+        span = _find_reach(history, described)
+        if span == described.span:
             break
-        vibration = _identified(history, span, memory)
+        vibration = _identify_window(history, span, memory)
         if vibration is None or not vibration.convinces:
             break
-        found = Described(vibration, span)
-    return found
+        described = Described(vibration, span)
+    return described
 
 
-def _reach(history: History, found: Described) -> Span:
+def _find_reach(history: History, found: Described) -> Span:
     """Give the window in which the record stays with the modes, at least that in which they were found."""
-    time, energy = history.time, history.energy
+    time = history.time
+    energy = history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
-    spacing = float(median(np.diff(time[inside])))
+    spacing = float(compute_median(np.diff(time[inside])))
     period = (
         2 * np.pi / max(float(found.vibration.reading.modes.poles.imag.max()), 1e-300)
     )
     width = max(3, round(period / _MEANS_PER_PERIOD / spacing))
-    before = _last_off(
+    last_before = _count_up_to_last_off(
         time[: inside.start], energy[: inside.start], found.vibration, width
     )
-    after = _last_off(
+    first_after = _count_up_to_last_off(
         time[inside.stop :][::-1], energy[inside.stop :][::-1], found.vibration, width
     )
     return Span(
-        float(time[before]) if before < inside.start else found.span.start,
-        float(time[time.size - 1 - after])
-        if after < time.size - inside.stop
+        float(time[last_before]) if last_before < inside.start else found.span.start,
+        float(time[time.size - 1 - first_after])
+        if first_after < time.size - inside.stop
         else found.span.end,
     )
 
 
-def _last_off(
+def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
     """Return the number of states, ordered towards the window, up to the last one that deviates from the modes."""
@@ -152,11 +154,11 @@ def _last_off(
     with np.errstate(
         over="ignore", invalid="ignore"
     ):  # far away, damped modes grow beyond all numbers
-        off = energy - vibration.reading.spectrum.at(time)
-        means = np.abs(np.convolve(off, np.full(width, 1 / width), mode="valid"))
+        deviation = energy - vibration.reading.spectrum.at(time)
+        means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(
             _MOST_OFF * vibration.vibration_energy(time[width - 1 :]),
             _SCATTERS_OFF * vibration.noise / np.sqrt(width),
         )
-        wrong = np.flatnonzero(~(means <= room))
-    return int(wrong[-1]) + width if wrong.size else 0
+        is_off = np.flatnonzero(~(means <= room))
+    return int(is_off[-1]) + width if is_off.size else 0

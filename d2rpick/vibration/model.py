@@ -15,21 +15,21 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import listing
+from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
     Identification,
-    samples_per_period,
+    count_samples_per_period,
 )
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import (
     Moments,
     OscillatorEnergy,
     SampledEnergy,
-    moments_of_mode,
+    find_moments_of_mode,
 )
 from d2rpick.vibration.oscillator_band import residual_band
 from d2rpick.vibration.span import SMALLEST
@@ -118,11 +118,9 @@ class Vibration:
     @property
     def modal(self) -> ModalVibration | None:
         """Return the modes of the structure that are relied on; None if they are not."""
-        return (
-            cast("ModalVibration", self.compared.deformation)
-            if self.basis == "modal" and self.compared
-            else None
-        )
+        if self.basis == "modal" and self.compared:
+            return cast("ModalVibration", self.compared.deformation)
+        return None
 
     @property
     def reasons(self) -> str | None:
@@ -135,7 +133,7 @@ class Vibration:
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
         of_parts = (
-            f"{listing(alike, most=_NAMED)}: {reason}"
+            f"{list_names(alike, most=_NAMED)}: {reason}"
             for reason, alike in names.items()
         )
         return "; ".join((self.unknown or "", *of_parts))
@@ -143,11 +141,9 @@ class Vibration:
     @property
     def kinetic_share(self) -> float | None:
         """Return K at td, None if it is unknown [-]."""
-        return (
-            None
-            if self.compared is None
-            else float(measures.kinetic_share(self.compared.deformation, self.td))
-        )
+        if self.compared is None:
+            return None
+        return float(measures.kinetic_share(self.compared.deformation, self.td))
 
     @cached_property
     def profile(self) -> Profile | None:
@@ -177,11 +173,14 @@ class Vibration:
         """Return the largest useful lock-in error of a tr, for a vibration of many modes; None for others [-]."""
         if self.basis != "modal":
             return None
-        least = self.least_residual or 0.0
-        most = (
-            NOTHING_KEPT if least <= NOTHING_KEPT else least + measures.TOLERATED_GROWTH
+        least_residual = self.least_residual or 0.0
+        if least_residual <= NOTHING_KEPT:
+            largest_residual = NOTHING_KEPT
+        else:
+            largest_residual = least_residual + measures.TOLERATED_GROWTH
+        return float(
+            np.sqrt(max(largest_residual**2 - (self.kinetic_share or 0.0), 0.0))
         )
-        return float(np.sqrt(max(most**2 - (self.kinetic_share or 0.0), 0.0)))
 
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
         """Return times before td that may serve as tr: crossings, standstills near the level, and closest matches.
@@ -224,7 +223,7 @@ class Vibration:
 
     def measured(self, times: Samples) -> Columns:
         """Return the measures of each time as tr, as far as its deformation can be compared with that at td."""
-        return measured_of([self], times, [0, times.size])[1]
+        return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
         """Return the errors that a tolerance limits, of the shape of ``times``; infinite if none would help [-].
@@ -252,21 +251,21 @@ class Vibration:
         """Return how far the true time of each moment may be off; for a match half a cell of the profile [time]."""
         reach = self.whole.reach(moments.tr)
         # a match lies at the least error
-        return (
-            np.where(moments.are("match"), self.profile.cell(moments.tr) / 2, reach)
-            if self.profile
-            else reach
-        )
+        if self.profile:
+            return np.where(
+                moments.are("match"), self.profile.cell(moments.tr) / 2, reach
+            )
+        return reach
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """Return the contribution of each part to the mismatch; nothing if single parts are unknown."""
         if self.signed is None:
             return ()
         from d2rpick.vibration.part_signs import (
-            contributions,
+            list_contributions,
         )  # imported here: a table has no parts
 
-        return contributions(self.signed, tr, self.td)
+        return list_contributions(self.signed, tr, self.td)
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
         """Return for each time whether its deformation can be compared with that at td."""
@@ -291,7 +290,7 @@ class Vibration:
         )
 
 
-def moments_of(
+def find_moments(
     vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
     """Return the moments of each vibration, as ``Vibration.moments`` does, for one mode all at once.
@@ -304,67 +303,72 @@ def moments_of(
     since : sequence of length n
         [time]
     """
-    found: dict[int, Moments] = {}
-    for places in _alike(vibrations):
-        first, times = vibrations[places[0]], [since[i] for i in places]
-        if len(places) > 1:
-            seen = [
-                one.whole
-                for one in map(vibrations.__getitem__, places)
-                if isinstance(one.whole, OscillatorEnergy)
+    moments: dict[int, Moments] = {}
+    for positions in _group_alike(vibrations):
+        first = vibrations[positions[0]]
+        times = [since[i] for i in positions]
+        if len(positions) > 1:
+            energies = [
+                vibration.whole
+                for vibration in map(vibrations.__getitem__, positions)
+                if isinstance(vibration.whole, OscillatorEnergy)
             ]
-            found |= zip(places, moments_of_mode(seen, tolerance, times), strict=True)
+            moments |= zip(
+                positions, find_moments_of_mode(energies, tolerance, times), strict=True
+            )
         else:
-            found[places[0]] = first.moments(tolerance, *times)
-    return [found[i] for i in range(len(vibrations))]
+            moments[positions[0]] = first.moments(tolerance, *times)
+    return [moments[i] for i in range(len(vibrations))]
 
 
-def measured_of(
+def measure_all(
     vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
 ) -> tuple[Samples, Columns]:
     """Return the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
 
     Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
-    energy, found = np.empty(tr.shape), []
-    for places in _alike(vibrations):
-        first, each = (
-            vibrations[places[0]],
-            [slice(ends[i], ends[i + 1]) for i in places],
-        )
+    energy = np.empty(tr.shape)
+    columns = []
+    for positions in _group_alike(vibrations):
+        first = vibrations[positions[0]]
+        ranges = [slice(ends[i], ends[i + 1]) for i in positions]
         rows: Any = (
-            each[0]
-            if len(each) == 1
-            else np.concatenate([np.arange(one.start, one.stop) for one in each])
+            ranges[0]
+            if len(ranges) == 1
+            else np.concatenate(
+                [np.arange(piece.start, piece.stop) for piece in ranges]
+            )
         )
         energy[rows] = first.whole.energies(tr[rows])
-        here = first.comparable(tr[rows])
-        if here.any():
+        is_comparable = first.comparable(tr[rows])
+        if is_comparable.any():
             seen_from = np.repeat(
-                [vibrations[i].td for i in places],
-                [one.stop - one.start for one in each],
+                [vibrations[i].td for i in positions],
+                [piece.stop - piece.start for piece in ranges],
             )
-            td = seen_from[here] if len(each) > 1 else first.td
-            found.append(
-                (np.arange(tr.size)[rows][here], first.measures_of(tr[rows][here], td))
+            td = seen_from[is_comparable] if len(ranges) > 1 else first.td
+            columns.append(
+                (
+                    np.arange(tr.size)[rows][is_comparable],
+                    first.measures_of(tr[rows][is_comparable], td),
+                )
             )
-    return energy, measures.spread(tr.size, found)
+    return energy, measures.spread(tr.size, columns)
 
 
-def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
+def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
     """Yield the indices of vibrations that one mode describes in one window together, and all others singly."""
     groups: dict[object, list[int]] = {}
-    for place, one in enumerate(vibrations):
-        whole, single = (
-            one.whole,
-            one.compared is not None and isinstance(one.compared.deformation, Mode),
+    for position, vibration in enumerate(vibrations):
+        whole = vibration.whole
+        single = vibration.compared is not None and isinstance(
+            vibration.compared.deformation, Mode
         )
-        key = (
-            (id(whole.fit), whole.span)
-            if single and isinstance(whole, OscillatorEnergy)
-            else place
-        )
-        groups.setdefault(key, []).append(place)
+        key: object = position
+        if single and isinstance(whole, OscillatorEnergy):
+            key = (id(whole.fit), whole.span)
+        groups.setdefault(key, []).append(position)
     return groups.values()
 
 
@@ -420,35 +424,31 @@ class Evidence(NamedTuple):
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
     """Return the best model that can be relied on; ``whole`` is the model of the whole energy."""
-    return replace(_best(whole, evidence), parts=evidence.parts)
+    return replace(_choose_best(whole, evidence), parts=evidence.parts)
 
 
-def _best(whole: Vibration, evidence: Evidence) -> Vibration:
+def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
     """Choose the model that can be relied on."""
     if not evidence.signed:
         return whole
-    basis, model, td, names = (
-        evidence.signed,
-        evidence.models[evidence.signed],
-        whole.td,
-        [*MODELS],
-    )
+    basis = evidence.signed
+    model = evidence.models[evidence.signed]
+    td = whole.td
+    names = [*MODELS]
     modes = whole.whole
     if names.index(basis) < names.index("oscillator"):
-        return (
-            _with_signs(whole, basis, model)
-            if whole.compared or model.known_at(td)
-            else _sunk(whole)
-        )
-    if whole.doubts or not doubtful(whole) or not model.known_at(td):
+        if whole.compared or model.known_at(td):
+            return _compare_with_signs(whole, basis, model)
+        return _note_sunk(whole)
+    if whole.doubts or not is_doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, OscillatorEnergy):
-        return _with_signs(whole, basis, model)
+        return _compare_with_signs(whole, basis, model)
     # structure that neighbouring states share is a further mode, which the modes describe better; white noise can only
     # hide one
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
-        return _with_signs(
+        return _compare_with_signs(
             Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER),
             basis,
             model,
@@ -456,7 +456,7 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
     return whole
 
 
-def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
+def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Return a vibration with signed deformations, while levels and times are those of the whole energy."""
     first = model.comparable_since(whole.td)
     return replace(
@@ -474,7 +474,7 @@ def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     )
 
 
-def _sunk(whole: Vibration) -> Vibration:
+def _note_sunk(whole: Vibration) -> Vibration:
     """Add that the parts vibrate less at td than the solver's error."""
     unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
     return replace(
@@ -484,7 +484,7 @@ def _sunk(whole: Vibration) -> Vibration:
     )
 
 
-def doubtful(whole: Vibration) -> bool:
+def is_doubtful(whole: Vibration) -> bool:
     """Return True if no oscillator is known, or one that leaves so much that its sign may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
@@ -492,9 +492,10 @@ def doubtful(whole: Vibration) -> bool:
     )
 
 
-def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
+def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Return the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
-    fit, whole = evidence.fit, describing(history, td, evidence)
+    fit = evidence.fit
+    whole = describe_energy_at(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
     if fit is None:
         return samples(unknown="identification was switched off")
@@ -502,14 +503,13 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
         "the oscillator that was asked for does not describe the record at td",
     ) * evidence.prescribed
     if fit.reason:
-        what = (
-            "the given oscillator does not describe"
-            if evidence.given
-            else "no single oscillator describes"
-        )
+        if evidence.given:
+            claim = "the given oscillator does not describe"
+        else:
+            claim = "no single oscillator describes"
         return samples(
-            unknown=f"{what} the record: {fit.reason}",
-            doubts=(*prescribed, *_aliased(history, fit)),
+            unknown=f"{claim} the record: {fit.reason}",
+            doubts=(*prescribed, *_find_aliasing(history, fit)),
         )
     if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
         return samples(
@@ -529,22 +529,23 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
     )
 
 
-def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy:
+def describe_energy_at(
+    history: History, td: float, evidence: Evidence
+) -> SampledEnergy:
     """Return the best description of the energy, whatever it is worth at ``td``: an oscillator, else samples."""
-    fit, span = evidence.fit, evidence.span
-    return (
-        OscillatorEnergy(history, td, fit, span)
-        if fit and fit.mode and span
-        else SampledEnergy(history, td)
-    )
+    fit = evidence.fit
+    span = evidence.span
+    if fit and fit.mode and span:
+        return OscillatorEnergy(history, td, fit, span)
+    return SampledEnergy(history, td)
 
 
-def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
+def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
     """Return a doubt if the energy swings so fast that its states miss the level as they miss the vibration."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)
-    states = samples_per_period(time, fit.mode)
+    states = count_samples_per_period(time, fit.mode)
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
     return (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.histories.samples import narrow
+from d2rpick.histories.samples import narrow_brackets
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 
 if TYPE_CHECKING:
@@ -109,23 +109,22 @@ class Mode(SignedAmplitudes):
         cosine, sine = self._velocity_parts
 
         def energy(decay: Samples, cos: Samples, sin: Samples) -> Samples:
-            swing, velocity = (
-                decay * (self.cosine * cos + self.sine * sin),
-                decay * (cosine * cos + sine * sin),
-            )
+            swing = decay * (self.cosine * cos + self.sine * sin)
+            velocity = decay * (cosine * cos + sine * sin)
             return swing**2 + (velocity / self.omega_0) ** 2
 
         return self._of_waves(energy, t)
 
     def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
         """Return E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
-        q, velocity = self.deformation(t), self.velocity(t)
+        q = self.deformation(t)
+        velocity = self.velocity(t)
         acceleration = -self.alpha * velocity - self.omega_0**2 * (q - self.preload)
         return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
 
     def energy_gradient(self, t: Samples, size: int) -> Samples:
         """Return derivatives of E(t) by the first ``size`` parameters of the class without origin, (size, n)."""
-        own = np.array(
+        own_gradient = np.array(
             [
                 self.omega,
                 self.alpha,
@@ -135,7 +134,7 @@ class Mode(SignedAmplitudes):
                 self.preload,
             ]
         )
-        return energy_and_jacobian(own, t - self.origin, size)[1]
+        return compute_energy_and_jacobian(own_gradient, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
         """Find the first time from ``t`` on at which the deformation stands still; the next is half a period later."""
@@ -187,10 +186,10 @@ class Mode(SignedAmplitudes):
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
-        place, times = self._passages(np.append(level, -level), start, ends)
-        place %= td.size
-        order = np.lexsort((times, place))
-        return place[order], times[order]
+        row, times = self._passages(np.append(level, -level), start, ends)
+        row %= td.size
+        order = np.lexsort((times, row))
+        return row[order], times[order]
 
     def _passages(
         self, levels: Samples, start: float, ends: Samples
@@ -211,15 +210,16 @@ class Mode(SignedAmplitudes):
             + np.sqrt(self.vibration_energy(edges))
         )
         above[np.abs(above) <= 8 * _EPS * scale] = 0.0
-        place, cell = np.nonzero(
+        row, cell = np.nonzero(
             above[:, :-1] * above[:, 1:] < 0
         )  # q is monotone between neighbouring extrema
-        side, wanted = np.sign(above[place, cell]), levels[place]
-        found = narrow(
-            lambda t: side * (self.deformation(t) - wanted), edges[place, cell], edges[place, cell + 1],
+        side = np.sign(above[row, cell])
+        wanted = levels[row]
+        times = narrow_brackets(
+            lambda t: side * (self.deformation(t) - wanted), edges[row, cell], edges[row, cell + 1],
             slope=lambda t: side * self.velocity(t), steps=_STEPS,
         )  # fmt: skip
-        return place, found.at
+        return row, times.at
 
     @property
     def _velocity_parts(self) -> tuple[float, float]:
@@ -254,7 +254,7 @@ class Mode(SignedAmplitudes):
         )
 
 
-def energy_and_jacobian(
+def compute_energy_and_jacobian(
     parameters: Samples, s: Samples, size: int
 ) -> tuple[Samples, Samples]:
     """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n).
@@ -262,8 +262,10 @@ def energy_and_jacobian(
     The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
     """
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
-    angle, decay = omega * s, np.exp(-alpha / 2 * s)
-    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
+    angle = omega * s
+    decay = np.exp(-alpha / 2 * s)
+    cos = decay * np.cos(angle)
+    sin = decay * np.sin(angle)
     swing = cosine * cos + sine * sin
     q = preload + swing
     twice = q + q

@@ -35,6 +35,22 @@ _DROWNED = 0.2
 # Times closer than this share of a radian are equal within rounding.
 _ZERO = 1e-9
 
+# Kinds of moments: crossing of the level, extremum near it, match of the deformations of several parts or modes, start
+# of a flight in which nothing vibrates, given time.
+_KINDS: Final = ("crossing", "extremum", "match", "start", "given")
+# Between samples E'' may exceed the second differences; on random vibrations with 8 samples per period or more, a
+# quarter more covers 99 % of the true crossings.
+_BEND_RESERVE = 1.25
+# Three standard deviations contain 99.7 % of normal errors.
+_DEVIATIONS = 3.0
+# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum contain 99 % of it, and
+# they add to the error of the bend as independent errors.
+_ROUNDING_DEVIATIONS = 2.6
+# The systematic rest of a fit is mostly a vibration, whose peaks are sqrt(2) times its rms.
+_PEAK_OF_REST = sqrt(2)
+# Reserve, as a share of the output interval: however well a fit follows the samples, it is a model between them.
+_BETWEEN_SAMPLES = 1e-3
+
 
 class SampledEnergy:
     """The samples of a record seen from ``td``, linear between them."""
@@ -46,11 +62,9 @@ class SampledEnergy:
 
     def energy(self, time: float) -> float:
         """Return E at a time: from the modes if they describe the record there, else from the samples [energy]."""
-        return (
-            float(self.mode.energy(time))
-            if self.mode and self.described(time)
-            else self.history.energy_at(time)
-        )
+        if self.mode and self.described(time):
+            return float(self.mode.energy(time))
+        return self.history.energy_at(time)
 
     def energies(self, times: Samples) -> Samples:
         """Return E at many times, of their shape [energy]."""
@@ -69,8 +83,8 @@ class SampledEnergy:
         """Return the times from ``since`` to td at which the energy crosses the level, and which rise, shape (k,)."""
         time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
-        asked = (since <= times) & (times < self.td)
-        return times[asked], rising[asked]
+        in_question = (since <= times) & (times < self.td)
+        return times[in_question], rising[in_question]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
         """Return the times from ``since`` to td at which the energy turns within the tolerance of the level (k,)."""
@@ -82,8 +96,9 @@ class SampledEnergy:
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
         """Return times and energies from the last sample before ``since`` up to td, and td itself with its level."""
         first, last = np.searchsorted(self.history.time, (since, self.td))
-        before = slice(max(int(first) - 1, 0), int(last))
-        time, energy = self.history.time[before], self.history.energy[before]
+        states_before = slice(max(int(first) - 1, 0), int(last))
+        time = self.history.time[states_before]
+        energy = self.history.energy[states_before]
         return np.append(time, self.td), np.append(energy, self.energy(self.td))
 
     def edges(self) -> Samples:
@@ -92,7 +107,7 @@ class SampledEnergy:
 
     def reach(self, times: Samples) -> Samples:
         """Return how far from each time the energy may have the level of td [time]."""
-        return sampled_reach(self.history, times, self.td, self.energy(self.td))
+        return compute_sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
 class OscillatorEnergy(SampledEnergy):
@@ -115,7 +130,8 @@ class OscillatorEnergy(SampledEnergy):
             max(self.td, self.span.start),
         )
         time, energy = self.history.between(start, end)
-        vibration, fit = float(self.mode.vibration_energy(self.td)), self.fit
+        vibration = float(self.mode.vibration_energy(self.td))
+        fit = self.fit
         fitted = fit.start <= start and end <= fit.end
         if (
             fitted
@@ -128,8 +144,8 @@ class OscillatorEnergy(SampledEnergy):
             vibration > 0 and scatter <= _DROWNED * vibration
         ):  # both may be too small for a number
             return None
-        found = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
-        return f"{found}: the sign of the deformation is unknown"
+        finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
+        return f"{finding}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
         """Return E at many times, of their shape [energy]."""
@@ -168,8 +184,8 @@ class OscillatorEnergy(SampledEnergy):
 
     def standstills(self) -> Samples:
         """Return the times within the span, up to td itself, at which the energy turns [time]."""
-        after = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
-        times = np.maximum(self.mode.extrema(self.before, after), self.span.start)
+        end = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
+        times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
 
     def edges(self) -> Samples:
@@ -182,7 +198,7 @@ class OscillatorEnergy(SampledEnergy):
         """Return the uncertainty of the crossing times due to the fit, sampling and printed digits [time]."""
         return self._each(
             times,
-            lambda inside: fitted_reach(
+            lambda inside: compute_fitted_reach(
                 self.history, self.fit, self.mode, inside, self.td
             ),
             super().reach,
@@ -199,17 +215,15 @@ class OscillatorEnergy(SampledEnergy):
         outside: Callable[[Samples], Samples],
     ) -> Samples:
         """Apply one function to times in the window that the modes describe, another to the others."""
-        here = self.within(times)
-        if here.all():  # as in nearly all cases
+        is_described = self.within(times)
+        if is_described.all():  # as in nearly all cases
             return inside(times)
-        found = np.empty(times.shape)
-        found[here], found[~here] = inside(times[here]), outside(times[~here])
-        return found
-
-
-# Kinds of moments: crossing of the level, extremum near it, match of the deformations of several parts or modes, start
-# of a flight in which nothing vibrates, given time.
-_KINDS: Final = ("crossing", "extremum", "match", "start", "given")
+        energies = np.empty(times.shape)
+        energies[is_described], energies[~is_described] = (
+            inside(times[is_described]),
+            outside(times[~is_described]),
+        )
+        return energies
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,10 +251,8 @@ class Moments:
         cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments
     ) -> Moments:
         """Make moments from crossings of the level, shape (k,), followed by other moments."""
-        kind, sides = (
-            np.zeros(crossings.size, np.int8),
-            np.where(rising, 1, -1).astype(np.int8),
-        )
+        kind = np.zeros(crossings.size, np.int8)
+        sides = np.where(rising, 1, -1).astype(np.int8)
         return cls.joined([cls(crossings, kind, sides), *others])
 
     @classmethod
@@ -249,7 +261,10 @@ class Moments:
         return cls(
             *map(
                 np.concatenate,
-                zip(*((one.tr, one.kind, one.rising) for one in some), strict=True),
+                zip(
+                    *((moments.tr, moments.kind, moments.rising) for moments in some),
+                    strict=True,
+                ),
             )
         )
 
@@ -274,18 +289,20 @@ class Moments:
         )
 
 
-def moments_of_mode(
+def find_moments_of_mode(
     seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
     """Return the moments of one mode in one window, in ascending order, for each td from which it is ``seen``.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
     """
-    mode, td = seen[0].mode, np.array([one.td for one in seen])
-    place, times = mode.all_level_crossings(td, seen[0].before)
+    mode = seen[0].mode
+    td = np.array([energy.td for energy in seen])
+    row, times = mode.all_level_crossings(td, seen[0].before)
     times = np.maximum(times, seen[0].span.start)
     early = [
-        one.crossings_before(first) for one, first in zip(seen, since, strict=True)
+        energy.crossings_before(first)
+        for energy, first in zip(seen, since, strict=True)
     ]
     crossings = np.concatenate([*(sampled for sampled, _ in early), times])
     rising = np.concatenate(
@@ -296,39 +313,25 @@ def moments_of_mode(
         turns < (td - _ZERO / mode.omega)[:, np.newaxis]
     )  # td may be an extremum itself
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
-    found = Moments.of_level(
+    moments = Moments.of_level(
         crossings, rising, Moments.of("extremum", turns[which[near]])
     )
-    place = np.concatenate(
+    row = np.concatenate(
         [
             np.repeat(np.arange(td.size), [sampled.size for sampled, _ in early]),
-            place,
+            row,
             of[near],
         ]
     )
-    order = np.lexsort((found.tr, place))
-    found, ends = (
-        found.at(order),
-        np.searchsorted(place[order], np.arange(td.size + 1)).tolist(),
-    )
-    return [found.at(slice(*each)) for each in pairwise(ends)]
+    order = np.lexsort((moments.tr, row))
+    moments = moments.at(order)
+    ends = np.searchsorted(row[order], np.arange(td.size + 1)).tolist()
+    return [moments.at(slice(*limits)) for limits in pairwise(ends)]
 
 
-# Between samples E'' may exceed the second differences; on random vibrations with 8 samples per period or more, a
-# quarter more covers 99 % of the true crossings.
-_BEND_RESERVE = 1.25
-# Three standard deviations contain 99.7 % of normal errors.
-_DEVIATIONS = 3.0
-# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum contain 99 % of it, and
-# they add to the error of the bend as independent errors.
-_ROUNDING_DEVIATIONS = 2.6
-# The systematic rest of a fit is mostly a vibration, whose peaks are sqrt(2) times its rms.
-_PEAK_OF_REST = sqrt(2)
-# Reserve, as a share of the output interval: however well a fit follows the samples, it is a model between them.
-_BETWEEN_SAMPLES = 1e-3
-
-
-def sampled_reach(history: History, times: Samples, td: float, level: float) -> Samples:
+def compute_sampled_reach(
+    history: History, times: Samples, td: float, level: float
+) -> Samples:
     """Return the distance to the true crossing if tr comes from the samples, linear between them.
 
     Parameters
@@ -346,45 +349,47 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     array of shape (n,)
         The true crossing lies within tr - x and tr + x [time]; at most two output intervals.
     """
-    time, energy = history.time, history.energy
-    cell, interval = _cells(time, times)
-    at_td, _ = _cells(time, np.atleast_1d(td))
-    bend = curvature(time, energy, times)
+    time = history.time
+    energy = history.energy
+    cell, interval = _find_cells(time, times)
+    at_td, _ = _find_cells(time, np.atleast_1d(td))
+    bend = estimate_curvature(time, energy, times)
     # Newton's error of linear interpolation: E''/2 times the distances to both neighbours, zero on a sample
     off_td = (
-        float(curvature(time, energy, td))
+        float(estimate_curvature(time, energy, td))
         * (td - time[at_td])
         * (time[at_td + 1] - td)
         / 2
     )
     curved = _BEND_RESERVE * (bend * interval**2 / 8 + off_td)
-    of_tr, of_td = _rounding(history, times), _rounding(history, np.atleast_1d(td))
-    most, square = (a + b for a, b in zip(of_tr, of_td, strict=True))
-    rounded = np.minimum(most, _ROUNDING_DEVIATIONS * np.sqrt(square))
+    of_tr = _compute_rounding(history, times)
+    of_td = _compute_rounding(history, np.atleast_1d(td))
+    largest, square = (a + b for a, b in zip(of_tr, of_td, strict=True))
+    rounded = np.minimum(largest, _ROUNDING_DEVIATIONS * np.sqrt(square))
     slope = np.abs((energy[cell + 1] - energy[cell]) / interval)
     error = np.hypot(curved, rounded) + abs(level - history.energy_at(td))
-    return np.minimum(reach(slope, bend, error), 2 * interval)
+    return np.minimum(compute_reach(slope, bend, error), 2 * interval)
 
 
-def fitted_reach(
+def compute_fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
     """Return the distance to the true crossing if tr and the level come from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
-    record about it, and the systematic part of the misfit.  Arguments and result as in ``sampled_reach``, without
-    level.
+    record about it, and the systematic part of the misfit.  Arguments and result are those of
+    ``compute_sampled_reach``, without level.
     """
-    both = np.append(times, td)
-    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(
-        fit, mode, both
-    )
-    error = off[:-1] + off[-1]
+    all_times = np.append(times, td)
+    deviation = _DEVIATIONS * fit.energy_deviation(
+        all_times
+    ) + _PEAK_OF_REST * _estimate_local_rest(fit, mode, all_times)
+    error = deviation[:-1] + deviation[-1]
     slope, bend = mode.energy_slopes(times)
-    distance = reach(np.abs(slope), np.abs(bend), error)
+    distance = compute_reach(np.abs(slope), np.abs(bend), error)
     # the fit, not the output interval, limits the error of a crossing to a quarter of a period
     quanta = (
-        _half_quanta(history.time_precision, times)
+        _compute_half_quanta(history.time_precision, times)
         + history.time_precision.quantum(td) / 2
     )
     return (
@@ -394,44 +399,42 @@ def fitted_reach(
     )
 
 
-def _local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
+def _estimate_local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
     """Return the systematic rest of a fit near each time: its rms, or more if the vibration is larger [energy]."""
     return np.asarray(
         fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
     )
 
 
-def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
+def _find_cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
     """Return the index of the sample before each time, and the interval to the next."""
     cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
     return cell, time[cell + 1] - time[cell]
 
 
-def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
+def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     """Return the largest error of the interpolated energy due to printed digits, and its mean square [energy].
 
     Energy and time of both neighbours are off by up to half a quantum each, uniformly distributed.
     """
-    cell, interval = _cells(history.time, at)
-    off = at - history.time[cell]
-    share, slope = (
-        off / interval,
-        (history.energy[cell + 1] - history.energy[cell]) / interval,
+    cell, interval = _find_cells(history.time, at)
+    distance = at - history.time[cell]
+    share = distance / interval
+    slope = (history.energy[cell + 1] - history.energy[cell]) / interval
+    energies = _compute_half_quanta(
+        history.energy_precision, history.energy[cell] + slope * distance
     )
-    energies = _half_quanta(
-        history.energy_precision, history.energy[cell] + slope * off
-    )
-    times = slope * _half_quanta(history.time_precision, at)
+    times = slope * _compute_half_quanta(history.time_precision, at)
     square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
     return energies + np.abs(times), square
 
 
-def _half_quanta(precision: Precision, values: Samples) -> Samples:
+def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
     """Return half of the quantum to which each value was rounded."""
     return precision.quanta(values) / 2
 
 
-def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
+def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     """Return the largest |E''| near ``at``: of the four second divided differences about its cell [energy/time^2].
 
     Zero where the record has fewer than three samples.
@@ -447,7 +450,7 @@ def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     return np.asarray(second.max(axis=-1))
 
 
-def reach(
+def compute_reach(
     slope: Samples | float, bend: Samples | float, error: Samples | float
 ) -> Samples:
     """Return how far in time a crossing may be off if the energy there is wrong by ``error``.
@@ -462,16 +465,16 @@ def reach(
 
     Examples
     --------
-    >>> float(reach(2.0, 0.0, 1.0)), float(reach(0.0, 2.0, 1.0))
+    >>> float(compute_reach(2.0, 0.0, 1.0)), float(compute_reach(0.0, 2.0, 1.0))
     (0.5, 1.0)
     """
     slope, bend, error = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (slope, bend, error))
     )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        steep, curved = (
-            slope / error,
-            bend / error,
+        steep = slope / error
+        curved = (
+            bend / error
         )  # divided by the error: squares of energies might overflow
         root = steep**2 - 2 * curved
         regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))

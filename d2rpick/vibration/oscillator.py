@@ -64,9 +64,9 @@ class Oscillator:
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass", "frame_mass"):
             if not _SMALLEST <= getattr(self, name) <= _LARGEST:
-                found = f"{name} is {getattr(self, name)}"
+                finding = f"{name} is {getattr(self, name)}"
                 raise RangeError(
-                    f"{found}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected"
+                    f"{finding}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected"
                 )
         if not np.isfinite(self.alpha):
             raise RangeError(f"alpha is {self.alpha}, a finite number was expected")
@@ -110,16 +110,17 @@ class Oscillator:
         """
         t = np.asarray(elapsed, dtype=np.float64)
         cosine, sine = self._vibration(t)
-        r, vr = start.y - start.z, start.vy - start.vz
+        r = start.y - start.z
+        vr = start.vy - start.vz
         deformation = cosine * r + sine * (vr + self.alpha / 2 * r)
         rate = cosine * vr - sine * (self.omega_0**2 * r + self.alpha / 2 * vr)
         centre, velocity = self._centre(start)
-        centre, velocity = (
-            centre + velocity * _drift(self.alpha, t),
-            velocity * np.exp(-self.alpha * t),
-        )
-        frame, suspended = self._share(self.mass), self._share(self.frame_mass)
-        z, y = centre - frame * deformation, centre + suspended * deformation
+        centre = centre + velocity * _compute_path(self.alpha, t)
+        velocity = velocity * np.exp(-self.alpha * t)
+        frame = self._share(self.mass)
+        suspended = self._share(self.frame_mass)
+        z = centre - frame * deformation
+        y = centre + suspended * deformation
         return State(z, y, velocity - frame * rate, velocity + suspended * rate)
 
     def free_on_grid(self, start: State, step: float, count: int) -> State:
@@ -136,23 +137,27 @@ class Oscillator:
         row = step * columns * np.arange(-(-count // columns), dtype=np.float64)
         column = step * np.arange(columns, dtype=np.float64)
         rate = -self.alpha / 2 + 1j * omega
-        turn, turn_row = np.exp(rate * column), np.exp(rate * row)
-        slow_row, slow = np.exp(-self.alpha * row), np.exp(-self.alpha * column)
-        drift_row, drift = _drift(self.alpha, row), _drift(self.alpha, column)
-        r, vr = start.y - start.z, start.vy - start.vz
+        turn = np.exp(rate * column)
+        turn_row = np.exp(rate * row)
+        slow_row = np.exp(-self.alpha * row)
+        slow = np.exp(-self.alpha * column)
+        drift_row = _compute_path(self.alpha, row)
+        drift = _compute_path(self.alpha, column)
+        r = start.y - start.z
+        vr = start.vy - start.vz
         amplitude = complex(r, -(vr + self.alpha / 2 * r) / omega)
         centre, velocity = self._centre(start)
 
         def displacement(share: float) -> Values:
             """Return the displacement of the mass with this share of the deformation."""
             swing = share * amplitude * turn_row
-            left = [
+            terms = [
                 swing.real,
                 -swing.imag,
                 centre + velocity * drift_row,
                 velocity * slow_row,
             ]
-            table = np.stack(left, axis=1) @ np.stack(
+            table = np.stack(terms, axis=1) @ np.stack(
                 [turn.real, turn.imag, np.ones(columns), drift]
             )
             return np.asarray(table.ravel()[:count])
@@ -165,7 +170,8 @@ class Oscillator:
                 (table @ np.stack([turn.real, turn.imag, slow])).ravel()[:count]
             )
 
-        frame, suspended = -self._share(self.mass), self._share(self.frame_mass)
+        frame = -self._share(self.mass)
+        suspended = self._share(self.frame_mass)
         states = State(
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
@@ -181,9 +187,11 @@ class Oscillator:
         """
         t = np.asarray(elapsed, dtype=np.float64)
         _, velocity = self._centre(start)
-        way = velocity * _drift(self.alpha, t)
+        displacement = velocity * _compute_path(self.alpha, t)
         common = velocity * np.exp(-self.alpha * t)
-        return State(start.z + way, start.y + way, common, common.copy())
+        return State(
+            start.z + displacement, start.y + displacement, common, common.copy()
+        )
 
     def internal_energy(self, state: State) -> Values:
         """Return the energy of the spring, k r^2/2 [energy]."""
@@ -208,7 +216,8 @@ class Oscillator:
 
     def _centre(self, state: State) -> tuple[Values, Values]:
         """Return displacement and velocity of the centre of mass; (8) is the velocity."""
-        frame, suspended = self._share(self.frame_mass), self._share(self.mass)
+        frame = self._share(self.frame_mass)
+        suspended = self._share(self.mass)
         return (
             frame * state.z + suspended * state.y,
             frame * state.vz + suspended * state.vy,
@@ -232,7 +241,7 @@ class Oscillator:
         ) / (2 * kappa)
 
 
-def _drift(alpha: float, t: Values) -> Values:
+def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
     # the quotient of the smallest products has no digits; there two terms of the series are exact
@@ -243,20 +252,23 @@ def _drift(alpha: float, t: Values) -> Values:
     )
 
 
-def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Values:
+def compute_lacking_energy(
+    oscillator: Oscillator, reference: State, switched: State
+) -> Values:
     """Return the vibration energy that ``switched`` lacks compared with ``reference``, both states at td."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
 
 
-def from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
+def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
     """Return an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
 
     An energy history contains neither masses nor the motion of the whole; they are chosen so that the deformation
     equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
     """
     mass = 4 / mode.omega_0**2
-    q, velocity = mode.deformation(time) - mode.preload, mode.velocity(time)
+    q = mode.deformation(time) - mode.preload
+    velocity = mode.velocity(time)
     oscillator = Oscillator(stiffness=2.0, mass=mass, frame_mass=mass, alpha=mode.alpha)
     return oscillator, State(-q / 2, q / 2, -velocity / 2, velocity / 2)
 
@@ -269,8 +281,10 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     """
     omega = oscillator.omega_2
     if not omega > 0:
-        found = f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}"
-        raise RangeError(f"{found}, less than {2 * oscillator.omega_0:g} was expected")
+        finding = f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}"
+        raise RangeError(
+            f"{finding}, less than {2 * oscillator.omega_0:g} was expected"
+        )
     sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
     if not abs(sine) <= sqrt(LARGEST_ENERGY):
         raise RangeError(
@@ -324,7 +338,7 @@ class Replay:
     def residual(self) -> float:
         """Return the energy norm of what the switched run lacks at td, relative to the reference vibration [-]."""
         reference = self.reference(self.td)
-        lack = lacking_energy(self.oscillator, reference, self.motion(self.td))
+        lack = compute_lacking_energy(self.oscillator, reference, self.motion(self.td))
         return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))
 
 
@@ -337,7 +351,7 @@ class Trajectory(NamedTuple):
     kinetic_energy: Values
 
 
-def trajectory(
+def compute_trajectory(
     oscillator: Oscillator,
     start: State,
     t_end: float,
@@ -352,11 +366,10 @@ def trajectory(
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
     with np.errstate(all="ignore"):
         time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
-        state = (
-            oscillator.free_on_grid(start, dt, count)
-            if switched is None
-            else switched.motion(time)
-        )
+        if switched is None:
+            state = oscillator.free_on_grid(start, dt, count)
+        else:
+            state = switched.motion(time)
         motion = Trajectory(
             time,
             state,

@@ -1,4 +1,4 @@
-"""How far the residual of an identified oscillator may be off: by scatter, by damping, and by a mode that hides."""
+"""Compute the band of an identified oscillator's residual: scatter, damping and hidden modes widen it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Standard deviations of R^2 to either side.
+# Half-width of the band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
-# A hidden share may be the harmonics of a spring that is not linear: between its peaks, which stay in step, R is then
-# off by up to half of so many times the share.
+# Effect of the hidden share if it consists of harmonics of a nonlinear spring: between the peaks, which stay in step,
+# R is off by up to half of this many times the share.
 _HARMONIC_COUNTS: Final = 8.0
 
 
 def residual_band(
     fit: Identification, stated: Samples, tr: Samples, td: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
-    """Give the residual of each tr (n,), and the lowest and highest that the record allows [-].
+    """Return the residual of each tr (n,), and the lowest and highest that the record allows [-].
 
-    Where scatter lets the square reach below zero, the middle of the rest is stated: a peak that is picked from noise
-    is not exact.  A mode that hides stood opposed at worst, and is left out at best.
+    If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
+    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.
 
     Parameters
     ----------
@@ -40,39 +40,46 @@ def residual_band(
         [time]
     """
     assert fit.mode is not None
-    mode, squared = fit.mode, np.square(stated)
-    scatter = _DEVIATIONS * _deviation(fit, tr, td)
+    mode = fit.mode
+    squared = np.square(stated)
+    scatter = _DEVIATIONS * _compute_deviation(fit, tr, td)
     share = measures.phase_share(mode.alpha, mode.omega)
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent
-    hidden = fit.hidden_share * _opposed(fit, tr, td)
+    hidden = fit.hidden_share * _count_opposed(fit, tr, td)
     return measures.band_about(squared, off, hidden, fit.hidden_share * squared)
 
 
-def _opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """R^2 of a mode that stood at tr at one end of its swing, and at td at the other, smaller by its damping [-]."""
+def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
+    """Return R^2 of a hidden mode at one end of its swing at tr and at the other at td, with its damping [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
 
 
-def _deviation(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Give the standard deviation of R^2 of each tr (n,), by what scatter does to the parameters of the fit [-]."""
+def _compute_deviation(
+    fit: Identification, tr: Samples, td: Samples | float
+) -> Samples:
+    """Return the standard deviation of R^2 of each tr (n,), due to the scatter of the fit's parameters [-].
+
+    The covariance is scaled to a unit diagonal first: its parameters have different units.
+    """
     assert fit.mode is not None
-    values, directions = np.linalg.eigh(fit.covariance)
+    sizes = np.sqrt(np.diag(fit.covariance))
+    sizes[sizes == 0] = 1.0
+    values, directions = np.linalg.eigh(fit.covariance / np.outer(sizes, sizes))
     deviation: Samples = np.zeros(tr.shape)
     for value, direction in zip(values.tolist(), directions.T, strict=True):
         if value <= 0:
             continue
-        step = np.sqrt(value) * direction
-        above, below = (
-            _squared(_moved(fit.mode, way), tr, td) for way in (step, -step)
-        )
+        step = np.sqrt(value) * sizes * direction
+        above = _compute_squared(_move_parameters(fit.mode, step), tr, td)
+        below = _compute_squared(_move_parameters(fit.mode, -step), tr, td)
         deviation = np.hypot(deviation, (above - below) / 2)
     return deviation
 
 
-def _moved(mode: Mode, step: Samples) -> Mode:
-    """Give a mode whose first parameters are off by a ``step`` of shape (p,)."""
+def _move_parameters(mode: Mode, step: Samples) -> Mode:
+    """Return a mode whose first parameters are changed by a ``step`` of shape (p,)."""
     parameters = np.array(
         [
             mode.omega,
@@ -88,7 +95,7 @@ def _moved(mode: Mode, step: Samples) -> Mode:
     return Mode(omega, alpha, cosine, sine, mode.origin, plastic, preload)
 
 
-def _squared(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """R^2 of each tr (n,) [-]."""
+def _compute_squared(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
+    """Return R^2 of each tr (n,) [-]."""
     lost = mode.separation(tr, td) + mode.kinetic_energy(td)
     return np.asarray(lost / mode.vibration_energy(td))

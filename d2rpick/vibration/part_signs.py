@@ -11,9 +11,9 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.measures import Profile
-from d2rpick.vibration.span import SMALLEST, hidden_share
+from d2rpick.vibration.span import SMALLEST, estimate_hidden_share
 from d2rpick.vibration.swings import SOLVER_FLOOR
-from d2rpick.vibration.waves import PartMotion, all_zeros, followed
+from d2rpick.vibration.waves import PartMotion, find_all_zeros, follow_waves
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,29 +27,6 @@ if TYPE_CHECKING:
 # A mode fitted to one part can imitate the cross terms between modes in its energy: it must leave this much less.
 _CLEARLY = 0.5
 
-
-def by_own_mode(
-    time: Samples, energy: Samples, followed: PartMotion | None
-) -> PartMotion | None:
-    """Return the motion of one mode for a part if it describes the energy and leaves clearly less than ``followed``."""
-    fit = identify(time, energy, quick=True)
-    if fit.mode is None or not _purely_vibrates(fit):
-        return followed
-    hidden = max(fit.hidden_share, hidden_share(time, energy, fit.mode))
-    if followed and hidden > _CLEARLY * followed.hidden:
-        return followed
-    return PartMotion(fit.mode, np.zeros(0), hidden)
-
-
-def _purely_vibrates(fit: Identification) -> bool:
-    """Return True if a fit has no plastic rest or preload, which may be a second plane at a similar rate."""
-    return bool(
-        fit.describes_record
-        and fit.mode
-        and not (fit.mode.energy_plastic or fit.mode.preload)
-    )
-
-
 # A deformation that swings about zero has a mean of zero. Beyond this share of its mean size it swings about a preload
 # or plastic work, and its sign at a zero of the energy means nothing.
 _MOST_OFF_CENTRE = 0.5
@@ -59,6 +36,30 @@ MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = (
     "no few modes have its energy, with the signs that its minima give or on their own"
 )
+# The named parts make up this share of the mismatch.
+_NAMED_TOGETHER = 0.8
+
+
+def find_own_mode(
+    time: Samples, energy: Samples, followed: PartMotion | None
+) -> PartMotion | None:
+    """Return the motion of one mode for a part if it describes the energy and leaves clearly less than ``followed``."""
+    fit = identify(time, energy, quick=True)
+    if fit.mode is None or not _is_pure_vibration(fit):
+        return followed
+    hidden = max(fit.hidden_share, estimate_hidden_share(time, energy, fit.mode))
+    if followed and hidden > _CLEARLY * followed.hidden:
+        return followed
+    return PartMotion(fit.mode, np.zeros(0), hidden)
+
+
+def _is_pure_vibration(fit: Identification) -> bool:
+    """Return True if a fit has no plastic rest or preload, which may be a second plane at a similar rate."""
+    return bool(
+        fit.describes_record
+        and fit.mode
+        and not (fit.mode.energy_plastic or fit.mode.preload)
+    )
 
 
 class PartMatch(NamedTuple):
@@ -115,17 +116,18 @@ class SignedParts(SignedAmplitudes):
         held = np.sum(roots**2, axis=1)
         self._order = np.argsort(-held, kind="stable")
         lost, self._main = 0.0, dict[int, PartMotion | str]()
-        for i, known in self._by_zeros(self._order, roots):
-            motion = known if isinstance(known, PartMotion) else None
+        for i, part_motion in self._by_zeros(self._order, roots):
+            motion = part_motion if isinstance(part_motion, PartMotion) else None
             if motion is None or motion.hidden > SMALLEST:
-                motion = by_own_mode(time, roots[i] ** 2, motion)
-            self._main[i] = motion or known
+                motion = find_own_mode(time, roots[i] ** 2, motion)
+            self._main[i] = motion or part_motion
             lost += 0.0 if motion else held[i]
             if lost > MOST_UNSIGNED * held.sum():
                 break
-        self.unsigned_share = (
-            float(lost / held.sum()) if lost else float(not held.any())
-        )
+        if lost:
+            self.unsigned_share = float(lost / held.sum())
+        else:
+            self.unsigned_share = float(not held.any())
 
     def _roots(self) -> Samples:
         """Return the roots of the energies, shape (k, n); not stored, since there may be a window for each td."""
@@ -136,23 +138,25 @@ class SignedParts(SignedAmplitudes):
     ) -> Iterator[tuple[int, PartMotion | str]]:
         """Yield the motion of parts from the zeros of their energy, or the reason why there is none."""
         lasting = np.gradient(self.time)
-        for i, own in zip(
-            places.tolist(), all_zeros(self.time, roots[places]), strict=True
+        for i, own_roots in zip(
+            places.tolist(), find_all_zeros(self.time, roots[places]), strict=True
         ):
             root = roots[i]
-            tracked = np.where(np.searchsorted(own.sure, self.time) % 2, -root, root)
-            reason = _no_sign(lasting, tracked, own.sure)
-            motion = None if reason else followed(self.time, tracked, own)
+            tracked = np.where(
+                np.searchsorted(own_roots.sure, self.time) % 2, -root, root
+            )
+            reason = _explain_no_sign(lasting, tracked, own_roots.sure)
+            motion = None if reason else follow_waves(self.time, tracked, own_roots)
             yield i, motion or reason or _NOT_FOLLOWED
 
     @cached_property
     def _all(self) -> list[PartMotion | str]:
         """Return all parts; if too much has no sign, no modes are searched in parts that hold less."""
-        found = {
+        motions = {
             **self._main,
             **dict(self._by_zeros(self._order[len(self._main) :], self._roots())),
         }
-        return [found[i] for i in sorted(found)]
+        return [motions[i] for i in sorted(motions)]
 
     @property
     def signed(self) -> bool:
@@ -169,14 +173,14 @@ class SignedParts(SignedAmplitudes):
         """Return the names of the k parts that have a sign."""
         return tuple(
             name
-            for name, known in zip(self._names, self._all, strict=True)
-            if isinstance(known, PartMotion)
+            for name, motion in zip(self._names, self._all, strict=True)
+            if isinstance(motion, PartMotion)
         )
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
         """Return how each of them vibrates; the sign of a deformation as a whole is arbitrary."""
-        return tuple(known for known in self._all if isinstance(known, PartMotion))
+        return tuple(motion for motion in self._all if isinstance(motion, PartMotion))
 
     @property
     def unsigned(self) -> tuple[PartMatch, ...]:
@@ -193,31 +197,33 @@ class SignedParts(SignedAmplitudes):
         """Return the index in ``names`` of each deformation's part: a part has a deformation for each of its modes."""
         return np.repeat(
             np.arange(len(self.names)),
-            [len(one.model.amplitudes(0.0)) for one in self.motions],
+            [len(motion.model.amplitudes(0.0)) for motion in self.motions],
         )
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Return signed deformations of the parts' modes, shape of ``t`` with an axis before it [sqrt(energy)]."""
-        return np.concatenate([one.model.amplitudes(t) for one in self.motions])
+        return np.concatenate([motion.model.amplitudes(t) for motion in self.motions])
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Return the kinetic energy of the vibration, T [energy]."""
         return np.asarray(
-            np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0)
+            np.sum([motion.model.kinetic_energy(t) for motion in self.motions], axis=0)
         )
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Return the energy of the vibration, V = E + T [energy]."""
         return np.asarray(
-            np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0)
+            np.sum(
+                [motion.model.vibration_energy(t) for motion in self.motions], axis=0
+            )
         )
 
     def unseen(self, t: Samples | float, td: float) -> Samples:
         """Return the share of the vibration energy at td that hidden modes and omitted parts may have at ``t`` [-]."""
-        beside = self.unsigned_share / (1 - self.unsigned_share)
+        unsigned_ratio = self.unsigned_share / (1 - self.unsigned_share)
         hidden = [
-            (one.hidden + beside) * one.model.vibration_energy(t)
-            for one in self.motions
+            (motion.hidden + unsigned_ratio) * motion.model.vibration_energy(t)
+            for motion in self.motions
         ]
         return np.asarray(np.sum(hidden, axis=0) / self.vibration_energy(td))
 
@@ -240,30 +246,30 @@ class SignedParts(SignedAmplitudes):
     ) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,), and its bounds if what may be hidden stood opposed at tr and td [-]."""
         opposed = np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
-        squared, hidden = np.square(stated), np.square(opposed)
+        squared = np.square(stated)
+        hidden = np.square(opposed)
         return measures.band_about(squared, 0.0 * squared, hidden, hidden)
 
     def comparable_since(self, td: float) -> float:
         """Return the last unclear time before ``td``: from there on signs can be compared with those at td [time]."""
-        unclear = np.concatenate([one.unclear for one in self.motions])
+        unclear = np.concatenate([motion.unclear for motion in self.motions])
         return float(np.max(unclear[unclear < td], initial=self.time[0]))
 
 
-def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:
+def _explain_no_sign(
+    lasting: Samples, deformation: Samples, zeros: Samples
+) -> str | None:
     """Return the reason why a deformation, with durations ``lasting`` of its states, does not swing about zero."""
     if zeros.size < 2:
         return "the energy does not return to zero: preloaded, yielded or vibrating in many modes"
-    off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
-    if off > _MOST_OFF_CENTRE * size:
-        return f"the deformation would vibrate about {off / size:.2g} of its mean size: preloaded or yielded"
+    offset = abs(float(lasting @ deformation))
+    size = float(lasting @ np.abs(deformation))
+    if offset > _MOST_OFF_CENTRE * size:
+        return f"the deformation would vibrate about {offset / size:.2g} of its mean size: preloaded or yielded"
     return None
 
 
-# The named parts make up this share of the mismatch.
-_NAMED_TOGETHER = 0.8
-
-
-def contributions(
+def list_contributions(
     vibration: SignedParts, tr: float, td: float
 ) -> tuple[PartMatch, ...]:
     """Return the match of each part, the largest share first, then those without a sign."""
@@ -280,24 +286,25 @@ def contributions(
         PartMatch(*row)
         for row in zip(vibration.names, same.tolist(), shares, strict=True)
     ]
-    matches.sort(key=lambda one: -(one.share or 0.0))
+    matches.sort(key=lambda contribution: -(contribution.share or 0.0))
     return (*matches, *vibration.unsigned)
 
 
-def main_contributors(matches: Sequence[PartMatch]) -> str:
+def name_main_contributors(matches: Sequence[PartMatch]) -> str:
     """Return the names of the parts that contribute most.
 
     Examples
     --------
-    >>> main_contributors([PartMatch("roof", False, 0.7), PartMatch("door", True, 0.25), PartMatch("seat", True, 0.05)])
+    >>> matches = [("roof", False, 0.7), ("door", True, 0.25), ("seat", True, 0.05)]
+    >>> name_main_contributors([PartMatch(*match) for match in matches])
     'roof 70 % (opposite sign), door 25 %'
     """
-    named, sum_of_shares = [], 0.0
+    contributors, sum_of_shares = [], 0.0
     for match in matches:
         if match.share is None or sum_of_shares >= _NAMED_TOGETHER:
             break
-        named.append(
+        contributors.append(
             f"{match.name} {match.share * 100:.0f} %{'' if match.sign_match else ' (opposite sign)'}"
         )
         sum_of_shares += match.share
-    return ", ".join(named)
+    return ", ".join(contributors)

@@ -11,8 +11,8 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import History, Memory, Samples
-from d2rpick.histories.samples import integral
-from d2rpick.vibration.fitting import cell_means
+from d2rpick.histories.samples import integrate_by_trapezia
+from d2rpick.vibration.fitting import average_cells
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.modes import BLOCK, Mode
 
@@ -68,6 +68,15 @@ _MOST_OF_BOUNDS = 0.5
 # Fits of the growing window until it stays; two are usual.
 _MOST_REFITS = 8
 
+# Least share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06, and real
+# solvers leave as much.
+SMALLEST: Final = 1e-3
+_MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
+_FINER: Final = 4  # points per line of a spectrum, so that its peak is met
+_CELLS_PER_PERIOD: Final = (
+    4  # of the fastest line: with fewer, means over cells would hide most of it
+)
+
 
 class Span(NamedTuple):
     """A window of the record, from its first to its last sample [time]."""
@@ -76,7 +85,7 @@ class Span(NamedTuple):
     end: float
 
 
-def described_span(
+def find_described_span(
     history: History,
     td: float,
     bounds: Span,
@@ -111,11 +120,12 @@ def described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    quick, up_to_td = partial(fitter, quick=True), Span(bounds.start, _mark(td, bounds))
-    reach = partial(_reach, history, bounds, memory or Memory())
+    quick = partial(fitter, quick=True)
+    up_to_td = Span(bounds.start, _mark(td, bounds))
+    reach = partial(_find_reach_of_fit, history, bounds, memory or Memory())
     refused = {}
-    for window in _windows(td, bounds, whole=whole):
-        span, fit = _grow(
+    for window in _list_windows_around(td, bounds, whole=whole):
+        span, fit = _grow_span(
             history, td, window, bounds, fitter if window == up_to_td else quick, reach
         )
         if span:
@@ -139,38 +149,40 @@ def most_described(
     """
     start, end = bounds
     middle = (start + end) / 2
-    beginnings, ends = [start], [end]
+    beginnings = [start]
+    ends = [end]
     if not whole:
         beginnings.append(_mark(middle - _BEGINNINGS[0] * (middle - start), bounds))
         ends.append(_mark(middle + _ENDS[0] * (end - middle), bounds, 1))
     windows = [Span(*window) for window in product(beginnings, ends)]
-    reach = partial(_reach, history, bounds, memory or Memory())
+    reach = partial(_find_reach_of_fit, history, bounds, memory or Memory())
     for window in sorted(windows, key=lambda one: one.start - one.end):
-        span, fit = _grow(history, middle, window, bounds, fitter, reach)
+        span, fit = _grow_span(history, middle, window, bounds, fitter, reach)
         if span and span.end - span.start >= _MOST_OF_BOUNDS * (end - start):
             return span, fit
     return None
 
 
-def _reach(
+def _find_reach_of_fit(
     history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification
 ) -> Span | None:
     """Give the `span_of` a fit, from the middle of what it was fitted to if the anchor lies in that.
 
     All times in it have the same but for rounding, and many td ask for it: none of them shall have it of another.
     """
-    key, middle = (fit.mode, fit.rms, fit.structure, bounds), (fit.start + fit.end) / 2
+    key = (fit.mode, fit.rms, fit.structure, bounds)
+    middle = (fit.start + fit.end) / 2
     span = memory.once(
-        ("span", *key, middle), lambda: span_of(history, middle, fit, bounds)
+        ("span", *key, middle), lambda: find_span(history, middle, fit, bounds)
     )
     if span is not None and span.start <= anchor <= span.end:
         return span
     return memory.once(
-        ("span", *key, anchor), lambda: span_of(history, anchor, fit, bounds)
+        ("span", *key, anchor), lambda: find_span(history, anchor, fit, bounds)
     )
 
 
-def span_of(
+def find_span(
     history: History, anchor: float, fit: Identification, bounds: Span
 ) -> Span | None:
     """Find the window around ``anchor`` [time], within ``bounds``, in which the record follows ``fit``.
@@ -186,21 +198,34 @@ def span_of(
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
     room = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
     middle = int(np.searchsorted(time, anchor))
-    behind, ahead = width // 2, (width - 1) // 2
-    after = _first_off(time, energy, fit.mode, room, middle, behind, ahead)
-    before = _first_off(
-        time[::-1], energy[::-1], fit.mode, room, time.size - middle, ahead, behind
+    states_behind = width // 2
+    ahead = (width - 1) // 2
+    first_after = _find_first_off(
+        time, energy, fit.mode, room, middle, states_behind, ahead
+    )
+    last_before = _find_first_off(
+        time[::-1],
+        energy[::-1],
+        fit.mode,
+        room,
+        time.size - middle,
+        ahead,
+        states_behind,
     )
     # the mean over ``width`` samples reaches half as far beyond its middle
-    left = 0 if before is None else time.size - before + width // 2
-    right = time.size - 1 if after is None else after - 1 - width // 2
-    return Span(float(time[left]), float(time[right])) if left < right else None
+    left_end = 0 if last_before is None else time.size - last_before + width // 2
+    right_end = time.size - 1 if first_after is None else first_after - 1 - width // 2
+    return (
+        Span(float(time[left_end]), float(time[right_end]))
+        if left_end < right_end
+        else None
+    )
 
 
 @np.errstate(
     over="ignore", invalid="ignore"
 )  # far away, a damped fit grows beyond all numbers
-def _first_off(
+def _find_first_off(
     time: Samples,
     energy: Samples,
     mode: Mode,
@@ -215,8 +240,10 @@ def _first_off(
     """
     for begin in range(first, time.size, BLOCK):
         inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
-        off = energy[inside] - mode.energy(time[inside])
-        means = np.abs(_means(off, begin - inside.start, behind, ahead)[:BLOCK])
+        deviation = energy[inside] - mode.energy(time[inside])
+        means = np.abs(
+            _average_running(deviation, begin - inside.start, behind, ahead)[:BLOCK]
+        )
         loud = np.flatnonzero(~(means <= room))
         far = loud[
             ~(means[loud] <= _SHARE_OFF * mode.vibration_energy(time[begin + loud]))
@@ -226,17 +253,18 @@ def _first_off(
     return None
 
 
-def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
+def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Samples:
     """Return means of ``behind`` values before each value and ``ahead`` after it, from ``first`` on."""
-    known, width = values[max(first - behind, 0) :], behind + 1 + ahead
+    needed = values[max(first - behind, 0) :]
+    width = behind + 1 + ahead
     sums = np.zeros(values.size - first + width)
     begin = 1 + max(behind - first, 0)
-    sums[begin : begin + known.size] = known
+    sums[begin : begin + needed.size] = needed
     np.cumsum(sums, out=sums)
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
+def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
     """Windows to try: around td, the longest first, then before td."""
     start, end = bounds
     beginnings = [
@@ -274,18 +302,17 @@ def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
 
 def _mark(time: float, bounds: Span, after: int = 0) -> float:
     """Give the last mark that is not after ``time``, or the one ``after`` it; where there is none, the time itself."""
-    share = (
-        (time - bounds.start) / (bounds.end - bounds.start)
-        if bounds.end > bounds.start
-        else 0.0
-    )
+    if bounds.end > bounds.start:
+        share = (time - bounds.start) / (bounds.end - bounds.start)
+    else:
+        share = 0.0
     if not 0 < share <= 1:
         return time
-    place = ceil(log(share) / log(_MARKS)) - after
-    return bounds.start + (bounds.end - bounds.start) * _MARKS ** max(place, 0)
+    exponent = ceil(log(share) / log(_MARKS)) - after
+    return bounds.start + (bounds.end - bounds.start) * _MARKS ** max(exponent, 0)
 
 
-def _grow(
+def _grow_span(
     history: History,
     td: float,
     window: Span,
@@ -294,30 +321,31 @@ def _grow(
     reach: Reach,
 ) -> tuple[Span | None, Identification]:
     """Fit the window, extend it while the record follows the fit, refit, and repeat until it no longer changes."""
-    fit, span = fitter(*history.between(*window)), window
+    fit = fitter(*history.between(*window))
+    span = window
     for _ in range(_MOST_REFITS):
         if not fit.follows or fit.mode is None:
             return None, fit
-        least = max(
+        shortest = max(
             _LEAST_PERIODS * 2 * np.pi / fit.mode.omega,
             _MOST * (window.end - window.start),
         )
         # of a period far beyond the record, means over a part of it would be of far more samples than there are
-        possible = least <= bounds.end - bounds.start
+        possible = shortest <= bounds.end - bounds.start
         grown = reach(min(td, window.end), fit) if possible else None
-        if grown is None or grown.end - grown.start < least:
+        if grown is None or grown.end - grown.start < shortest:
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
             if not fit.describes_record:  # too short, for example
                 return None, fit
-            return _cleared(history, grown, fit, bounds, fitter, reach)
+            return _clear_ends(history, grown, fit, bounds, fitter, reach)
         span = grown
         fit = fitter(*history.between(*span))
     return (span, fit) if fit.describes_record else (None, fit)
 
 
-def _cleared(
+def _clear_ends(
     history: History,
     span: Span,
     fit: Identification,
@@ -364,17 +392,7 @@ class Fits(Memory):
         return fit
 
 
-# Least share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06, and real
-# solvers leave as much.
-SMALLEST: Final = 1e-3
-_MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
-_FINER: Final = 4  # points per line of a spectrum, so that its peak is met
-_CELLS_PER_PERIOD: Final = (
-    4  # of the fastest line: with fewer, means over cells would hide most of it
-)
-
-
-def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
+def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     """Return the share of the vibration energy that a further mode may have in what a model leaves over [-].
 
     That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
@@ -389,11 +407,15 @@ def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
     s = (time - time[0]) / span
-    rest = cell_means(s, integral(s, energy - model.energy(time)), count)
+    remainder = average_cells(
+        s, integrate_by_trapezia(s, energy - model.energy(time)), count
+    )
     decay = np.exp(-model.alpha * span * (np.arange(count) + 0.5) / count)
     # from one period in the record to the fastest line that the cells show
-    shown = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
-    strongest = float(np.abs(np.fft.rfft(rest * decay, _FINER * count))[shown].max())
+    visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
+    strongest = float(
+        np.abs(np.fft.rfft(remainder * decay, _FINER * count))[visible].max()
+    )
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # the energy of a mode swings about a mean by half of its vibration energy
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)

@@ -39,6 +39,9 @@ _OF_ANY_SPRING: Final = 2.0
 # times the root by more than 0.05.
 _OF_THE_FLOOR: Final = 5.0
 
+# Share of the highest energy below which nothing is surely vibration: a solver errs by 1/10 of it at any time.
+SOLVER_FLOOR: Final = 1e-4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swings(SignedAmplitudes):
@@ -83,8 +86,8 @@ class Swings(SignedAmplitudes):
 
     def comparable_since(self, td: float) -> float:
         """Return the earliest time whose sign can be compared with that at ``td`` [time]."""
-        before = self.unclear[self.unclear < td]
-        return float(before[-1] if before.size else self.time[0])
+        unclear_before = self.unclear[self.unclear < td]
+        return float(unclear_before[-1] if unclear_before.size else self.time[0])
 
     def known_at(self, td: float) -> bool:
         """Return True if at least two swings before ``td`` were counted, and more vibrates than the solver's error."""
@@ -122,7 +125,10 @@ class Swings(SignedAmplitudes):
         last = int(np.searchsorted(self.bottoms, td)) + 1
         around = [self.floor[min(at, last - 1) : last] for at in first.tolist()]
         energies = np.array(
-            [min(float(np.ptp(one)), float(np.abs(one).max())) for one in around]
+            [
+                min(float(np.ptp(excursions)), float(np.abs(excursions).max()))
+                for excursions in around
+            ]
         )
         return energies / float(self.vibration_energy(td))
 
@@ -143,29 +149,31 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     True
     >>> count_swings(t, np.sin(8.0 * t) ** 2 + np.sin(13.0 * t) ** 2)
     """
-    at, open_end = _turns(energy)
-    low = (
-        energy[at] < energy[np.roll(at, 1)] if at.size > 1 else np.zeros(0, dtype=bool)
-    )
+    at, open_end = _find_turns(energy)
+    if at.size > 1:
+        low = energy[at] < energy[np.roll(at, 1)]
+    else:
+        low = np.zeros(0, dtype=bool)
     low[:1] = ~low[1:2]
     if np.count_nonzero(low) < _FEWEST:
         return None
     moment, value = vertices(time, energy, at)
-    bottom, floor = moment[low], value[low]
+    bottom = moment[low]
+    floor = value[low]
     swing = np.interp(bottom, moment[~low], value[~low]) - floor
-    off = np.abs(_off_line(bottom, floor)) > _OFF_FLOOR * swing
-    if np.count_nonzero(off) > _MOST_OFF * off.size:
+    is_off_floor = np.abs(_measure_off_line(bottom, floor)) > _OFF_FLOOR * swing
+    if np.count_nonzero(is_off_floor) > _MOST_OFF * is_off_floor.size:
         return None
     if _is_beat(bottom, floor, moment[~low], value[~low]):
         return None
-    elastic = np.maximum(energy - _along(time, bottom, floor), 0.0)
-    whole = upper_envelope(time, elastic)
+    elastic = np.maximum(energy - _extend_lines(time, bottom, floor), 0.0)
+    whole = find_upper_envelope(time, elastic)
     if whole is None:
         return None
     turned = np.searchsorted(bottom, time) % 2 == 1
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
     unclear = np.sort(
-        np.concatenate([bottom[off], time[[1, open_end]]])
+        np.concatenate([bottom[is_off_floor], time[[1, open_end]]])
     )  # a minimum next to the ends is not seen
     return Swings(time, deformation, unclear, whole, bottom, floor)
 
@@ -184,38 +192,44 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
         The maxima between them [time], and the energy there.
     """
     middle = (bottom[1:] + bottom[:-1]) / 2
-    lasting, height = (
-        np.diff(bottom),
-        np.interp(middle, top, peak) - np.interp(middle, bottom, floor),
-    )
-    longer, higher = np.diff(lasting), np.diff(height)
+    lasting = np.diff(bottom)
+    height = np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
+    longer = np.diff(lasting)
+    higher = np.diff(height)
     uneven = np.abs(longer) > _UNEVEN * (lasting[1:] + lasting[:-1])
     opposed = uneven & (longer * higher < 0)
     return bool(2 * np.count_nonzero(opposed) > opposed.size)
 
 
-def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
+def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
     """Return the indices at which the energy turns from one swing into the next, and the last turn seen completely."""
-    places, last = find_turns(energy)[0], energy.size - 2
-    if 4 * places.size > energy.size:  # noise
+    turning_points = find_turns(energy)[0]
+    last = energy.size - 2
+    if 4 * turning_points.size > energy.size:  # noise
         return np.zeros(0, dtype=np.intp), last
-    places = np.concatenate([[0], places, [energy.size - 1]])
-    found, swing, before = [], float(np.ptp(energy)), float(energy[0])
-    extreme, direction = before, 1 if energy[places[1]] > before else -1
+    turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
+    turns = []
+    swing = float(np.ptp(energy))
+    last_extreme = float(energy[0])
+    extreme = last_extreme
+    direction = 1 if energy[turning_points[1]] > last_extreme else -1
     at = 0
-    for place, value in zip(places.tolist(), energy[places].tolist(), strict=True):
+    for turning_point, value in zip(
+        turning_points.tolist(), energy[turning_points].tolist(), strict=True
+    ):
         if direction * (value - extreme) >= 0:
-            extreme, at = value, place
+            extreme, at = value, turning_point
         elif abs(value - extreme) > _SWING * swing:
-            found.append(at)
-            swing, before = abs(extreme - before) or swing, extreme
-            extreme, at, direction = value, place, -direction
+            turns.append(at)
+            swing = abs(extreme - last_extreme) or swing
+            last_extreme = extreme
+            extreme, at, direction = value, turning_point, -direction
     return np.array(
-        [one for one in found if one > 0], dtype=np.intp
+        [turn for turn in turns if turn > 0], dtype=np.intp
     ), last if direction > 0 else min(at, last)
 
 
-def _along(time: Samples, x: Samples, y: Samples) -> Samples:
+def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
     """Return values on straight lines through points, continued beyond the first and the last two of them."""
     first, last = (
         y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
@@ -226,21 +240,19 @@ def _along(time: Samples, x: Samples, y: Samples) -> Samples:
     )
 
 
-def _off_line(x: Samples, y: Samples) -> Samples:
+def _measure_off_line(x: Samples, y: Samples) -> Samples:
     """Return how far each of n >= 3 values lies off the line through its neighbours, or the next two at an end."""
     middle = np.clip(np.arange(x.size), 1, x.size - 2)
     ends = np.arange(x.size) != middle
-    left, right = (
-        np.where(ends, middle, middle - 1),
-        np.where(ends, 2 * middle - np.arange(x.size), middle + 1),
-    )
+    left_state = np.where(ends, middle, middle - 1)
+    right_state = np.where(ends, 2 * middle - np.arange(x.size), middle + 1)
     return np.asarray(
-        y - y[left] - (y[right] - y[left]) / (x[right] - x[left]) * (x - x[left])
+        y
+        - y[left_state]
+        - (y[right_state] - y[left_state])
+        / (x[right_state] - x[left_state])
+        * (x - x[left_state])
     )
-
-
-# Share of the highest energy below which nothing is surely vibration: a solver errs by 1/10 of it at any time.
-SOLVER_FLOOR: Final = 1e-4
 
 
 class Envelope(NamedTuple):
@@ -265,7 +277,7 @@ class Envelope(NamedTuple):
         )
 
 
-def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
+def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     """Find the lowest falling exponential above all peaks, seen from the middle of them; None without peaks.
 
     Parameters
@@ -282,7 +294,7 @@ def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     Examples
     --------
     >>> t = np.linspace(0.0, 3.0, 301)
-    >>> found = upper_envelope(t, np.exp(-0.5 * t) * np.sin(8.0 * t) ** 2)
+    >>> found = find_upper_envelope(t, np.exp(-0.5 * t) * np.sin(8.0 * t) ** 2)
     >>> f"{found.rate:.2f}", f"{found.vibration_energy(0.0):.2f}"
     ('0.50', '1.00')
     """
@@ -295,18 +307,20 @@ def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     middle = float(np.mean([t for t, _ in peaks]))
     hull: list[tuple[float, float]] = []
     for peak in peaks:
-        while len(hull) > 1 and _turns_left(hull[-2], hull[-1], peak):
+        while len(hull) > 1 and _is_left_turn(hull[-2], hull[-1], peak):
             hull.pop()
         hull.append(peak)
-    right = next((i for i, (t, _) in enumerate(hull) if t > middle), len(hull) - 1)
-    (t0, top0), (t1, top1) = hull[max(right - 1, 0)], hull[right]
+    next_vertex = next(
+        (i for i, (t, _) in enumerate(hull) if t > middle), len(hull) - 1
+    )
+    (t0, top0), (t1, top1) = hull[max(next_vertex - 1, 0)], hull[next_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
     if rate <= 0:  # vibration energy only falls: the highest peak bounds it
         return Envelope(float(np.exp(max(top for _, top in hull))), 0.0, middle, floor)
     return Envelope(float(np.exp(top0)), rate, t0, floor)
 
 
-def _turns_left(
+def _is_left_turn(
     a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
     """Return True if the path through three points turns left at the second."""

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import stretches
-from d2rpick.vibration.fitting import factors_of
-from d2rpick.vibration.span import hidden_share
+from d2rpick.histories.samples import find_stretches
+from d2rpick.vibration.fitting import find_factors
+from d2rpick.vibration.span import estimate_hidden_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -39,6 +39,29 @@ _MOST_SAMPLES, _LEAST_SAMPLES = 400, 36
 _AS_GOOD, _ROUNDING = 1.5, 1e-12
 # Largest exponent: outside the fitted record a decay grows backwards without end.
 _LARGEST_EXPONENT: Final = 100.0
+
+# One choice of the sign must be this many times smoother. At 24 samples per period of a chain of two springs the least
+# clear of 35 minima has 2.5, usual ones 5 to 60.
+_SMOOTHER = 2.0
+# Every second sample is left out repeatedly while minima are unclear: in fine output the solver's error, 1e-5 of the
+# highest energy, hides a zero. Minima keep at least this many samples between them.
+_LEAST_APART = 8
+# Samples of parts that are processed together, so that they stay in the processor's cache.
+_TOGETHER = 1 << 14
+# Signs of five samples about a minimum if the deformation turns nowhere, just before the minimum, or just after it.
+_TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
+# Largest share of the energy that waves may leave: a wrong sign at one of thirty minima leaves 10 times as much, noise
+# of 0.5 % of the highest energy 1/10.
+_MOST_LEFT: Final = 0.01
+# A second plane with this share of the energy hides zeros, or makes false ones.
+_MOST_HIDDEN: Final = 0.01
+# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear: the record
+# differs there or is lost in noise.
+_OFF: Final = 0.2
+_MOST_OFF: Final = 0.5  # of the samples
+_ROUNDS: Final = (
+    4  # repetitions in which the fitted stretch comes to contain all clear times
+)
 
 
 class Waves(NamedTuple):
@@ -125,21 +148,21 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
         _fit(space[: 2 * count].T, even[1] - even[0], time, deformation)
         for count in range(1, _MOST + 1)
     )
-    found = [fit for fit in fits if fit]
-    if not found:
+    usable_fits = [fit for fit in fits if fit]
+    if not usable_fits:
         return None
-    most = max(
-        _AS_GOOD * min(left for left, _ in found),
+    worst_accepted = max(
+        _AS_GOOD * min(misfit for misfit, _ in usable_fits),
         _ROUNDING * float(deformation @ deformation),
     )
-    return next(waves for left, waves in found if left <= most)
+    return next(waves for misfit, waves in usable_fits if misfit <= worst_accepted)
 
 
 def _fit(
     space: Samples, step: float, time: Samples, deformation: Samples
 ) -> tuple[float, Waves] | None:
     """Return the remaining sum of squares and the waves whose windows span ``space``, an orthonormal basis."""
-    rates = np.log(factors_of(space)) / step
+    rates = np.log(find_factors(space)) / step
     rates = rates[rates.imag > np.abs(rates.real)]  # a faster decay is no vibration
     if not rates.size:
         return None
@@ -149,24 +172,12 @@ def _fit(
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
     weight = np.abs(deformation)  # an error in the energy is halved in its root
-    found = np.linalg.lstsq(
+    solution = np.linalg.lstsq(
         basis * weight[:, np.newaxis], deformation * weight, rcond=None
     )[0]
-    rest = deformation - basis @ found
-    weights = found[: rates.size] + 1j * found[rates.size :]
-    return float(rest @ rest), Waves(rates, weights, float(time[0]))
-
-
-# One choice of the sign must be this many times smoother. At 24 samples per period of a chain of two springs the least
-# clear of 35 minima has 2.5, usual ones 5 to 60.
-_SMOOTHER = 2.0
-# Every second sample is left out repeatedly while minima are unclear: in fine output the solver's error, 1e-5 of the
-# highest energy, hides a zero. Minima keep at least this many samples between them.
-_LEAST_APART = 8
-# Samples of parts that are processed together, so that they stay in the processor's cache.
-_TOGETHER = 1 << 14
-# Signs of five samples about a minimum if the deformation turns nowhere, just before the minimum, or just after it.
-_TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
+    remainder = deformation - basis @ solution
+    weights = solution[: rates.size] + 1j * solution[rates.size :]
+    return float(remainder @ remainder), Waves(rates, weights, float(time[0]))
 
 
 class Zeros(NamedTuple):
@@ -177,103 +188,96 @@ class Zeros(NamedTuple):
     unseen: Samples
 
 
-def all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
+def find_all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
     """Find the zeros of each row of ``roots``, shape (k, n)."""
     rows = max(1, _TOGETHER // time.size)
     for first in range(0, len(roots), rows):
-        yield from _zeros(time, roots[first : first + rows])
+        yield from _find_zeros(time, roots[first : first + rows])
 
 
-def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
+def _find_zeros(time: Samples, roots: Samples) -> list[Zeros]:
     """Find the zeros of each row from every sample, or every second and so on, with the fewest doubtful ones."""
-    best, stride = _zeros_of(time, roots, _minima(roots)), 2
-    unsure = _unsure(best, range(len(best)))
+    best = _find_zeros_in(time, roots, _find_minima(roots))
+    stride = 2
+    unsure = _list_unsure(best, range(len(best)))
     while unsure.size:
         coarse = roots[unsure, ::stride]
-        minima = _minima(coarse)
+        minima = _find_minima(coarse)
         apart = coarse.shape[1] >= _LEAST_APART * np.maximum(
             1, np.count_nonzero(minima, axis=1)
         )
         rows = unsure[apart].tolist()
         for row, coarser in zip(
-            rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True
+            rows,
+            _find_zeros_in(time[::stride], coarse[apart], minima[apart]),
+            strict=True,
         ):
-            best[row] = min(best[row], coarser, key=lambda found: found.doubtful.size)
-        unsure, stride = _unsure(best, rows), 2 * stride
+            best[row] = min(best[row], coarser, key=lambda zeros: zeros.doubtful.size)
+        unsure = _list_unsure(best, rows)
+        stride = 2 * stride
     return best
 
 
-def _unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
+def _list_unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
     """Return the rows with doubtful zeros."""
     return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
 
 
-def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[Zeros]:
+def _find_zeros_in(
+    time: Samples, roots: Samples, minima: NDArray[np.bool_]
+) -> list[Zeros]:
     """Find the zeros of each row from just these samples with these minima."""
     row, at = np.nonzero(minima)
     # two samples on either side show the bend of the root; a minimum nearer to an end remains unknown
-    early, late = at < 2, at >= time.size - 2
-    own, middle = row[~early & ~late], at[~early & ~late]
+    early = at < 2
+    late = at >= time.size - 2
+    row_of_zero = row[~early & ~late]
+    middle = at[~early & ~late]
     around = middle[:, np.newaxis] + np.arange(-2, 3)
-    plain, before, after = _bends(
-        time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis]
+    plain, bend_before, bend_after = _measure_bends(
+        time[around], roots[row_of_zero[:, np.newaxis], around] * _TURNS[:, np.newaxis]
     )
-    turned = np.minimum(before, after)
+    turned = np.minimum(bend_before, bend_after)
     zero = plain > _SMOOTHER * turned
     doubt = ~zero & (turned <= _SMOOTHER * plain)
-    left = np.where(before < after, middle - 1, middle)[zero]
-    low, high = roots[own[zero], left], roots[own[zero], left + 1]
+    left_state = np.where(bend_before < bend_after, middle - 1, middle)[zero]
+    low = roots[row_of_zero[zero], left_state]
+    high = roots[row_of_zero[zero], left_state + 1]
     share = np.divide(
-        low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0
+        low, low + high, out=np.full(left_state.shape, 0.5), where=low + high > 0
     )
-    sure = time[left] + share * (time[left + 1] - time[left])
+    sure = time[left_state] + share * (time[left_state + 1] - time[left_state])
     # a zero beside a minimum near an end may lie one sample further inwards
-    ends, unseen = (
-        np.append(row[early], row[late]),
-        np.append(time[at[early] + 1], time[at[late] - 1]),
-    )
+    ends = np.append(row[early], row[late])
+    unseen = np.append(time[at[early] + 1], time[at[late] - 1])
     order = np.argsort(ends, kind="stable")
     tables = (
-        (sure, own[zero]),
-        (time[middle[doubt]], own[doubt]),
+        (sure, row_of_zero[zero]),
+        (time[middle[doubt]], row_of_zero[doubt]),
         (unseen[order], ends[order]),
     )
-    parted = (_by_row(times, owners, len(roots)) for times, owners in tables)
-    return [Zeros(*one) for one in zip(*parted, strict=True)]
+    parted = (_split_by_row(times, owners, len(roots)) for times, owners in tables)
+    return [Zeros(*columns) for columns in zip(*parted, strict=True)]
 
 
-def _by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
+def _split_by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
     """Split values by row; rows may be empty."""
     edges = np.searchsorted(row, np.arange(rows + 1)).tolist()
     return [values[first:last] for first, last in pairwise(edges)]
 
 
-def _minima(values: Samples) -> NDArray[np.bool_]:
+def _find_minima(values: Samples) -> NDArray[np.bool_]:
     """Return a mask of the local minima in each row: the first of a flat one, and an end below its neighbour."""
     around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
     return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
 
 
-def _bends(times: Samples, values: Samples) -> Samples:
+def _measure_bends(times: Samples, values: Samples) -> Samples:
     """Return the largest second difference of the slopes in each row of five samples, for any number of tables."""
     slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
     return np.asarray(
         np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0)
     )
-
-
-# Largest share of the energy that waves may leave: a wrong sign at one of thirty minima leaves 10 times as much, noise
-# of 0.5 % of the highest energy 1/10.
-_MOST_LEFT: Final = 0.01
-# A second plane with this share of the energy hides zeros, or makes false ones.
-_MOST_HIDDEN: Final = 0.01
-# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear: the record
-# differs there or is lost in noise.
-_OFF: Final = 0.2
-_MOST_OFF: Final = 0.5  # of the samples
-_ROUNDS: Final = (
-    4  # repetitions in which the fitted stretch comes to contain all clear times
-)
 
 
 class PartMotion(NamedTuple):
@@ -287,7 +291,7 @@ class PartMotion(NamedTuple):
     hidden: float
 
 
-def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
+def follow_waves(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
     """Compare a deformation with waves, which are fitted where it is clear and decide the doubtful signs.
 
     Parameters
@@ -301,11 +305,9 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
     PartMotion or None
         None where no waves follow it.
     """
-    root, deformation, width = (
-        np.abs(tracked),
-        tracked,
-        max(3, time.size // (2 * zeros.sure.size)),
-    )
+    root = np.abs(tracked)
+    deformation = tracked
+    width = max(3, time.size // (2 * zeros.sure.size))
     edges = np.sort(np.concatenate([time[[0, -1]], zeros.doubtful, zeros.unseen]))
     longest = int(np.argmax(np.diff(edges)))
     stretch = slice(*np.searchsorted(time, edges[longest : longest + 2]).tolist())
@@ -316,29 +318,29 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         waves = fit
         modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
-        missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
+        missed = _average_around(miss, width) > _OFF * waves.vibration_energy(time)
         # also beside it, where the mean still contains much that is right
-        off = _means(missed.astype(np.float64), width) * width > 0.5
-        fitted, stretch = (
-            stretch,
-            max(
-                stretches(~off),
-                key=lambda one: one.stop - one.start,
-                default=slice(0, 0),
-            ),
+        is_missed = _average_around(missed.astype(np.float64), width) * width > 0.5
+        fitted = stretch
+        stretch = max(
+            find_stretches(~is_missed),
+            key=lambda stretch: stretch.stop - stretch.start,
+            default=slice(0, 0),
         )
         if stretch == fitted:
             break
         deformation = np.copysign(root, modelled)
     if (
-        np.mean(off) > _MOST_OFF
-        or miss[~off].sum() > _MOST_LEFT * (root[~off] ** 2).sum()
+        np.mean(is_missed) > _MOST_OFF
+        or miss[~is_missed].sum() > _MOST_LEFT * (root[~is_missed] ** 2).sum()
     ):
         return None
-    hidden = hidden_share(time[fitted], root[fitted] ** 2, waves)
-    return PartMotion(waves, time[off], hidden) if hidden <= _MOST_HIDDEN else None
+    hidden = estimate_hidden_share(time[fitted], root[fitted] ** 2, waves)
+    return (
+        PartMotion(waves, time[is_missed], hidden) if hidden <= _MOST_HIDDEN else None
+    )
 
 
-def _means(values: Samples, width: int) -> Samples:
+def _average_around(values: Samples, width: int) -> Samples:
     """Return means over ``width`` values around each value."""
     return np.convolve(values, np.ones(width) / width, mode="same")

@@ -4,12 +4,12 @@ import unicodedata
 
 from hypothesis import given, strategies as st
 
-from d2rpick.base.errors import listing, printable
+from d2rpick.base.errors import list_names, make_printable
 
 
 @given(st.text())
 def test_what_is_shown_holds_no_line_end_and_no_control_character(text: str) -> None:
-    escaped = printable(text)
+    escaped = make_printable(text)
     assert len(escaped.splitlines()) <= 1
     assert not {unicodedata.category(letter) for letter in escaped} & {
         "Cc",
@@ -21,19 +21,20 @@ def test_what_is_shown_holds_no_line_end_and_no_control_character(text: str) -> 
 
 @given(st.text(st.characters(exclude_categories=["Cc", "Cf", "Zl", "Zp"])))
 def test_every_other_name_is_shown_as_it_is(text: str) -> None:
-    assert printable(text) == text
+    assert make_printable(text) == text
 
 
 def test_an_escape_code_is_spelled_out() -> None:
     assert (
-        printable("\x1b[2Jbox\u202e\u2028é\udce9") == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
+        make_printable("\x1b[2Jbox\u202e\u2028é\udce9")
+        == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
     )
 
 
 def test_a_listing_is_one_line_and_counts_what_it_leaves_out() -> None:
     assert (
-        listing([f"box\n{i}" for i in range(4)], most=2)
+        list_names([f"box\n{i}" for i in range(4)], most=2)
         == "box\\n0, box\\n1 and 2 more"
     )
-    assert listing([3, 7], most=2, between=",") == "3,7"
-    assert listing([]) == ""
+    assert list_names([3, 7], most=2, between=",") == "3,7"
+    assert list_names([]) == ""

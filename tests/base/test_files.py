@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from d2rpick.base.files import settled_state, write_whole
+from d2rpick.base.files import wait_for_settled_state, write_as_a_whole
 
 NOW = 1_700_000_000_123_456_789
 MOMENT, HOUR = 10**6, 3600 * 10**9
@@ -64,7 +64,7 @@ def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
             "fstat",
             lambda _: SimpleNamespace(st_dev=1, st_ino=2, st_size=size, **times),
         )
-        state = settled_state(file, may_grow=may_grow)
+        state = wait_for_settled_state(file, may_grow=may_grow)
     assert state
     assert state.size == size
     assert pauses == ([] if pause is None else [pytest.approx(pause)])
@@ -75,7 +75,7 @@ def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path, mode: int) -> No
     file = tmp_path / "report.html"
     file.touch()
     file.chmod(mode)
-    write_whole(file, b"new")
+    write_as_a_whole(file, b"new")
     assert (file.read_bytes(), stat.S_IMODE(file.stat().st_mode)) == (b"new", mode)
 
 
@@ -83,7 +83,7 @@ def test_a_file_behind_a_link_keeps_its_mode(tmp_path: Path) -> None:
     file, link = tmp_path / "a", tmp_path / "b"
     file.touch(mode=0o600)
     link.symlink_to(file)
-    write_whole(link, b"new")
+    write_as_a_whole(link, b"new")
     assert link.is_symlink()
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
@@ -95,7 +95,7 @@ def test_a_file_that_is_replaced_keeps_its_owner(tmp_path: Path) -> None:
     file = tmp_path / "a"
     file.touch(mode=0o600)
     os.chown(file, 12345, 23456)
-    write_whole(file, b"new")
+    write_as_a_whole(file, b"new")
     status = file.stat()
     assert (status.st_uid, status.st_gid, stat.S_IMODE(status.st_mode)) == (
         12345,
@@ -105,7 +105,7 @@ def test_a_file_that_is_replaced_keeps_its_owner(tmp_path: Path) -> None:
 
 
 def test_a_new_file_has_the_mode_of_any_new_file(tmp_path: Path) -> None:
-    write_whole(tmp_path / "a", b"")
+    write_as_a_whole(tmp_path / "a", b"")
     (tmp_path / "b").touch()
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
 
@@ -117,10 +117,10 @@ def test_a_name_may_be_as_long_as_the_file_system_allows(
     longest = os.pathconf(tmp_path, "PC_NAME_MAX")
     file = tmp_path / (letter * (longest // len(os.fsencode(letter))))
     for content in (b"old", b"new"):
-        write_whole(file, content)
+        write_as_a_whole(file, content)
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"new"]
     with pytest.raises(OSError, match="too long"):
-        write_whole(tmp_path / f"{file.name}{letter}", b"")
+        write_as_a_whole(tmp_path / f"{file.name}{letter}", b"")
 
 
 def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(
@@ -129,7 +129,7 @@ def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(
     file = tmp_path / "a"
     file.write_bytes(b"old")
     with pytest.raises(TypeError):
-        write_whole(file, ["no bytes"])  # type: ignore[arg-type]
+        write_as_a_whole(file, ["no bytes"])  # type: ignore[arg-type]
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [
         ("a", b"old")
     ]

@@ -11,7 +11,7 @@ from subprocess import PIPE, Popen, check_output
 import pytest
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.workers import Cores, Farm, cores
+from d2rpick.base.workers import Cores, Farm, count_cores
 from tests.command import ROOT, TIME_LIMIT
 
 FARMS = [Farm, lambda: Cores(2, __name__)]
@@ -125,7 +125,7 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
 
 
 def test_there_is_a_core() -> None:
-    assert cores() >= 1
+    assert count_cores() >= 1
 
 
 def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
@@ -136,9 +136,9 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
         "import sys; print('importing', flush=True); sys.stdin.readline()"
     )
     code = (
-        "import signal; from d2rpick.base.workers import Cores, begin\n"
+        "import signal; from d2rpick.base.workers import Cores, start_importing\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored SIGINT would be inherited
-        "begin(2, 'slow')\n"
+        "start_importing(2, 'slow')\n"
         "with Cores(2, 'slow') as farm: print(next(farm.answers(abs, [-7])).result)\n"
     )
     command = [sys.executable, "-c", code]

@@ -70,12 +70,12 @@ def number_cards(path: Path) -> None:
 def inventory(path: Path) -> None:
     """Count the elements of every part, with masses, steps and shared nodes."""
     from d2rpick.deck import read_inventory
-    from d2rpick.deck.geometry import masses_and_steps
+    from d2rpick.deck.geometry import compute_masses_and_steps
 
     found = read_inventory(str(path))
     assert sum(counts.total() for counts in found.counts.values()) == ELEMENTS
     assert found.neighbours[1] == {2}
-    assert set(masses_and_steps(found)) == {1, 2}
+    assert set(compute_masses_and_steps(found)) == {1, 2}
 
 
 def check(path: Path) -> None:

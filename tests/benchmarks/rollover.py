@@ -22,7 +22,7 @@ import numpy as np
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, history_of, simulate
+from d2rpick.models.box_run import RigidWindow, make_history, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
 WINDOW = RigidWindow(0.0970, 0.370)  # what suggest recommends for the default
@@ -80,7 +80,7 @@ def main() -> int:
         print(saving(mesh), flush=True)
     run = simulate(Parameters(), 0.4)
     start = perf_counter()
-    suggest(history_of(run), 0.37, Settings())
+    suggest(make_history(run), 0.37, Settings())
     ratio = run.seconds / (perf_counter() - start)
     print(
         f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100"

@@ -22,7 +22,7 @@ from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.rules.judgement import faults_of
+from d2rpick.rules.judgement import find_faults
 from tests import paper
 from tests.command import BOX as T01, ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
@@ -311,7 +311,7 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
 
 def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
     verdict = verify_of(read([GLSTAT]), 0.02, 0.0687, PLAIN)
-    assert any("suits this td" in fault.message for fault in faults_of(verdict))
+    assert any("suits this td" in fault.message for fault in find_faults(verdict))
 
 
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:

@@ -17,7 +17,7 @@ from d2rpick.choice.cost import (
     saved_share,
     weights_as_toml,
 )
-from d2rpick.deck.formulations import ls_dyna, radioss
+from d2rpick.deck.formulations import find_ls_dyna_formulation, find_radioss_formulation
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from tests.energies import sure
@@ -42,11 +42,13 @@ def inventory(
     own = formulations or {}
     parts = {
         one: PartData(
-            one, f"part {one}", Material("MAT", "rigid" if one == rigid else "deformable"),
+            one,
+            f"part {one}",
+            Material("MAT", "rigid" if one == rigid else "deformable"),
             Section({"shell": own.get(one, QBAT)}),
         )
         for one in counts
-    }  # fmt: skip
+    }
     elements = (Elements("shell", part, nodes),)
     return Inventory(
         solver, parts, elements, np.zeros((4 * part.size, 3)), notes, complete=not notes
@@ -65,7 +67,7 @@ def test_shells_cost_more_with_more_integration_points(
     layers: int | None, extra: int
 ) -> None:
     """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
-    of_deck = sure(radioss("shell", 12, 0, 0))
+    of_deck = sure(find_radioss_formulation("shell", 12, 0, 0))
     found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     parts = {
         1: found.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)),
@@ -117,9 +119,12 @@ def test_formulations_that_were_not_measured_are_named() -> None:
 
 
 @given(
-    total=st.floats(1.0, 1e9), part=st.floats(0.0, 1.0), share=st.floats(0.01, 1.0), nodes=st.integers(0, 10**6),
+    total=st.floats(1.0, 1e9),
+    part=st.floats(0.0, 1.0),
+    share=st.floats(0.01, 1.0),
+    nodes=st.integers(0, 10**6),
     scale=st.floats(1e-3, 1e3),
-)  # fmt: skip
+)
 def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit(
     total: float, part: float, share: float, nodes: int, scale: float
 ) -> None:
@@ -136,11 +141,17 @@ def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit
 @pytest.mark.parametrize(
     ("found", "cost"),
     [
-        (radioss("shell", 12, 0, 0), "QBAT"), (radioss("shell", 24, 0, 0), "QEPH"), (radioss("shell", 3, 0, 0), "BT"),
-        (radioss("shell", 99, 0, 0), None), (radioss("solid", 0, 0, 24), "solid"), (ls_dyna("shell", 2), "BT"),
-        (ls_dyna("shell", 16), "QBAT"), (ls_dyna("shell", 99), None), (ls_dyna("spring", 0), "spring"),
+        (find_radioss_formulation("shell", 12, 0, 0), "QBAT"),
+        (find_radioss_formulation("shell", 24, 0, 0), "QEPH"),
+        (find_radioss_formulation("shell", 3, 0, 0), "BT"),
+        (find_radioss_formulation("shell", 99, 0, 0), None),
+        (find_radioss_formulation("solid", 0, 0, 24), "solid"),
+        (find_ls_dyna_formulation("shell", 2), "BT"),
+        (find_ls_dyna_formulation("shell", 16), "QBAT"),
+        (find_ls_dyna_formulation("shell", 99), None),
+        (find_ls_dyna_formulation("spring", 0), "spring"),
     ],
-)  # fmt: skip
+)
 def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
     assert found.cost == cost
     assert not (found.measured and "ELFORM" in found.name)
@@ -157,15 +168,21 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", "no table"), ("[per_element]\nBT = 'much'", "BT is 'much'"), ("[per_element]\nBT = -1", "at least 0"),
-        ("[per_element]\nBT = 1e308", "at most 1e+100"), (f"[per_element]\nBT = {'9' * 400}", "is inf"),
+        ("", "no table"),
+        ("[per_element]\nBT = 'much'", "BT is 'much'"),
+        ("[per_element]\nBT = -1", "at least 0"),
+        ("[per_element]\nBT = 1e308", "at most 1e+100"),
+        (f"[per_element]\nBT = {'9' * 400}", "is inf"),
         ("rigid_node = nan\n[per_element]\nBT = 1", "rigid_node is nan"),
-        ("[per_element]\nBT = 0", "no weight is above 0"), ("element_share = 2\n[per_element]\nBT = 1", "up to 1"),
-        ("elementshare = 1\n[per_element]\nBT = 1", "not a key"), ("= 1", "cannot be read"),
-        ("[per_element]\nBT = nan", "at least 0"), ("[per_element]\nBT = true", "BT is True"),
+        ("[per_element]\nBT = 0", "no weight is above 0"),
+        ("element_share = 2\n[per_element]\nBT = 1", "up to 1"),
+        ("elementshare = 1\n[per_element]\nBT = 1", "not a key"),
+        ("= 1", "cannot be read"),
+        ("[per_element]\nBT = nan", "at least 0"),
+        ("[per_element]\nBT = true", "BT is True"),
         ("a = " + "[" * 100_000, "cannot be read"),
     ],
-)  # fmt: skip
+)
 def test_weights_that_make_no_sense_are_refused_with_the_file(
     tmp_path: Path, text: str, told: str
 ) -> None:

@@ -16,7 +16,7 @@ from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.deck import read_inventory
-from d2rpick.flight.momentum import flight_around
+from d2rpick.flight.momentum import find_flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Support, Surroundings
@@ -375,27 +375,27 @@ def falling(acceleration: float, surroundings: Surroundings) -> Momenta:
 @pytest.mark.parametrize("acceleration", [9.81, 3.71, 1.62, 24.8])
 def test_the_gravity_of_the_deck_is_what_is_believed(acceleration: float) -> None:
     """Of another planet, or another load: without a deck only that of the earth is."""
-    known = flight_around(falling(acceleration, gravity(acceleration)), 0.6)
+    known = find_flight_around(falling(acceleration, gravity(acceleration)), 0.6)
     assert known
     assert known.gravity == pytest.approx(acceleration, rel=1e-3)
-    assert bool(flight_around(falling(acceleration, Surroundings()), 0.6)) is (
+    assert bool(find_flight_around(falling(acceleration, Surroundings()), 0.6)) is (
         acceleration == 9.81
     )
-    assert flight_around(falling(acceleration, gravity(0.0)), 0.6) is None
-    assert flight_around(falling(acceleration, gravity(5.0)), 0.6) is None
+    assert find_flight_around(falling(acceleration, gravity(0.0)), 0.6) is None
+    assert find_flight_around(falling(acceleration, gravity(5.0)), 0.6) is None
 
 
 def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
-    assert flight_around(falling(0.0, gravity(0.0)), 0.6)
-    assert flight_around(
+    assert find_flight_around(falling(0.0, gravity(0.0)), 0.6)
+    assert find_flight_around(
         falling(0.0, gravity(0.0, 9.81)), 0.6
     )  # it acts for a time only
-    assert flight_around(falling(0.0, gravity(9.81)), 0.6) is None
+    assert find_flight_around(falling(0.0, gravity(9.81)), 0.6) is None
     constant = replace(
         falling(0.0, gravity(9.81)), values=np.full((TIME.size, 1, 3), 5.0)
     )
-    assert flight_around(constant, 0.6) is None
-    assert flight_around(replace(constant, surroundings=gravity(0.0)), 0.6)
+    assert find_flight_around(constant, 0.6) is None
+    assert find_flight_around(replace(constant, surroundings=gravity(0.0)), 0.6)
 
 
 def flying_history(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.health import Health, assess, cautions_of_health, unsound
-from d2rpick.histories.balance import balance_of
+from d2rpick.histories.balance import read_balance
 from d2rpick.histories.history import Balance, Given, History, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
@@ -114,7 +114,7 @@ def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> Non
         ("damaged", bytes(t01(8).data).replace(written, nan)),
     ):
         run_of = open_run([str(put(tmp_path / f"{name}T01", content))])
-        balance = sure(balance_of(run_of.databases, run_of.parts))
+        balance = sure(read_balance(run_of.databases, run_of.parts))
         assert (balance.hourglass is None, balance.kinetic is None) == (
             name == "damaged",
             False,
@@ -179,7 +179,7 @@ def test_the_total_energy_of_abaqus_is_without_the_external_work(
         "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode(),
     )
     run_of = open_run([str(path)])
-    health = assess(sure(balance_of(run_of.databases, None)))
+    health = assess(sure(read_balance(run_of.databases, None)))
     assert (health.energy_ratio_min, health.energy_ratio_max) == (1.0, 1.0)
 
 
@@ -205,7 +205,7 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
     before = assess(
-        balance_of(run_of.databases, box, until=0.37) or Balance(TIME),
+        read_balance(run_of.databases, box, until=0.37) or Balance(TIME),
         flight,
         locked=1.75,
     )
@@ -216,7 +216,7 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
         ((0.0886, 0.4), "contact-in-window"),
     ):
         whole = assess(
-            balance_of(run_of.databases, box) or Balance(TIME), window, locked=1.75
+            read_balance(run_of.databases, box) or Balance(TIME), window, locked=1.75
         )
         assert code in {caution.code for caution in cautions_of_health(whole)}
 
@@ -227,7 +227,7 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     run_of = open_run([stored(name)])
     health = assess(
-        balance_of(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064)
+        read_balance(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064)
     )
     assert sure(health.window_work) < 1e-3
     assert not list(cautions_of_health(health))

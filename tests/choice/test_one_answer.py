@@ -14,12 +14,12 @@ from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.windows import acceptable_windows
-from d2rpick.flight.flight import all_seen, seen_flight
-from d2rpick.histories.digits import as_read
+from d2rpick.flight.flight import find_all_seen, find_seen_flight
+from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
-from d2rpick.rules.judgement import faults_of
+from d2rpick.rules.judgement import find_faults
 from tests.choice.test_same_answers import made
 from tests.command import BOX, run
 from tests.computed import stored
@@ -47,7 +47,7 @@ def resting() -> History:
 
 def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
     """Judge a pair as it is read."""
-    return verify(history, as_read(tr), as_read(td), asked)
+    return verify(history, round_as_read(tr), round_as_read(td), asked)
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
     flight = planned(box, LEVEL).flights[1]
     verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
-    told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
+    told = [fault.message for fault in find_faults(verdict) if fault.rule == "D2R204"]
     assert len(reasons) == len(told) == 2
     for reason, message in zip(reasons, told, strict=True):
         assert reason.removeprefix("td ") in message
@@ -151,10 +151,10 @@ def test_the_last_td_that_is_named_lies_in_the_flight(
 )
 def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
     history = read([file]).history
-    listed = all_seen(history)
+    listed = find_all_seen(history)
     assert listed
     for source, flight in listed:
-        used = seen_flight(history, (flight.start + flight.end) / 2)
+        used = find_seen_flight(history, (flight.start + flight.end) / 2)
         assert (source, flight) == (used.source, used.flight)
 
 
@@ -263,11 +263,11 @@ def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> N
     history = of(1 + np.sin(40 * (time - time[60])) ** 2, time)
     start = float(time[60])
     asked = replace(LEVEL, after=start)
-    assert as_read(start) < start
-    for tr in (start, as_read(start)):
+    assert round_as_read(start) < start
+    for tr in (start, round_as_read(start)):
         verdict = verify(history, tr, float(time[60] + np.pi / 10), asked)
         assert verdict.verified
-        assert not list(faults_of(verdict))
+        assert not list(find_faults(verdict))
     assert not verify(
         history, start - 1e-5, float(time[60] + np.pi / 10), asked
     ).verified

@@ -13,7 +13,7 @@ from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.trade_off import explored_flights
-from d2rpick.histories.digits import first_as_read
+from d2rpick.histories.digits import round_to_first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
@@ -336,7 +336,10 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
     for row in plan.flights:
         assert (
             row.window is None
-            or first_as_read(row.start) <= row.window[0] < row.window[1] <= row.end
+            or round_to_first_as_read(row.start)
+            <= row.window[0]
+            < row.window[1]
+            <= row.end
         )
     assert all(one.end <= other.start for one, other in pairwise(plan.flights))
     if len(plan.flights) == 1 and plan.flights[0].window:

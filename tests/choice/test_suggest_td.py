@@ -18,7 +18,7 @@ from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import history_of, simulate
+from d2rpick.models.box_run import make_history, simulate
 from d2rpick.report.suggestion import outlook
 from tests import paper
 from tests.command import ENERGY, ROLLOVER, answer, run
@@ -89,7 +89,7 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
     """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
     found = suggest_in_window(
-        history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN
+        make_history(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN
     )
     assert sure(found.recommended).td == pytest.approx(0.37, abs=1e-3)
     assert sure(found.recommended).rigid_time > 0.2

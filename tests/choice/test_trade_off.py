@@ -11,7 +11,7 @@ from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
-from d2rpick.histories.digits import as_read
+from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.vibration.span import Fits
@@ -46,7 +46,7 @@ def unbeaten(found: TradeOff) -> None:
     """Hold the marks against every other offer."""
     for known in (True, False):
         pairs = [
-            (one.unbeaten, round(one.error, 3), as_read(one.best.rigid_time))
+            (one.unbeaten, round(one.error, 3), round_as_read(one.best.rigid_time))
             for one in found.offers
             if one.best
             and one.error is not None
@@ -128,10 +128,13 @@ def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
     found = explore_of(read(["sample_data/energy.csv"]), Settings(), None, steps=20)
     unbeaten(found)
     peaks = [one for one in found.offers if one.peak and one.best]
+    rigid_times = [
+        round_as_read(one.best.rigid_time) for one in peaks if one.best is not None
+    ]
     alike = [
         one
-        for one in peaks
-        if as_read(one.best.rigid_time) == as_read(peaks[-1].best.rigid_time)  # type: ignore[union-attr]
+        for one, rigid_time in zip(peaks, rigid_times, strict=True)
+        if rigid_time == rigid_times[-1]
     ]
     assert len(alike) > 1
     assert {one.unbeaten for one in alike} == {True}

@@ -12,7 +12,7 @@ from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.trade_off import offers_of
 from d2rpick.choice.warnings import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.windows import acceptable_windows
-from d2rpick.rules.judgement import faults_of
+from d2rpick.rules.judgement import find_faults
 from tests.energies import of, sure
 
 TIME = np.linspace(0, 1, 2001)
@@ -47,7 +47,7 @@ def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_
     verdict = verify_at(situation, crossing.tr)
     assert not verdict.verified
     assert "times that of the reference" in verdict.reasons[0]
-    assert [fault.rule for fault in faults_of(verdict)] == ["D2R201"]
+    assert [fault.rule for fault in find_faults(verdict)] == ["D2R201"]
     (offer,) = offers_of([situation], set())
     assert offer.best is None
     assert not acceptable_windows(situation, answer.candidates, None).size

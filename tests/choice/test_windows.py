@@ -25,10 +25,10 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
     SHARE,
     changes_momentum_little,
-    grazes,
-    landing_moves,
-    landing_spread,
-    margin_before_contact,
+    compute_margin,
+    estimate_landing_spread,
+    estimate_spread_of_vibration,
+    is_grazing,
 )
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Samples
 from d2rpick.histories.opening import Selection
@@ -69,31 +69,33 @@ def test_the_landing_moves_by_the_amplitude_over_the_speed(
     """Half of the vibration energy is kinetic in the mean: the amplitude counts with 1 over the root of 2."""
     history, flight = flying_oscillator(omega, amplitude * speed / omega, speed, mass)
     expected = amplitude * speed / omega / speed / np.sqrt(2)
-    assert landing_spread(history, flight) == pytest.approx(expected, rel=0.05)
+    assert estimate_spread_of_vibration(history, flight) == pytest.approx(
+        expected, rel=0.05
+    )
 
 
 def test_the_larger_of_share_and_spread_counts() -> None:
     history, flight = flying_oscillator(10.0, 1e-4, 1.0, 2.0)
-    assert margin_before_contact(history, flight)[:2] == (
+    assert compute_margin(history, flight)[:2] == (
         SHARE * sure(flight.end),
         "flight",
     )
     history, flight = flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
-    found = margin_before_contact(history, flight)
+    found = compute_margin(history, flight)
     assert (found.source, found.time) == ("landing", found.spread)
-    assert margin_before_contact(history, flight, 0.25)[:2] == (0.25, "given")
+    assert compute_margin(history, flight, 0.25)[:2] == (0.25, "given")
 
 
 def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
     history, flight = flying_oscillator(10.0, 1.0, 1.0, 2.0)
-    assert margin_before_contact(history, flight._replace(end=None)) == (
+    assert compute_margin(history, flight._replace(end=None)) == (
         0.0,
         "no-contact",
         None,
         None,
     )
     bare = of(history.energy, history.time)
-    assert margin_before_contact(bare, flight) == (
+    assert compute_margin(bare, flight) == (
         SHARE * history.time[-1],
         "flight",
         None,
@@ -106,12 +108,12 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
     place: float, speed: float
 ) -> None:
     history, flight = flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
-    spread = sure(landing_spread(history, flight))
-    assert landing_moves(history, flight, place) == pytest.approx(
+    spread = sure(estimate_spread_of_vibration(history, flight))
+    assert estimate_landing_spread(history, flight, place) == pytest.approx(
         spread + place / speed, rel=1e-6
     )
-    assert landing_moves(history, flight, None) == spread
-    kept = margin_before_contact(history, flight, place=place)
+    assert estimate_landing_spread(history, flight, None) == spread
+    kept = compute_margin(history, flight, place=place)
     assert kept.time == max(SHARE * sure(flight.end), sure(kept.spread))
 
 
@@ -141,8 +143,8 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     force: float, grazed: bool
 ) -> None:
     history, flight = touching(force)
-    margin = margin_before_contact(history, flight, place=0.02)
-    assert grazes(history, flight, 0.02) is grazed
+    margin = compute_margin(history, flight, place=0.02)
+    assert is_grazing(history, flight, 0.02) is grazed
     assert (margin.source == "grazing") is grazed
     if grazed:  # gravity alone opens a gap of 20 mm, and of the vibration, in that time
         assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
@@ -175,9 +177,9 @@ def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
     impulse: float, length: float, grazed: bool
 ) -> None:
     history, flight = tapped(impulse, length)
-    assert not grazes(history, flight, 0.02)
+    assert not is_grazing(history, flight, 0.02)
     assert changes_momentum_little(history, flight) is grazed
-    margin = margin_before_contact(history, flight, place=0.02)
+    margin = compute_margin(history, flight, place=0.02)
     assert (margin.source == "grazing") is grazed
     assert margin.grazing == ("momentum" if grazed else None)
 
@@ -218,15 +220,14 @@ def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() 
 def test_a_grazing_contact_without_gravity_leaves_no_td() -> None:
     history, flight = touching(0.5)
     assert (
-        margin_before_contact(history, flight._replace(gravity=0.0), place=0.02).time
-        == np.inf
+        compute_margin(history, flight._replace(gravity=0.0), place=0.02).time == np.inf
     )
 
 
 def test_where_no_force_is_known_no_contact_grazes() -> None:
     history, flight = touching(0.5)
-    assert not grazes(of(history.energy, history.time), flight, 0.02)
-    assert not grazes(
+    assert not is_grazing(of(history.energy, history.time), flight, 0.02)
+    assert not is_grazing(
         history, flight._replace(end=0.99), 0.02
     )  # the record ends too early
 
@@ -253,7 +254,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     """All that were switched in the flight and back before the contact."""
     history = solved("carT01.gz").history
     flight = flights_of(history, Settings())[-1]
-    margin = margin_before_contact(history, flight)
+    margin = compute_margin(history, flight)
     starts, ends = (
         dict(landings("car_runs.csv", "tr_s")),
         dict(landings("car_runs.csv", "td_s")),
@@ -289,7 +290,7 @@ def test_the_landings_of_the_switched_box_lie_within_the_margin(
         if one.end == pytest.approx(end, abs=1e-3)
     )
     moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
-    assert 1e-3 < moved < margin_before_contact(history, flight).time
+    assert 1e-3 < moved < compute_margin(history, flight).time
 
 
 TD = 0.064

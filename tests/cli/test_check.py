@@ -14,12 +14,12 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.rules import RULES
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, write_automatic_card
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, refused, run
 from tests.json_schemas import check_by_schema, checked, junit_is_valid, sarif_is_valid
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
-LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END
+LATE = HEAD + PARTS + THERE + write_automatic_card(2, "0.5", deformable=["1"]) + END
 COARSE = GOOD.replace("    0.0001", "      0.01")
 
 
@@ -276,7 +276,8 @@ def test_printed_engine_files_pass() -> None:
 
 def test_options_and_configuration_select_rules() -> None:
     deck = place(
-        "runs/main.k", HEAD + PARTS + THERE + automatic(1, "0.5", rigid=["1"]) + END
+        "runs/main.k",
+        HEAD + PARTS + THERE + write_automatic_card(1, "0.5", rigid=["1"]) + END,
     )
     every = {"D2R004", "D2R101", "D2R104"}
     assert set(rules(answer("check", deck))) == every
@@ -482,7 +483,7 @@ def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(
     parts = {
         str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]
     }
-    both = automatic(1, str(tr), rigid=[*parts]) + automatic(
+    both = write_automatic_card(1, str(tr), rigid=[*parts]) + write_automatic_card(
         2, "0.37", deformable=[*parts]
     )
     found = answer("check", place("main.k", both), "--history", BOX)["findings"]
@@ -499,8 +500,12 @@ def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(
 
 
 def test_parts_with_windows_of_their_own_are_judged_apart() -> None:
-    cards = automatic(1, "0.05", rigid=["1"]) + automatic(2, "0.37", deformable=["1"])
-    cards += automatic(3, "0.15", rigid=["2"]) + automatic(4, "0.36", deformable=["2"])
+    cards = write_automatic_card(1, "0.05", rigid=["1"]) + write_automatic_card(
+        2, "0.37", deformable=["1"]
+    )
+    cards += write_automatic_card(3, "0.15", rigid=["2"]) + write_automatic_card(
+        4, "0.36", deformable=["2"]
+    )
     found = answer("check", place("main.k", cards), "--history", BOX)["findings"]
     for part, tr, td in (("1", "0.05", "0.37"), ("2", "0.15", "0.36")):
         blamed = [
@@ -535,7 +540,7 @@ def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:
 
 
 def test_parts_of_one_card_with_the_same_fault_are_one_finding() -> None:
-    both = automatic(1, ".0122659", rigid=["1", "2"]) + automatic(
+    both = write_automatic_card(1, ".0122659", rigid=["1", "2"]) + write_automatic_card(
         2, "0.064", deformable=["1", "2"]
     )
     found = answer(
@@ -593,14 +598,16 @@ def test_td_after_the_next_contact_is_named_at_td() -> None:
 
 
 def test_a_part_set_that_cannot_be_resolved_is_judged_by_the_whole_model() -> None:
-    there = automatic(1, "0.2", rigid=["         5         0      PSET"])
-    back = automatic(2, "0.37", deformable=["         5      PSET"])
+    there = write_automatic_card(1, "0.2", rigid=["         5         0      PSET"])
+    back = write_automatic_card(2, "0.37", deformable=["         5      PSET"])
     found = answer("check", place("main.k", there + back), "--history", BOX)
     assert "judged-by-whole" in {warning["code"] for warning in found["warnings"]}
 
 
 def test_windows_that_are_none_are_left_to_other_rules() -> None:
-    swapped = automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"])
+    swapped = write_automatic_card(1, "0.09", rigid=["1"]) + write_automatic_card(
+        2, "0.02", deformable=["1"]
+    )
     assert rules(
         answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)
     ) == ["D2R102"]
@@ -620,7 +627,10 @@ def test_windows_that_are_none_are_left_to_other_rules() -> None:
 def test_tr_is_judged_whatever_becomes_of_td(
     tr: str, options: tuple[str, ...], objections: set[str]
 ) -> None:
-    there, back = automatic(1, tr, rigid=["1"]), automatic(2, "0.01", deformable=["1"])
+    there, back = (
+        write_automatic_card(1, tr, rigid=["1"]),
+        write_automatic_card(2, "0.01", deformable=["1"]),
+    )
     for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
         found = answer(
             "check",

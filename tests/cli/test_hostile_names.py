@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.base.errors import UNSEEN, printable
+from d2rpick.base.errors import UNSEEN, make_printable
 from d2rpick.report.figures import with_unit
 from d2rpick.report.tables import (
     as_json,
@@ -111,7 +111,7 @@ def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> N
     rows = as_markdown(["a", "b"], [[one, other]]).split("\n")[2:]
     assert len(rows) == 1
     assert re.sub(r"\\.", "", rows[0]).count("|") == 3
-    assert re.sub(r"\\([\\|<*\[~&_])", r"\1", in_markdown(one)) == printable(one)
+    assert re.sub(r"\\([\\|<*\[~&_])", r"\1", in_markdown(one)) == make_printable(one)
 
 
 @pytest.mark.slow
@@ -135,14 +135,14 @@ def test_answers_name_a_file_without_control_codes(
             assert documents[-1]["command"][-1] == NAME
             assert command != ("info",) or documents[-1]["source"] == [NAME]
         if form == "table":
-            assert "".join(printable(NAME).split()) in "".join(
+            assert "".join(make_printable(NAME).split()) in "".join(
                 (result.stdout + result.stderr).split()
             )
         if form == "csv":
             rows = list(csv.reader(io.StringIO(result.stdout), strict=True))
             assert len({len(row) for row in rows}) == 1
             assert command[0] != "study" or any(
-                printable(NAME) in cell for cell in rows[1]
+                make_printable(NAME) in cell for cell in rows[1]
             )
         if form == "markdown":
             assert not re.search(r"(?<!\\)<script", result.stdout)
@@ -171,7 +171,7 @@ def test_refusals_name_a_file_without_control_codes(
 ) -> None:
     shutil.copy(ENERGY, here / NAME)
     result = run("suggest", *asked, "--", NAME)
-    assert printable(NAME) in result.stderr
+    assert make_printable(NAME) in result.stderr
     assert not unseen(result.stderr)
 
 

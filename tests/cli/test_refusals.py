@@ -128,7 +128,7 @@ card --solver radioss --part 7 --node 1 --end 1 --tr 0.01 --td 0.02 | give a --h
 card --solver radioss --part 7 --node 1 --tr 0.01 --td 0.02 --history {ENERGY} | give a --history with parts
 card --solver radioss --node 1 --end 1 --name a/b --tr 0.01 --td 0.02 | the name of the run is 'a/b'
 card --solver radioss --node 1 --end 1 --name '' --tr 0.01 --td 0.02 | the name of the run is ''
-card --part 1 --swset 5 5 --tr 0.01 --td 0.02 | both switch sets are 5
+card --part 1 --swset 5 5 --tr 0.01 --td 0.02 | both switch sets have id 5
 card --part 1 --margin 0 --tr 0.01 --td 0.02 | --margin needs an energy history
 card --part 1 --tolerance 0.3 --tr 0.01 --td 0.02 | --tolerance needs an energy history
 card --part 1 -F csv --tr 0.01 --td 0.02 | --input-format needs an energy history

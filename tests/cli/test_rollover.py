@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import Outcome, RigidWindow, history_of, simulate
+from d2rpick.models.box_run import Outcome, RigidWindow, make_history, simulate
 from d2rpick.report import figures_models
 from d2rpick.report.formats import Shown, write
 from d2rpick.report.rollover import Scan
@@ -177,7 +177,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert found["recommended"] in [one["tr"] for one in found["runs"]]
     reference = simulate(Parameters(mesh=4), 0.11, interval=1e-3)
-    chosen = suggest(history_of(reference), 0.1, Settings())
+    chosen = suggest(make_history(reference), 0.1, Settings())
     scanned = Scan(
         reference, [Outcome(**one) for one in found["runs"]], chosen, chosen.cautions
     )

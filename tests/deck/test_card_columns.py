@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.printed_card import Printing
-from d2rpick.deck.printing import cards
+from d2rpick.deck.printing import print_cards
 
 WIDTH = 10  # columns of a field
 
@@ -123,7 +123,7 @@ def test_sets_by_time_have_every_field_in_its_columns(
 ) -> None:
     times = starts_of(gaps)
     windows = list(zip(times[::2], times[1::2], strict=True))
-    card = cards(windows, printing)
+    card = print_cards(windows, printing)
     sets = [*read_sets(card.text)]
     assert len(sets) == 2 * len(windows)
     names = [one.fields["SWSET"] for one in sets]
@@ -182,7 +182,7 @@ def test_pairs_by_force_name_each_other(
         speed=speed,
     )
     try:
-        card = cards(windows, asked, "ls-dyna-contact")
+        card = print_cards(windows, asked, "ls-dyna-contact")
     except DeckError as refused:
         assert "no wait lets a pair" in str(refused)  # noqa: PT017  most have one
         return

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck import main_decks, read_inventory
+from d2rpick.deck import find_main_decks, read_inventory
 from d2rpick.deck.printed_card import Printing
-from d2rpick.deck.printing import cards
+from d2rpick.deck.printing import print_cards
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
@@ -226,7 +226,7 @@ def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
     text, files = f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh}
     read_calls = (
         str(tmp_path / "main.k"),
-        cards([(0.02, 0.09)], Printing(part=(1,))),
+        print_cards([(0.02, 0.09)], Printing(part=(1,))),
         str(tmp_path / "next"),
     )
 
@@ -289,13 +289,13 @@ def test_a_deck_that_changes_all_the_time_is_an_error(
         match=r"main\.k: the file keeps changing while it is read; read it again",
     ):
         read_deck(path)
-    assert main_decks(str(tmp_path)) == [path]  # the file is not skipped
+    assert find_main_decks(str(tmp_path)) == [path]  # the file is not skipped
 
 
 def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None:
     main, pipe = write(tmp_path, GOOD), tmp_path / "pipe.k"
     os.mkfifo(pipe)
-    assert main_decks(str(tmp_path)) == [main]
+    assert find_main_decks(str(tmp_path)) == [main]
     writer = Thread(target=lambda: pipe.write_text(GOOD))
     writer.start()
     assert spans(read_deck(str(pipe))) == WINDOW
@@ -310,5 +310,5 @@ def test_no_folder_of_decks_waits_for_what_a_solver_writes(
     with (tmp_path / "d3plot").open("wb") as results:
         results.truncate(20 << 30)
     monkeypatch.setattr(time, "sleep", waited.append)
-    assert main_decks(str(tmp_path)) == [main]
+    assert find_main_decks(str(tmp_path)) == [main]
     assert sum(waited) < 1

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 import d2rpick as d2
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.contact_timing import Pushes, time_pair, time_sensor
+from d2rpick.deck.contact_timing import Pushes, find_pair_timing, find_sensor_timing
 from tests.command import answer, put, refused, run
 
 PUSHES = Pushes(
@@ -24,48 +24,48 @@ def flatten_windows(windows: Sequence[tuple[float, float]]) -> list[float]:
 
 def test_the_wait_lets_no_window_begin_before_it_is_planned() -> None:
     planned = [(0.02, 0.049), (0.08, 0.119)]
-    pair = time_pair(planned, PUSHES)
+    pair = find_pair_timing(planned, PUSHES)
     assert [tr for tr, _ in pair.windows] == pytest.approx([0.02, 0.08])
     assert pair.earliest == 0.02
     assert 0.12 < pair.latest < 0.13  # in the contact after the last window
-    sensor = time_sensor(planned, PUSHES)
+    sensor = find_sensor_timing(planned, PUSHES)
     assert sensor.wait == pytest.approx(0.01)
     assert flatten_windows(sensor.windows) == pytest.approx([0.02, 0.05, 0.08, 0.119])
 
 
 def test_the_offset_is_what_the_parts_fly_from_td_to_the_contact() -> None:
-    timing = time_pair([(0.02, 0.049), (0.08, 0.117)], PUSHES)
+    timing = find_pair_timing([(0.02, 0.049), (0.08, 0.117)], PUSHES)
     assert timing.offset == pytest.approx(3.0 * 0.001)
     assert [td for _, td in timing.windows] == pytest.approx([0.049, 0.119])
-    assert time_pair([(0.02, 0.049)], PUSHES._replace(speed=None)).offset == 0
+    assert find_pair_timing([(0.02, 0.049)], PUSHES._replace(speed=None)).offset == 0
 
 
 def test_chatter_between_two_windows_is_waited_for() -> None:
-    timing = time_sensor([(0.013, 0.05), (0.0705, 0.12)], PUSHES)
+    timing = find_sensor_timing([(0.013, 0.05), (0.0705, 0.12)], PUSHES)
     assert flatten_windows(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
     with pytest.raises(
         DeckError, match="no wait lets a sensor switch"
     ):  # the short gap from 0.06 to 0.062 stays without a window
-        time_sensor([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
+        find_sensor_timing([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
 
 def test_a_flight_without_a_window_is_left_out_by_a_pair_alone() -> None:
     planned = [(0.02, 0.049), (0.14, 0.199)]
-    assert [tr for tr, _ in time_pair(planned, PUSHES).windows] == pytest.approx(
+    assert [tr for tr, _ in find_pair_timing(planned, PUSHES).windows] == pytest.approx(
         [0.02, 0.14]
     )
     with pytest.raises(
         DeckError, match=r"in the planned windows \(0.02 to 0.049, 0.14 to 0.199\)"
     ):
-        time_sensor(planned, PUSHES)
+        find_sensor_timing(planned, PUSHES)
 
 
 def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
     with pytest.raises(DeckError, match="no wait lets a pair"):
-        time_pair([(0.22, 0.3)], PUSHES)
-    assert flatten_windows(time_sensor([(0.22, 0.3)], PUSHES).windows) == pytest.approx(
-        [0.22, 0.3]
-    )
+        find_pair_timing([(0.22, 0.3)], PUSHES)
+    assert flatten_windows(
+        find_sensor_timing([(0.22, 0.3)], PUSHES).windows
+    ) == pytest.approx([0.22, 0.3])
 
 
 @given(st.lists(st.floats(0.5, 9.0), min_size=3, max_size=9), st.floats(0.0, 0.9))
@@ -79,10 +79,10 @@ def test_windows_after_every_contact_are_met_by_a_common_wait(
     planned = [
         (end + wait, start) for (_, end), (start, _) in itertools.pairwise(contacts)
     ]
-    timing = time_sensor(planned, Pushes(contacts))
+    timing = find_sensor_timing(planned, Pushes(contacts))
     assert flatten_windows(timing.windows) == pytest.approx(flatten_windows(planned))
     assert timing.wait == pytest.approx(wait, abs=1e-9)
-    paired = time_pair(planned, Pushes(contacts))
+    paired = find_pair_timing(planned, Pushes(contacts))
     assert [tr for tr, _ in paired.windows] == pytest.approx([tr for tr, _ in planned])
     assert not math.isinf(paired.latest)
 

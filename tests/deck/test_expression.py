@@ -4,7 +4,12 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.deck.expression import ExpressionError, evaluate, number, plain
+from d2rpick.deck.expression import (
+    ExpressionError,
+    convert_plain,
+    evaluate,
+    parse_number,
+)
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import read_switching
 
@@ -38,7 +43,7 @@ def look_up(name: str) -> int | float:
     ],
 )
 def test_numbers_as_decks_write_them(text: str, value: float) -> None:
-    assert number(text) == value
+    assert parse_number(text) == value
 
 
 @pytest.mark.parametrize(
@@ -60,12 +65,12 @@ def test_numbers_as_decks_write_them(text: str, value: float) -> None:
 )
 def test_what_is_no_number(text: str) -> None:
     with pytest.raises(ExpressionError):
-        number(text)
+        parse_number(text)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_every_double_reads_back(value: float) -> None:
-    assert number(repr(value)) == value
+    assert parse_number(repr(value)) == value
 
 
 @pytest.mark.parametrize(
@@ -159,12 +164,12 @@ def test_integer_division_drops_the_fraction(x: int, y: int) -> None:
 
 
 def test_texts_that_are_too_long_for_a_number_are_not_kept() -> None:
-    size_before = plain.cache_info().currsize
+    size_before = convert_plain.cache_info().currsize
     content = b"*DEFORMABLE_TO_RIGID\n" + b"x" * 100 + b",1\n"
     (card,) = read_switching(read_deck("deck.k", content))
     assert (
         next(problem for _, problem in card.problems) == f"{'x' * 40!r} is not a number"
     )
     assert (
-        plain.cache_info().currsize <= size_before + 1
+        convert_plain.cache_info().currsize <= size_before + 1
     )  # the digit 1 after the blanks

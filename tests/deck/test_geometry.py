@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from d2rpick.deck import ls_dyna_inventory, radioss_inventory, read_inventory
-from d2rpick.deck.geometry import Placement, masses_and_steps
+from d2rpick.deck.geometry import Placement, compute_masses_and_steps
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
@@ -58,8 +58,8 @@ def test_by_hand(
     tmp_path: Path, section: str, elements: str, mass: float, step: float
 ) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    masses = masses_and_steps(
-        ls_dyna_inventory.read(
+    masses = compute_masses_and_steps(
+        ls_dyna_inventory.read_ls_dyna_inventory(
             read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")
         )
     )
@@ -72,7 +72,9 @@ def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> No
     text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 3, 4)}*END\n".replace(
         lost, "*OTHER"
     )
-    mass, step = masses_and_steps(ls_dyna_inventory.read(read(tmp_path, text)))[7]
+    mass, step = compute_masses_and_steps(
+        ls_dyna_inventory.read_ls_dyna_inventory(read(tmp_path, text))
+    )[7]
     assert mass is None
     assert (step is None) == (lost != "*SECTION")
 
@@ -80,8 +82,8 @@ def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> No
 def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
     assert (
-        masses_and_steps(
-            ls_dyna_inventory.read(
+        compute_masses_and_steps(
+            ls_dyna_inventory.read_ls_dyna_inventory(
                 read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n")
             )
         )
@@ -91,8 +93,10 @@ def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
-    masses = masses_and_steps(
-        radioss_inventory.read(read_run(str(tmp_path / "CAR_0000.rad")))
+    masses = compute_masses_and_steps(
+        radioss_inventory.read_radioss_inventory(
+            read_run(str(tmp_path / "CAR_0000.rad"))
+        )
     )
     lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)

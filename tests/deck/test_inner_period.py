@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.deck import read_inventory
-from d2rpick.deck.pieces import inner_period
+from d2rpick.deck.pieces import find_inner_period
 from tests.command import put
 from tests.decks import wide
 from tests.sprung import DENSITY, cubes
@@ -15,7 +15,7 @@ from tests.sprung import DENSITY, cubes
 
 def find_period(folder: Path, deck: str) -> tuple[float, ...] | None:
     name = put(folder / "box_0000.rad", deck)
-    inner = inner_period(read_inventory(str(name)))
+    inner = find_inner_period(read_inventory(str(name)))
     return inner and inner[:2]
 
 

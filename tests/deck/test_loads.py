@@ -12,7 +12,7 @@ import pytest
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
-from d2rpick.deck.pieces import supports_of
+from d2rpick.deck.pieces import find_supports
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.run import Run
 from d2rpick.histories.surroundings import Surroundings
@@ -44,7 +44,7 @@ def read_ls_dyna(folder: Path, further_cards: str) -> Inventory:
 
 def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
     """Return the parts that are held, and True if the model is held."""
-    by_part, whole = supports_of(inventory)
+    by_part, whole = find_supports(inventory)
     return set(by_part), bool(whole)
 
 

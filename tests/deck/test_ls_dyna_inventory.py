@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna_inventory, read_inventory
 from d2rpick.deck.model import Inventory
-from d2rpick.deck.pieces import pieces_of
+from d2rpick.deck.pieces import count_pieces
 from d2rpick.deck.reader import read_deck
 from tests.decks import read, row, write
 from tests.sample_deck import DECK, FLYING, deck, radioss
@@ -28,7 +28,7 @@ def write_nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
 
 
 def read_text(folder: Path, text: str, **files: str) -> Inventory:
-    return ls_dyna_inventory.read(
+    return ls_dyna_inventory.read_ls_dyna_inventory(
         read(folder, text, {f"{name}.k": content for name, content in files.items()})
     )
 
@@ -249,7 +249,9 @@ def test_counts_and_nodes_agree_with_a_plain_count(
     parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
     elements = "".join(row(*line) for line in lines)
     text = f"*KEYWORD\n{parts}*NODE\n{write_nodes(count=44)}*ELEMENT_SHELL\n{elements}*END\n"
-    random_inventory = ls_dyna_inventory.read(read_deck(write(folder, text)))
+    random_inventory = ls_dyna_inventory.read_ls_dyna_inventory(
+        read_deck(write(folder, text))
+    )
     assert {
         part: counts["shell"] for part, counts in random_inventory.counts.items()
     } == Counter(part for part, _ in shells)
@@ -296,4 +298,4 @@ def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
         tmp_path,
         HEAD + "*NODE\n" + write_nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n",
     )
-    assert [pieces_of(shell_inventory, [part]) for part in (7, 9, 3)] == [2, 1, 0]
+    assert [count_pieces(shell_inventory, [part]) for part in (7, 9, 3)] == [2, 1, 0]

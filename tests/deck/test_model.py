@@ -7,7 +7,7 @@ import pytest
 from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
-from d2rpick.deck.pieces import pieces_of
+from d2rpick.deck.pieces import count_pieces
 from d2rpick.flight.position_error import RigidBody
 from tests import made_car
 from tests.deck import test_radioss_inventory as rad
@@ -61,7 +61,7 @@ def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
         (2,),
         (3,),
     )  # each may have a body of its own
-    assert pieces_of(inventory, [1, 2]) == 1
+    assert count_pieces(inventory, [1, 2]) == 1
     assert bodies_of(inventory, [1, 2]) == (RigidBody((1, 2)),)
 
 
@@ -142,18 +142,25 @@ def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) ->
         assert bodies_of(inventory, [*made_car.BODY, *made_car.WHEELS]) == (
             RigidBody(made_car.BODY), RigidBody(made_car.WHEELS, whole=False)
         )  # fmt: skip
-        assert pieces_of(inventory, made_car.WHEELS) == pieces_of(inventory, [7]) == 2
+        assert (
+            count_pieces(inventory, made_car.WHEELS)
+            == count_pieces(inventory, [7])
+            == 2
+        )
         assert bodies_of(inventory, [7]) == (
             RigidBody((7,), whole),
         )  # Radioss switches each piece by itself
     welded = read_inventory(
         made_car.keywords(tmp_path, f"*CONSTRAINED_SPOTWELD\n{wide(21, 31)}")
     )
-    assert pieces_of(welded, [7]) == 1
+    assert count_pieces(welded, [7]) == 1
     through = read_inventory(
         made_car.keywords(tmp_path, f"*ELEMENT_SHELL\n{row(99, 1, 21, 22, 32, 31)}")
     )
-    assert (pieces_of(through, [7]), pieces_of(through, [7], among=range(1, 10))) == (
+    assert (
+        count_pieces(through, [7]),
+        count_pieces(through, [7], among=range(1, 10)),
+    ) == (
         2,
         1,
     )

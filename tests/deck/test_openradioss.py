@@ -12,7 +12,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.deck.printed_card import Printing
-from d2rpick.deck.printing import cards
+from d2rpick.deck.printing import print_cards
 from d2rpick.deck.writing import write_deck
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.rules import check_deck
@@ -119,7 +119,9 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
-    card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
+    card = print_cards(
+        windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss"
+    )
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
     assert [finding.rule for finding in checked.findings] == (
@@ -156,7 +158,7 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
     energies = {}
     for solver in ("radioss", "radioss-sensors"):
         # the limit of the only run also applies while it is deformable, with a time step of 1.7e-5
-        card = cards(
+        card = print_cards(
             windows,
             Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5),
             solver,

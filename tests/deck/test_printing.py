@@ -10,8 +10,8 @@ from hypothesis import given, strategies as st
 
 from d2rpick.api.arguments import read_windows
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, shortest
-from d2rpick.deck.printing import SOLVERS, cards, solver_of
+from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, write_number
+from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 from d2rpick.histories.formats import READERS
 from d2rpick.rules import check_deck
 from tests.command import refused, run
@@ -31,13 +31,13 @@ ALL = Printing(
 @given(st.integers(-9999, 99999), st.integers(-3, 3))
 def test_few_digits_read_back(digits: int, exponent: int) -> None:
     value = float(f"{digits}e{exponent}")
-    assert float(shortest(value)) == value
-    assert len(shortest(value)) <= LONGEST
+    assert float(write_number(value)) == value
+    assert len(write_number(value)) <= LONGEST
 
 
 @given(TIMES)
 def test_the_nearest_text_is_taken(value: float) -> None:
-    text = shortest(value)
+    text = write_number(value)
     assert len(text) <= LONGEST
     texts = [f"{value:.{n}f}" for n in range(12)] + [
         f"{value:.{n}g}" for n in range(1, 12)
@@ -50,7 +50,7 @@ def test_the_nearest_text_is_taken(value: float) -> None:
 
 def test_a_number_too_wide_is_refused() -> None:
     with pytest.raises(DeckError, match="cannot be written"):
-        shortest(1e300, 4)
+        write_number(1e300, 4)
 
 
 @pytest.mark.parametrize(
@@ -72,13 +72,13 @@ def test_windows_that_do_not_follow_each_other_are_refused(
     windows: list[tuple[float, float]], message: str, solver: str
 ) -> None:
     with pytest.raises(DeckError, match=message):
-        cards(windows, ALL, solver)
+        print_cards(windows, ALL, solver)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     windows = [(0.0, 0.09), (0.2, 0.3), (0.5, 0.75)]
-    card = cards(windows, ALL, solver, ["a\nremark"])
+    card = print_cards(windows, ALL, solver, ["a\nremark"])
     assert card.windows == tuple(windows)
     assert " a\\nremark\n" in card.text
     assert all("cycles at least" in note for note in card.notes)
@@ -91,11 +91,11 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
 
 
 def test_the_solver_is_that_of_the_history() -> None:
-    formats = {name: solver_of(name) for name in READERS}
+    formats = {name: find_solver(name) for name in READERS}
     assert {name for name, solver in formats.items() if solver == "radioss"} == {
         "radioss-th"
     }
-    assert solver_of("glstat + matsum") == "ls-dyna"
+    assert find_solver("glstat + matsum") == "ls-dyna"
     claimed = [name for solver in SOLVERS.values() for name in solver.histories]
     assert len(claimed) == len(set(claimed))
 
@@ -170,7 +170,7 @@ def list_rows(text: str) -> list[str]:
 
 
 def test_the_card_to_the_letter() -> None:
-    text = cards([(0.02, 0.09)], MERGED).text
+    text = print_cards([(0.02, 0.09)], MERGED).text
     assert text[text.index("*") :] == CARD
 
 
@@ -189,7 +189,7 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
     for factor in factors:
         times.append(times[-1] * factor)
     windows = list(zip(times[::2], times[1::2], strict=False))
-    card = cards(windows, Printing(part=tuple(parts), merge=parts[-1]))
+    card = print_cards(windows, Printing(part=tuple(parts), merge=parts[-1]))
     folder = tmp_path_factory.mktemp("card")
     assert check_deck(write(folder, card.text)).findings == ()
     assert spans(read(folder, card.text)) == [
@@ -204,16 +204,16 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
 
 
 def test_rounding_is_reported() -> None:
-    card = cards([(0.0128853793630525, 0.064)], PARTS)
+    card = print_cards([(0.0128853793630525, 0.064)], PARTS)
     assert card.windows == ((0.01288538, 0.064),)
     assert ".01288538" in card.notes[0]
     assert card.notes[0] in card.text
-    assert cards([(0.02, 0.09)], PARTS).notes == ()
+    assert print_cards([(0.02, 0.09)], PARTS).notes == ()
 
 
 def test_warnings_are_those_that_apply() -> None:
     def text(printing: Printing) -> str:
-        return cards([(0.02, 0.09)], printing).text
+        return print_cards([(0.02, 0.09)], printing).text
 
     assert "d2rpick card --merge" in text(PARTS)
     assert "merged" not in text(MERGED)
@@ -224,7 +224,7 @@ def test_warnings_are_those_that_apply() -> None:
 
 
 def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
-    text = cards(
+    text = print_cards(
         [(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], MERGED._replace(swset=(8, 7))
     ).text
     assert re.findall(
@@ -233,7 +233,7 @@ def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
     assert not found(tmp_path, text)
 
 
-radioss_cards = partial(cards, solver="radioss")
+radioss_cards = partial(print_cards, solver="radioss")
 BOX = Printing(node=tuple(range(1, 13)), end=0.15, name="run")
 
 
@@ -303,4 +303,4 @@ def test_what_a_solver_cannot_be_told_is_refused(
     solver: str, windows: list[tuple[float, float]], printing: Printing, message: str
 ) -> None:
     with pytest.raises(DeckError, match=message):
-        cards(windows, printing, solver)
+        print_cards(windows, printing, solver)

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.mesh import nodes_of
+from d2rpick.deck.mesh import read_nodes
 from d2rpick.deck.printed_card import Printing
-from d2rpick.deck.printing import cards
-from d2rpick.deck.radioss_bodies import Bodies, bodies_for
-from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
+from d2rpick.deck.printing import print_cards
+from d2rpick.deck.radioss_bodies import SwitchedBodies, find_bodies
+from d2rpick.deck.radioss_run import RadiossRun, find_rigid_parts, read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
 from tests.command import put
@@ -99,13 +99,13 @@ def write_gravity(number: int) -> str:
 
 def write_bodies(
     tmp_path: Path, further_cards: str = "", parts: tuple[int, ...] = ALL
-) -> tuple[tuple[int, ...], Run, str]:
+) -> tuple[tuple[int, ...], RadiossRun, str]:
     """Write the deck with the bodies, and read it again."""
     main = write_run(tmp_path / "deck", further_cards)
-    bodies = bodies_for(main, parts)
+    bodies = find_bodies(main, parts)
     printing = Printing(node=bodies.nodes, end=0.4, name="box", starter=bodies.cards)
     name = write_deck(
-        main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
     )[0]
     return bodies.nodes, read_run(name), name
 
@@ -115,7 +115,9 @@ def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
     nodes, run, name = write_bodies(tmp_path)
     assert run.starter
     bodies = {body.node.value: body for body in run.starter.bodies}
-    held = rigid_parts(run.starter, {node: body.group for node, body in bodies.items()})
+    held = find_rigid_parts(
+        run.starter, {node: body.group for node, body in bodies.items()}
+    )
     assert {node: held[node] for node in nodes} == {100: {1, 2, 4}, 101: {3}}
     part_groups, body_groups = (
         write_starter().partition("/END\n")[::2],
@@ -138,7 +140,7 @@ def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
     """Centres of the squares are at 0.5 and 2.5, the second has twice the mass; springs without mass count nothing."""
     nodes, run, _ = write_bodies(tmp_path)
     assert run.starter
-    ids, coordinates = nodes_of(run.starter.named("NODE"))
+    ids, coordinates = read_nodes(run.starter.named("NODE"))
     main_coordinates = [coordinates[ids == node][0].tolist() for node in nodes]
     assert main_coordinates == [
         pytest.approx([(0.5 + 2 * 2.5) / 3, 0.5, 0.0], abs=1e-9),
@@ -180,7 +182,7 @@ def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -
 
 
 def test_gravity_that_acts_on_all_nodes_needs_nothing_more(tmp_path: Path) -> None:
-    assert "/GRAV" not in bodies_for(write_run(tmp_path, write_gravity(0)), ALL).cards
+    assert "/GRAV" not in find_bodies(write_run(tmp_path, write_gravity(0)), ALL).cards
 
 
 def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
@@ -189,8 +191,8 @@ def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
         write_group(70, 1, 2, 4, kind="PART") + BODY,
         ENGINE + "/RBODY/OFF\n99\n",
     )
-    assert bodies_for(main, (1, 2, 4)) == Bodies((99,))
-    bodies = bodies_for(main, ALL)
+    assert find_bodies(main, (1, 2, 4)) == SwitchedBodies((99,))
+    bodies = find_bodies(main, ALL)
     assert bodies.nodes == (99, 100)
     assert "/RBODY/8\n" in bodies.cards
     assert [note.partition(" with ")[0] for note in bodies.notes] == ["/RBODY"]
@@ -207,7 +209,7 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
         write_group(70, *held, kind="PART") + BODY,
         ENGINE + "/RBODY/OFF\n99\n",
     )
-    bodies = bodies_for(main, (1, 2, 4))
+    bodies = find_bodies(main, (1, 2, 4))
     assert (bodies.nodes, bodies.replaced) == ((100,), (99,))
     assert "is off in the whole run and must be removed" in bodies.notes[-1]
     printing = Printing(
@@ -218,7 +220,7 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
         replaced=bodies.replaced,
     )
     name = write_deck(
-        main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
     )[0]
     starter_of_copy = read_run(name).starter
     assert starter_of_copy
@@ -236,7 +238,7 @@ def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
         ENGINE.replace("box/1", "box/2") + "/RBODY/ON\n99\n"
     )
     with pytest.raises(DeckError, match="not exactly these parts"):
-        bodies_for(main, (1, 2, 4))
+        find_bodies(main, (1, 2, 4))
 
 
 @pytest.mark.parametrize(
@@ -268,17 +270,17 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     tmp_path: Path, more: str, message: str
 ) -> None:
     with pytest.raises(DeckError, match=message) as refusal:
-        bodies_for(write_run(tmp_path, more), (1, 2, 4))
+        find_bodies(write_run(tmp_path, more), (1, 2, 4))
     assert "\n" not in str(refusal.value)
 
 
 def test_parts_without_nodes_are_named(tmp_path: Path) -> None:
     with pytest.raises(DeckError, match="parts 7, 8 are without elements"):
-        bodies_for(write_run(tmp_path), (1, 7, 8))
+        find_bodies(write_run(tmp_path), (1, 7, 8))
 
 
 def test_pieces_that_nothing_joins_are_told(tmp_path: Path) -> None:
     nodes, shell = write_quad(5, 20.0)
     more = "/NODE\n" + nodes + shell.partition("/SHELL/5\n")[2].join(("/SHELL/3\n", ""))
-    (note,) = bodies_for(write_run(tmp_path, more), (3,)).notes
+    (note,) = find_bodies(write_run(tmp_path, more), (3,)).notes
     assert note.endswith("it joins 2 pieces that nothing else connects")

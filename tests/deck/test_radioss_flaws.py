@@ -9,7 +9,7 @@ import pytest
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
-from d2rpick.deck.radioss_flaws import flaws_of
+from d2rpick.deck.radioss_flaws import find_flaws
 from d2rpick.deck.radioss_run import read_run
 from tests.deck.test_openradioss import MAIN, write_starter
 from tests.decks import wide
@@ -31,7 +31,7 @@ def find_run_flaws(
         (folder / f"strip_{number:04d}.rad").write_text(
             f"/RUN/strip/{number}\n{number / 1000}\n{text}"
         )
-    return flaws_of(read_run(str(folder / "strip_0000.rad")), {MAIN})
+    return find_flaws(read_run(str(folder / "strip_0000.rad")), {MAIN})
 
 
 def list_codes(run_flaws: tuple[Flaw, ...]) -> list[str]:

@@ -25,7 +25,9 @@ PROPS = (
 
 def read_text(folder: Path, text: str) -> Inventory:
     (folder / "TEST_0000.rad").write_text(BEGIN + text + "/END\n")
-    return radioss_inventory.read(read_run(str(folder / "TEST_0000.rad")))
+    return radioss_inventory.read_radioss_inventory(
+        read_run(str(folder / "TEST_0000.rad"))
+    )
 
 
 def write_nodes(count: int) -> str:
@@ -155,7 +157,7 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
     deck = tmp_path / "TEST_0000.rad"
     for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
         deck.write_text(text[:end])
-        cut_inventory = radioss_inventory.read(read_run(str(deck)))
+        cut_inventory = radioss_inventory.read_radioss_inventory(read_run(str(deck)))
         assert (
             sum("may be truncated" in note for note in cut_inventory.notes),
             cut_inventory.complete,
@@ -167,7 +169,7 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
             "D2R011"
         ]
     deck.write_text(f"{text}/END\n")
-    assert radioss_inventory.read(read_run(str(deck))).complete
+    assert radioss_inventory.read_radioss_inventory(read_run(str(deck))).complete
 
 
 def test_titles_may_be_empty(tmp_path: Path) -> None:

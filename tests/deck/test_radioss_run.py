@@ -7,8 +7,8 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.printed_card import Printing
-from d2rpick.deck.printing import cards
-from d2rpick.deck.radioss_files import recognises, run_files
+from d2rpick.deck.printing import print_cards
+from d2rpick.deck.radioss_files import is_radioss, list_run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.rules import RULES, check_deck
 from tests.command import put
@@ -221,7 +221,7 @@ def test_printed_sensors_hold_their_windows(
 ) -> None:
     times = sorted(cut / 1000 for cut in cuts)
     windows = list(zip(times[::2], times[1::2], strict=True))
-    card = cards(
+    card = print_cards(
         windows,
         Printing(node=(1808,), end=windows[-1][1] + 1, sensor=5),
         "radioss-sensors",
@@ -283,11 +283,16 @@ def test_stresses_of_solids_without_a_frame_do_not_turn(
 def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
     path = write_run(tmp_path)
     files = [str(tmp_path / f"box_000{n}.rad") for n in range(4)]
-    assert run_files(path) == run_files(files[2]) == files
+    assert list_run_files(path) == list_run_files(files[2]) == files
     other_file = put(tmp_path / "starter.rad", EXAMPLE.deck)
     (tmp_path / "box_0000.rad").unlink()
-    assert run_files(str(other_file)) == [str(other_file), *files[1:]]
-    assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []
+    assert list_run_files(str(other_file)) == [str(other_file), *files[1:]]
+    assert (
+        list_run_files(str(tmp_path))
+        == list_run_files("absent")
+        == list_run_files("\0")
+        == []
+    )
 
 
 @pytest.mark.parametrize("cut", range(1, 30))
@@ -409,7 +414,7 @@ def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) ->
         + keyword
         + garbage
     )
-    assert recognises(content)
+    assert is_radioss(content)
     check_deck("run.rad", content=content)
 
 

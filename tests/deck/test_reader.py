@@ -7,11 +7,11 @@ import pytest
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED
-from d2rpick.deck.reader import holds_mesh, read_deck
+from d2rpick.deck.reader import has_mesh, read_deck
 from d2rpick.deck.source import Block, SourceFile, find_marks
-from d2rpick.deck.stored import Held
+from d2rpick.deck.stored import HeldInMemory
 from d2rpick.deck.switching import read_switching
-from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, write_automatic_card
 from tests.decks import found, read, spans
 
 WINDOW = [(1, 0.02, 0.09)]
@@ -38,31 +38,54 @@ SAME = {
     "hint text": GOOD.replace("_AUTOMATIC", "_AUTOMATIC   (all doors) "),
     "indented keyword": GOOD.replace("*DEFORM", "  *DEFORM"),
     "comments anywhere": GOOD.replace("\n", "\n$ * 1.0, *END *COMMENT\n"),
-    "short lines": GOOD.replace("         0         0         0\n", "\n").replace("      PART\n", "\n"),
+    "short lines": GOOD.replace("         0         0         0\n", "\n").replace(
+        "      PART\n", "\n"
+    ),
     "trailing blanks": GOOD.replace("\n", "   \n"),
     "blank lines at the end": GOOD.replace(END, "\n\n" + END),
-    "title that looks like data": GOOD.replace(PARTS, "*TITLE\n         1         2\n" + PARTS),
+    "title that looks like data": GOOD.replace(
+        PARTS, "*TITLE\n         1         2\n" + PARTS
+    ),
     "dollar in a title": GOOD.replace("door", "door $1 *PART"),
     "Latin-1": GOOD.replace("door", "T\xfcr \xb5 \xff"),
     "comma": HEAD + PARTS + COMMA,
     "LONG=Y": "*KEYWORD LONG=Y\n" + LONG_CARDS.format(""),
     "long by suffix": "*KEYWORD\n" + LONG_CARDS.format("+"),
     "long by suffix apart": "*KEYWORD\n" + LONG_CARDS.format(" + "),
-    "standard inside long": "*KEYWORD LONG=Y\n" + (THERE + BACK).replace("_AUTOMATIC", "_AUTOMATIC-"),
+    "standard inside long": "*KEYWORD LONG=Y\n"
+    + (THERE + BACK).replace("_AUTOMATIC", "_AUTOMATIC-"),
     "LONG=K reads standard": "*KEYWORD LONG=K\n" + THERE + BACK,
     "percent suffix": GOOD.replace("_AUTOMATIC", "_AUTOMATIC%"),
-    "encrypted block after": GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nABC=\n-----END PGP MESSAGE-----\n"),
-    "parameters": HEAD + "*PARAMETER\nR     TR        0.02I one              1\n" + PARTS
-    + automatic(1, "&tr", rigid=["&one"]) + BACK,
-    "left-aligned reference": HEAD + "*PARAMETER\nR tr          0.02\n" + PARTS
-    + THERE.replace("      0.02", "&tr       ") + BACK,
-    "minus reference": HEAD + "*PARAMETER\nR tr         -0.02\n" + automatic(1, "-&tr", rigid=["1"]) + BACK,
-    "expression": HEAD + "*PARAMETER_EXPRESSION\nR a       2.0/100\nI b       2/5+1\n"
-    + automatic(1, "&a*1.0", rigid=["&b"]) + BACK,
-    "expression over two lines": HEAD + "*PARAMETER_EXPRESSION\nR a       2.0/\n          100\n"
-    + automatic(1, "&a", rigid=["1"]) + BACK,
-    "comma in a parameter": HEAD + "*PARAMETER\nRtr, 0.02\n" + automatic(1, "&tr", rigid=["1"]) + BACK,
-}  # fmt: skip
+    "encrypted block after": GOOD.replace(
+        END, "-----BEGIN PGP MESSAGE-----\nABC=\n-----END PGP MESSAGE-----\n"
+    ),
+    "parameters": HEAD
+    + "*PARAMETER\nR     TR        0.02I one              1\n"
+    + PARTS
+    + write_automatic_card(1, "&tr", rigid=["&one"])
+    + BACK,
+    "left-aligned reference": HEAD
+    + "*PARAMETER\nR tr          0.02\n"
+    + PARTS
+    + THERE.replace("      0.02", "&tr       ")
+    + BACK,
+    "minus reference": HEAD
+    + "*PARAMETER\nR tr         -0.02\n"
+    + write_automatic_card(1, "-&tr", rigid=["1"])
+    + BACK,
+    "expression": HEAD
+    + "*PARAMETER_EXPRESSION\nR a       2.0/100\nI b       2/5+1\n"
+    + write_automatic_card(1, "&a*1.0", rigid=["&b"])
+    + BACK,
+    "expression over two lines": HEAD
+    + "*PARAMETER_EXPRESSION\nR a       2.0/\n          100\n"
+    + write_automatic_card(1, "&a", rigid=["1"])
+    + BACK,
+    "comma in a parameter": HEAD
+    + "*PARAMETER\nRtr, 0.02\n"
+    + write_automatic_card(1, "&tr", rigid=["1"])
+    + BACK,
+}
 
 
 @pytest.mark.parametrize("deck", SAME.values(), ids=SAME.keys())
@@ -102,9 +125,9 @@ def test_encrypted_blocks_are_found_and_end_the_card_before(tmp_path: Path) -> N
 @pytest.mark.parametrize("chunk", [37, 64, 100])
 def test_no_cut_between_chunks_hides_a_keyword(chunk: int) -> None:
     text = (GOOD + "-----BEGIN PGP MESSAGE-----\nA\n").replace(END, "")
-    whole = find_marks(Held(text.encode()))
+    whole = find_marks(HeldInMemory(text.encode()))
     assert len(whole) == text.count("\n*") + 2
-    assert [*find_marks(Held(text.encode()), chunk)] == [*whole]
+    assert [*find_marks(HeldInMemory(text.encode()), chunk)] == [*whole]
 
 
 def write_transform(
@@ -116,75 +139,155 @@ def write_transform(
 CARDS = {"cards.k": THERE + BACK}
 INCLUDES = {
     "beside": ("*INCLUDE\ncards.k\n", CARDS, WINDOW),
-    "names between blank lines": ("*INCLUDE\n\nother.k\n   \ncards.k\n", CARDS | {"other.k": "*NODE\n"}, WINDOW),
-    "several names": ("*INCLUDE\nother.k\ncards.k\n", CARDS | {"other.k": "*NODE\n"}, WINDOW),
-    "name over two lines": ("*INCLUDE\nsub/long_ +\nname.k\n", {"sub/long_name.k": THERE + BACK}, WINDOW),
+    "names between blank lines": (
+        "*INCLUDE\n\nother.k\n   \ncards.k\n",
+        CARDS | {"other.k": "*NODE\n"},
+        WINDOW,
+    ),
+    "several names": (
+        "*INCLUDE\nother.k\ncards.k\n",
+        CARDS | {"other.k": "*NODE\n"},
+        WINDOW,
+    ),
+    "name over two lines": (
+        "*INCLUDE\nsub/long_ +\nname.k\n",
+        {"sub/long_name.k": THERE + BACK},
+        WINDOW,
+    ),
     "backslashes": ("*INCLUDE\nsub\\cards.k\n", {"sub/cards.k": THERE + BACK}, WINDOW),
     "quoted": ('*INCLUDE\n"cards.k"\n', CARDS, WINDOW),
-    "include path": ("*INCLUDE_PATH\nfar/away\n*INCLUDE\ncards.k\n", {"far/away/cards.k": THERE + BACK}, WINDOW),
-    "relative path": ("*INCLUDE_PATH_RELATIVE\nfar\n*INCLUDE\ncards.k\n", {"far/cards.k": THERE + BACK}, WINDOW),
-    "beside the include": ("*INCLUDE\nsub/a.k\n", {"sub/a.k": "*INCLUDE\nb.k\n", "sub/b.k": THERE + BACK}, WINDOW),
-    "parts move": (write_transform(f"{0:10d}{0:10d}{100:10d}"), CARDS, [(101, 0.02, 0.09)]),
-    "times scale": (write_transform(factors=f"{'1.0':>10s}{'0.5':>10s}"), CARDS, [(1, 0.01, 0.045)]),
-    "factor 0 is 1": (write_transform(factors=f"{'0.0':>10s}{'0.0':>10s}"), CARDS, WINDOW),
+    "include path": (
+        "*INCLUDE_PATH\nfar/away\n*INCLUDE\ncards.k\n",
+        {"far/away/cards.k": THERE + BACK},
+        WINDOW,
+    ),
+    "relative path": (
+        "*INCLUDE_PATH_RELATIVE\nfar\n*INCLUDE\ncards.k\n",
+        {"far/cards.k": THERE + BACK},
+        WINDOW,
+    ),
+    "beside the include": (
+        "*INCLUDE\nsub/a.k\n",
+        {"sub/a.k": "*INCLUDE\nb.k\n", "sub/b.k": THERE + BACK},
+        WINDOW,
+    ),
+    "parts move": (
+        write_transform(f"{0:10d}{0:10d}{100:10d}"),
+        CARDS,
+        [(101, 0.02, 0.09)],
+    ),
+    "times scale": (
+        write_transform(factors=f"{'1.0':>10s}{'0.5':>10s}"),
+        CARDS,
+        [(1, 0.01, 0.045)],
+    ),
+    "factor 0 is 1": (
+        write_transform(factors=f"{'0.0':>10s}{'0.0':>10s}"),
+        CARDS,
+        WINDOW,
+    ),
     "transforms nest": (
         write_transform(f"{0:10d}{0:10d}{100:10d}", factors=f"{'':10s}{'0.5':>10s}"),
-        {"cards.k": write_transform(f"{0:10d}{0:10d}{10:10d}", factors=f"{'':10s}{'0.1':>10s}").replace("cards",
-         "inner"),
-         "inner.k": THERE + BACK},
+        {
+            "cards.k": write_transform(
+                f"{0:10d}{0:10d}{10:10d}", factors=f"{'':10s}{'0.1':>10s}"
+            ).replace("cards", "inner"),
+            "inner.k": THERE + BACK,
+        },
         [(111, 0.001, pytest.approx(0.0045))],
     ),
     "sets move": (
-        PARTS + "*SET_PART\n        57\n         1\n" + write_transform(f"{0:40d}{50:10d}"),
-        {"cards.k": (THERE + BACK).replace("         1         0      PART", "         7         0      PSET").replace(
-            "         1      PART", "         7      PSET")},
+        PARTS
+        + "*SET_PART\n        57\n         1\n"
+        + write_transform(f"{0:40d}{50:10d}"),
+        {
+            "cards.k": (THERE + BACK)
+            .replace("         1         0      PART", "         7         0      PSET")
+            .replace("         1      PART", "         7      PSET")
+        },
         WINDOW,
     ),
-    "long format is inherited": ("*KEYWORD LONG=Y\n*INCLUDE\ncards.k\n", {"cards.k": LONG_CARDS.format("")}, WINDOW),
+    "long format is inherited": (
+        "*KEYWORD LONG=Y\n*INCLUDE\ncards.k\n",
+        {"cards.k": LONG_CARDS.format("")},
+        WINDOW,
+    ),
     "parameters of the deck": (
         "*PARAMETER\nR tr          0.02\n*INCLUDE\ncards.k\n",
-        {"cards.k": automatic(1, "&tr", rigid=["1"]) + BACK}, WINDOW,
+        {"cards.k": write_automatic_card(1, "&tr", rigid=["1"]) + BACK},
+        WINDOW,
     ),
     "local masks outer": (
         "*PARAMETER\nR tr          0.05\n*INCLUDE\ncards.k\n",
-        {"cards.k": "*PARAMETER_LOCAL\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"]) + BACK}, WINDOW,
+        {
+            "cards.k": "*PARAMETER_LOCAL\nR tr          0.02\n"
+            + write_automatic_card(1, "&tr", rigid=["1"])
+            + BACK
+        },
+        WINDOW,
     ),
     "local ends with its file": (
-        "*INCLUDE\nlocal.k\n*PARAMETER\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"]) + BACK,
-        {"local.k": "*PARAMETER_LOCAL\nR tr          0.05\n"}, WINDOW,
+        "*INCLUDE\nlocal.k\n*PARAMETER\nR tr          0.02\n"
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + BACK,
+        {"local.k": "*PARAMETER_LOCAL\nR tr          0.05\n"},
+        WINDOW,
     ),
     "local masks the deck's in the same file": (
         "*PARAMETER\nR tr          0.05\n*PARAMETER_LOCAL\nR tr          0.02\n"
-        + automatic(1, "&tr", rigid=["1"]) + BACK, {}, WINDOW,
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + BACK,
+        {},
+        WINDOW,
     ),
     "a local one below a card does not mask for it": (
-        "*PARAMETER\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"])
-        + "*PARAMETER_LOCAL\nR tr          0.05\n" + BACK, {}, WINDOW,
+        "*PARAMETER\nR tr          0.02\n"
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + "*PARAMETER_LOCAL\nR tr          0.05\n"
+        + BACK,
+        {},
+        WINDOW,
     ),
     "a mutable one changes between two cards": (
-        "*PARAMETER_MUTABLE\nR t           0.02\n" + automatic(1, "&t", rigid=["1"])
-        + "*PARAMETER_MUTABLE\nR t           0.09\n" + automatic(2, "&t", deformable=["1"]), {}, WINDOW,
+        "*PARAMETER_MUTABLE\nR t           0.02\n"
+        + write_automatic_card(1, "&t", rigid=["1"])
+        + "*PARAMETER_MUTABLE\nR t           0.09\n"
+        + write_automatic_card(2, "&t", deformable=["1"]),
+        {},
+        WINDOW,
     ),
     "a parameter names the file": (
-        "*PARAMETER\nCfile       cards\n*INCLUDE\n&file.k\n", {"cards.k": THERE + BACK}, WINDOW,
+        "*PARAMETER\nCfile       cards\n*INCLUDE\n&file.k\n",
+        {"cards.k": THERE + BACK},
+        WINDOW,
     ),
     "a parameter names the folder": (
         "*PARAMETER\nCdir          sub\n*INCLUDE_PATH\n&dir\n*INCLUDE\ncards.k\n",
-        {"sub/cards.k": THERE + BACK}, WINDOW,
+        {"sub/cards.k": THERE + BACK},
+        WINDOW,
     ),
     "the first definition counts": (
-        "*PARAMETER\nR tr          0.02\n*PARAMETER\nR tr          0.05\n" + automatic(1, "&tr", rigid=["1"]) + BACK,
-        {}, WINDOW,
+        "*PARAMETER\nR tr          0.02\n*PARAMETER\nR tr          0.05\n"
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + BACK,
+        {},
+        WINDOW,
     ),
     "the last one when asked for": (
         "*PARAMETER_DUPLICATION\n         2\n*PARAMETER\nR tr          0.05\n*PARAMETER\nR tr          0.02\n"
-        + automatic(1, "&tr", rigid=["1"]) + BACK, {}, WINDOW,
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + BACK,
+        {},
+        WINDOW,
     ),
     "a mutable one": (
-        "*PARAMETER\nR tr          0.05\n*PARAMETER_MUTABLE\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"])
-        + BACK, {}, WINDOW,
+        "*PARAMETER\nR tr          0.05\n*PARAMETER_MUTABLE\nR tr          0.02\n"
+        + write_automatic_card(1, "&tr", rigid=["1"])
+        + BACK,
+        {},
+        WINDOW,
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(
@@ -266,12 +369,14 @@ def test_a_deck_that_cannot_be_read(tmp_path: Path, name: str) -> None:
     ("deck", "told", "place"),
     [
         (
-            "*PARAMETER_EXPRESSION\nR a       &b*2\n" + automatic(1, "&a", rigid=["1"]),
+            "*PARAMETER_EXPRESSION\nR a       &b*2\n"
+            + write_automatic_card(1, "&a", rigid=["1"]),
             "&b is not defined",
             "main.k:2",
         ),
         (
-            automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n",
+            write_automatic_card(1, "&a", rigid=["1"])
+            + "*PARAMETER\nR a           0.02\n",
             "defined only below, at",
             "main.k:8",
         ),
@@ -293,4 +398,4 @@ def test_a_parameter_without_a_value_is_named_with_its_place(
 @pytest.mark.parametrize("keyword", [*KINDS, *sorted(NOT_COUNTED), "NODE"])
 def test_all_elements_of_radioss_are_mesh(keyword: str) -> None:
     """The names are defined twice, because a check does not load the inventory."""
-    assert holds_mesh(Block(SourceFile("run_0000.rad", b""), 0, None, f"/{keyword}/1"))
+    assert has_mesh(Block(SourceFile("run_0000.rad", b""), 0, None, f"/{keyword}/1"))

@@ -18,7 +18,7 @@ from hypothesis import given, strategies as st
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState
 from d2rpick.deck.source import SourceFile, find_marks
-from d2rpick.deck.stored import Held, OnDisk
+from d2rpick.deck.stored import DeckOnDisk, HeldInMemory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,10 +70,10 @@ def find_marks_by_line(data: bytes) -> Iterator[int]:
         start += len(line)
 
 
-def open_on_disk(file: Path, window: int = 64) -> OnDisk:
+def open_on_disk(file: Path, window: int = 64) -> DeckOnDisk:
     """Return a file that stays on disk and is read in small pieces."""
     with file.open("rb", buffering=0) as opened:
-        return OnDisk(str(file), FileState.of(opened), window)
+        return DeckOnDisk(str(file), FileState.of(opened), window)
 
 
 @pytest.fixture(scope="module")
@@ -87,13 +87,13 @@ def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
 ) -> None:
     file.write_bytes(data)
     expected = [*find_marks_by_line(data)]
-    assert [*find_marks(Held(data))] == expected
+    assert [*find_marks(HeldInMemory(data))] == expected
     blocks = [
         (block.start, block.end, block.head, block.line, [*block.lines()])
         for block in SourceFile("held", data).blocks()
     ]
     disk_file = open_on_disk(file, window)
-    for content in (disk_file, Held(data)):
+    for content in (disk_file, HeldInMemory(data)):
         assert [*find_marks(content, piece, alone=0, helpers=helpers)] == expected
     source = SourceFile(str(file), disk_file, piece)
     assert [*source.marks] == expected
@@ -137,7 +137,7 @@ def test_a_call_of_the_system_that_gives_less_is_repeated(
         disk_file.read(1, 9)
 
 
-class Failing(Held):
+class Failing(HeldInMemory):
     """Bytes that can be read only up to an offset."""
 
     @contextmanager
@@ -163,10 +163,12 @@ def test_where_no_more_threads_are_allowed_one_searches_all(
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr("_thread.start_new_thread", none_left)
-    assert [*find_marks(Held(b"*NODE\n" * 100), 64, alone=0)] == [*range(0, 600, 6)]
+    assert [*find_marks(HeldInMemory(b"*NODE\n" * 100), 64, alone=0)] == [
+        *range(0, 600, 6)
+    ]
 
 
-class Short(Held):
+class Short(HeldInMemory):
     """Bytes for which only the main thread gets memory."""
 
     @contextmanager
@@ -186,7 +188,7 @@ def test_what_a_thread_has_no_memory_for_the_first_one_searches(
     assert capfd.readouterr() == ("", "")
 
 
-class Counting(Held):
+class Counting(HeldInMemory):
     """Bytes that count how many of them are read."""
 
     asked = 0
@@ -211,7 +213,7 @@ def test_lines_are_counted_once_in_whatever_order_they_are_asked_for() -> None:
     assert file.asked < 3 * len(text)
 
 
-class Interrupted(Held):
+class Interrupted(HeldInMemory):
     """Bytes whose read interrupts the main thread."""
 
     def __init__(self, data: bytes) -> None:

@@ -4,20 +4,20 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.deck.ls_dyna_inventory import first_shared_nodes
-from d2rpick.deck.ls_dyna_parts import element_cards, read_parts
-from d2rpick.rules.rule import PARTS, automatic
+from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
+from d2rpick.deck.ls_dyna_parts import find_element_cards, read_parts
+from d2rpick.rules.rule import PARTS, write_automatic_card
 from tests.decks import read, spans, wide, windows
 
 Spans = list[tuple[int | None, float, float | None]]
 
 
 def write_rigid_card(time: str, *parts: str, swset: int = 1) -> str:
-    return automatic(swset, time, rigid=parts)
+    return write_automatic_card(swset, time, rigid=parts)
 
 
 def write_back_card(time: str, *parts: str, swset: int = 2) -> str:
-    return automatic(swset, time, deformable=parts)
+    return write_automatic_card(swset, time, deformable=parts)
 
 
 PLAIN = "*DEFORMABLE_TO_RIGID\n         1\n"
@@ -58,8 +58,8 @@ CASES: dict[str, tuple[str, Spans]] = {
     "inverted": (write_rigid_card("2", "1") + write_back_card("1", "1"), [(1, 2, 1)]),
     "at once": (write_rigid_card("1", "1") + write_back_card("1", "1"), [(1, 1, 1)]),
     "by force": (
-        automatic(1, "0", rigid=["1"], code=2)
-        + automatic(2, "0", deformable=["1"], code=4),
+        write_automatic_card(1, "0", rigid=["1"], code=2)
+        + write_automatic_card(2, "0", deformable=["1"], code=4),
         [],
     ),
     "restart": ("*RIGID_DEFORMABLE_R2D\n         1\n", []),
@@ -187,10 +187,10 @@ ELEMENTS: dict[str, str] = {
 
 @pytest.mark.parametrize("deck", ELEMENTS.values(), ids=ELEMENTS.keys())
 def test_shared_nodes(tmp_path: Path, deck: str) -> None:
-    cards = element_cards(read(tmp_path, deck), searched=True)
-    assert first_shared_nodes(cards, {1: 1, 2: 2})[(1, 2)] == 3
-    assert first_shared_nodes(cards, {1: 1, 2: 1}) == {}
-    assert first_shared_nodes(cards, {1: 1, 3: 3}) == {}
+    cards = find_element_cards(read(tmp_path, deck), searched=True)
+    assert find_shared_nodes(cards, {1: 1, 2: 2})[(1, 2)] == 3
+    assert find_shared_nodes(cards, {1: 1, 2: 1}) == {}
+    assert find_shared_nodes(cards, {1: 1, 3: 3}) == {}
 
 
 def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
@@ -201,8 +201,8 @@ def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
         + write_shell(2, 2, 3, 4, 6, 7)
     )
     assert (
-        first_shared_nodes(
-            element_cards(read(tmp_path, deck), searched=True), {1: 1, 2: 2}
+        find_shared_nodes(
+            find_element_cards(read(tmp_path, deck), searched=True), {1: 1, 2: 2}
         )
         == {}
     )

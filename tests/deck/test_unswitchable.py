@@ -7,7 +7,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.deck import read_inventory
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import engine_files, starter_deck
+from d2rpick.rules.rule import write_engine_files, write_starter_deck
 from tests.command import MATSUM, put
 from tests.decks import wide
 
@@ -126,11 +126,11 @@ def test_other_laws_and_elements_are_switched(tmp_path: Path, law: str) -> None:
 def test_parts_of_radioss_that_must_not_be_switched(
     tmp_path: Path, cards: str, rule: str
 ) -> None:
-    for name, text in engine_files(
+    for name, text in write_engine_files(
         ("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF")
     ).items():
         put(tmp_path / name, text)
-    main = str(put(tmp_path / "box_0000.rad", starter_deck(more=cards)))
+    main = str(put(tmp_path / "box_0000.rad", write_starter_deck(more=cards)))
     assert [finding.rule for finding in check_deck(main).findings] == [rule] * bool(
         rule
     )

@@ -7,8 +7,8 @@ import pytest
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.printed_card import PrintedCard, Printing
-from d2rpick.deck.printing import cards
-from d2rpick.deck.radioss_deck import Leg
+from d2rpick.deck.printing import print_cards
+from d2rpick.deck.radioss_deck import RadiossLeg
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
@@ -16,7 +16,7 @@ from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
-CARD = cards(WINDOWS, Printing(part=(1,)))
+CARD = print_cards(WINDOWS, Printing(part=(1,)))
 INCLUDE = "*INCLUDE\nswitches.k\n"
 RUN = RULES["D2R401"].passing[0]
 
@@ -162,7 +162,7 @@ def write_radioss_run(folder: Path, engine: str = ENGINE) -> str:
 
 
 def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
-    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
+    card = print_cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
     starter, *legs = write_deck(
         write_radioss_run(tmp_path / "ref"), card, str(tmp_path / "next")
     )
@@ -183,13 +183,17 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
         file.rename(file.with_name(file.name.replace("box_", "heavy_box_")))
     main = main.replace("box_0000", "heavy_box_0000")
     for name in ("box", "heavy_box"):  # the name in /RUN, or that of the files
-        card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
+        card = print_cards(
+            WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss"
+        )
         names = [
             Path(written_file).name
             for written_file in write_deck(main, card, str(tmp_path / name))
         ]
         assert names == [f"heavy_box_{number:04d}.rad" for number in range(6)]
-    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss")
+    card = print_cards(
+        WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss"
+    )
     check_refused(main, card, "the cards are for run 'other', but this is run 'box'")
 
 
@@ -197,7 +201,7 @@ def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
     tmp_path: Path,
 ) -> None:
     """A later leg may lack keywords of the first one, such as initial velocities, but has none of its own."""
-    card = cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
+    card = print_cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
     ref = write_radioss_run(tmp_path / "ref")
     (tmp_path / "ref" / "box_0002.rad").write_text(
         "/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n"
@@ -225,7 +229,7 @@ def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> 
         ((), "a"),
         ((1810, 1809), "b"),
     ):  # a card that knows them, and one that does not
-        card = cards(
+        card = print_cards(
             WINDOWS,
             Printing(node=(1808,), off=starter_deck, end=0.4, name="box"),
             "radioss",
@@ -245,14 +249,14 @@ def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> 
         )  # the starter ignores a second block that follows the first
 
 
-def list_states(leg: Leg) -> Iterator[tuple[int, bool]]:
+def list_states(leg: RadiossLeg) -> Iterator[tuple[int, bool]]:
     for _, rigid, nodes in leg.switched:
         yield from ((node.value, rigid) for node in nodes)
 
 
 def test_a_card_names_all_that_is_off_in_one_block() -> None:
     """The starter of OpenRadioss ignores the second of two consecutive blocks."""
-    card = cards(
+    card = print_cards(
         WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss"
     )
     texts = list(card.files.values())
@@ -263,7 +267,7 @@ def test_a_card_names_all_that_is_off_in_one_block() -> None:
 
 def print_sensor_card(**more: object) -> PrintedCard:
     printing = Printing(node=(1808,), end=0.4, name="box", **more)  # type: ignore[arg-type]
-    return cards(WINDOWS, printing, "radioss-sensors")
+    return print_cards(WINDOWS, printing, "radioss-sensors")
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
@@ -320,16 +324,39 @@ LEGS = Printing(node=(1808,), end=0.4, name="box")
 @pytest.mark.parametrize(
     ("deck", "engine", "card", "message"),
     [
-        (RUN.deck, ENGINE.replace("OFF", "ON"), cards(WINDOWS, LEGS, "radioss"), "switches main node 1808 already"),
-        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "but this is run 'box'"),
-        (RUN.deck.replace("      1808         0", "      1808         4"), ENGINE, print_sensor_card(),
-         "sensor 4 switches this /RBODY already"),
-        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), ENGINE, print_sensor_card(),
-         "has sensor 903 of the cards already"),
-        (RUN.deck.replace("      1808 ", "      1807 "), ENGINE, print_sensor_card(), "main node 1808: no /RBODY"),
+        (
+            RUN.deck,
+            ENGINE.replace("OFF", "ON"),
+            print_cards(WINDOWS, LEGS, "radioss"),
+            "switches main node 1808 already",
+        ),
+        (
+            RUN.deck,
+            ENGINE,
+            print_cards(WINDOWS, LEGS._replace(name="other"), "radioss"),
+            "but this is run 'box'",
+        ),
+        (
+            RUN.deck.replace("      1808         0", "      1808         4"),
+            ENGINE,
+            print_sensor_card(),
+            "sensor 4 switches this /RBODY already",
+        ),
+        (
+            RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"),
+            ENGINE,
+            print_sensor_card(),
+            "has sensor 903 of the cards already",
+        ),
+        (
+            RUN.deck.replace("      1808 ", "      1807 "),
+            ENGINE,
+            print_sensor_card(),
+            "main node 1808: no /RBODY",
+        ),
         (RUN.deck, ENGINE, CARD, "another solver"),
     ],
-)  # fmt: skip
+)
 def test_a_run_that_does_not_suit_is_refused(
     tmp_path: Path, deck: str, engine: str, card: PrintedCard, message: str
 ) -> None:
@@ -343,4 +370,6 @@ def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(
     tmp_path: Path, solver: str
 ) -> None:
     message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
-    check_refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)
+    check_refused(
+        write(tmp_path, HEAD + PARTS), print_cards(WINDOWS, LEGS, solver), message
+    )

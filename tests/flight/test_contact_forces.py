@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.flight.contact_forces import Touches, is_deformed
-from d2rpick.flight.flight import all_seen, seen_flight
+from d2rpick.flight.flight import find_all_seen, find_seen_flight
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
@@ -102,7 +102,10 @@ def test_files_that_are_written_at_different_times_are_put_together() -> None:
 
 def test_forces_find_the_flights_of_a_computed_run_that_its_momenta_find() -> None:
     history = open_run([COMPUTED]).history(Selection())
-    by_momenta, by_forces = all_seen(history), all_seen(without_momenta(history))
+    by_momenta, by_forces = (
+        find_all_seen(history),
+        find_all_seen(without_momenta(history)),
+    )
     assert {source for source, _ in by_momenta} == {"momentum"}
     assert {source for source, _ in by_forces} == {"contact-force"}
     for (_, one), (_, other) in zip(by_momenta, by_forces, strict=True):
@@ -119,10 +122,10 @@ def test_momenta_of_parts_come_first_since_a_contact_may_be_of_others() -> None:
     of_others = Given(
         evidence.momenta, evidence.balance, evidence.masses, (*evidence.forces, rattle)
     )
-    seen = seen_flight(replace(history, evidence=of_others), 0.205)
+    seen = find_seen_flight(replace(history, evidence=of_others), 0.205)
     assert seen.source == "momentum"
     assert seen.doubts == ()
-    alone = seen_flight(
+    alone = find_seen_flight(
         replace(history, evidence=Given((), None, None, (*evidence.forces, rattle))),
         0.205,
     )
@@ -143,11 +146,11 @@ def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
     history = with_forces(crash(TIME), contact((0.05, 0.3)))
     found = sure(around(0.5, *history.evidence.forces))
     assert is_deformed(history, found)
-    seen = seen_flight(history, 0.5)
+    seen = find_seen_flight(history, 0.5)
     assert seen.flight is None or seen.refusal or seen.flight.start > 0.6
     calm = with_forces(1 + 0.2 * np.sin(300 * TIME), contact((0.05, 0.3)))
     assert not is_deformed(calm, found)
-    assert sure(seen_flight(calm, 0.5).flight).start == pytest.approx(
+    assert sure(find_seen_flight(calm, 0.5).flight).start == pytest.approx(
         0.3, abs=1.1 * STEP
     )
 
@@ -155,12 +158,12 @@ def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
 def test_before_any_contact_has_ended_forces_alone_show_no_flight() -> None:
     """A load of another kind may act from the start on, which only the external work shows."""
     history = with_forces(0.4 + 0.2 * np.sin(300 * TIME), contact((0.8, 0.85)))
-    assert sure(seen_flight(history, 0.6).refusal).startswith(
+    assert sure(find_seen_flight(history, 0.6).refusal).startswith(
         "the contact force shows no free flight at td = 0.6"
     )
     work = Balance(TIME, internal=history.energy, external_work=np.zeros_like(TIME))
     known = replace(history, evidence=Given((), work, None, history.evidence.forces))
-    assert sure(seen_flight(known, 0.6).flight).start == 0
+    assert sure(find_seen_flight(known, 0.6).flight).start == 0
 
 
 def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None:

@@ -13,9 +13,9 @@ from d2rpick.choice.answers import suggest, verify_at
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.flight.flight import seen_flight
-from d2rpick.flight.internal_energy import quiet_time
-from d2rpick.histories.digits import window_as_read
+from d2rpick.flight.flight import find_seen_flight
+from d2rpick.flight.internal_energy import find_quiet_time
+from d2rpick.histories.digits import format_window
 from d2rpick.histories.history import Balance, Given, History, Momenta
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
@@ -100,7 +100,7 @@ def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
     flight = json.loads(result.stdout)["flight"]
-    assert window_as_read(flight["start"], flight["end"]) in result.stderr
+    assert format_window(flight["start"], flight["end"]) in result.stderr
 
 
 @pytest.mark.slow
@@ -164,7 +164,7 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
     assert (flight.start, flight.end) == pytest.approx(
         (rolled.start, rolled.end), abs=MILLISECOND
     )
-    assert seen_flight(history, rolled.end + 0.02).refusal
+    assert find_seen_flight(history, rolled.end + 0.02).refusal
 
 
 def test_the_energy_balance_tells_the_flight_where_there_is_neither(
@@ -188,7 +188,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
     # damping bends the parabola of the work of gravity: less than the flight is found then, never more
     start, end = sure(flight.start), sure(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
-    assert seen_flight(history, rolled.end + 0.02).refusal
+    assert find_seen_flight(history, rolled.end + 0.02).refusal
 
 
 def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
@@ -271,7 +271,7 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     source: str, energy: str, start: float, end: float, share: float
 ) -> None:
     time, values = columns(source, energy)
-    quiet = quiet_time(table(time, values), start + share * (end - start))
+    quiet = find_quiet_time(table(time, values), start + share * (end - start))
     assert quiet is None or quiet.start >= start
 
 
@@ -283,7 +283,7 @@ def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(
     whole = history_of(DROP, part)
     history = table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
-        quiet = quiet_time(history, start + share * (end - start))
+        quiet = find_quiet_time(history, start + share * (end - start))
         assert quiet is None or quiet.start >= start
 
 
@@ -294,7 +294,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
         -(((time - 0.8) / 0.01) ** 2)
     )  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = sure(quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
+    quiet = sure(find_quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
     assert quiet.start > 0.81
 
 
@@ -404,9 +404,9 @@ def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes
 
     history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
-    seen = [seen_flight(history, td) for td in times]
-    assert seen == [seen_flight(fresh(), td) for td in times]
+    seen = [find_seen_flight(history, td) for td in times]
+    assert seen == [find_seen_flight(fresh(), td) for td in times]
     assert len({one.flight and one.flight[:2] for one in seen}) == 1
     after = rolled.end + 0.02
-    assert seen_flight(history, after) == seen_flight(fresh(), after)
-    assert seen_flight(history, after).refusal
+    assert find_seen_flight(history, after) == find_seen_flight(fresh(), after)
+    assert find_seen_flight(history, after).refusal

@@ -12,10 +12,10 @@ from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.internal_energy import end_of_load
+from d2rpick.flight.internal_energy import find_end_of_load
 from d2rpick.histories.history import History
 from d2rpick.vibration.oscillator import to_mode
-from d2rpick.vibration.span import Span, described_span
+from d2rpick.vibration.span import Span, find_described_span
 from tests import paper
 from tests.computed import columns, stored
 from tests.energies import sure
@@ -110,7 +110,7 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> (
     None
 ):
-    span, fit = described_span(paper.history(), paper.TD, Span(0.0, 0.15))
+    span, fit = find_described_span(paper.history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
     assert examine(paper.history(), paper.TD, Settings()).flight == Flight(
         0.0, None, "oscillator", described=True
@@ -133,7 +133,7 @@ def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) ->
 
 def test_an_energy_that_never_was_above_its_band_shows_no_end_of_a_load() -> None:
     time = np.linspace(0, 1, 101)
-    assert end_of_load(table(time, time**2), 0.8) is None
+    assert find_end_of_load(table(time, time**2), 0.8) is None
 
 
 def test_a_start_that_is_given_replaces_the_start_only() -> None:
@@ -235,8 +235,8 @@ def test_a_rising_energy_shows_no_end_of_a_load() -> None:
         + np.where(time > 0.9, time - 0.9, 0) * 9
     )
     fed = table(time, energy)
-    assert end_of_load(fed, 0.96) is None
-    assert end_of_load(fed, 0.85) == pytest.approx(0.13, abs=0.05)
+    assert find_end_of_load(fed, 0.96) is None
+    assert find_end_of_load(fed, 0.85) == pytest.approx(0.13, abs=0.05)
 
 
 @pytest.mark.slow

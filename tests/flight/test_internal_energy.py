@@ -13,11 +13,11 @@ from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import (
-    moves_as_a_whole,
+    find_settled_time,
+    has_whole_motion,
     rises_as_it_yields,
-    settled_from,
 )
-from d2rpick.flight.momentum import bodies_apart, flight_around
+from d2rpick.flight.momentum import find_bodies_apart, find_flight_around
 from d2rpick.histories.history import (
     EXACT,
     Balance,
@@ -27,7 +27,7 @@ from d2rpick.histories.history import (
     Samples,
 )
 from d2rpick.histories.names import Part
-from d2rpick.histories.samples import integral
+from d2rpick.histories.samples import integrate_by_trapezia
 from tests.benchmarks import falls, flights as campaign
 from tests.energies import sure
 from tests.records import printed, table
@@ -91,7 +91,7 @@ def test_the_flight_behind_a_load_that_fades_is_found(
     impulse = np.concatenate(
         [[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)]
     )
-    found = sure(flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
+    found = sure(find_flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
     start = int(np.searchsorted(TIME, found.start))
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
     assert found.start < 0.6
@@ -113,12 +113,12 @@ def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_al
     along = np.array(direction) / np.linalg.norm(direction)
     values = (20.0 * acceleration * (1 - 0.5 * TIME))[:, np.newaxis, np.newaxis] * along
     one = Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
-    found = flight_around(one, 0.5)
+    found = find_flight_around(one, 0.5)
     assert (found is not None) is flies
     falling = replace(
         one, values=one.values - values[-1] * 1.5
     )  # it stands, and goes back
-    assert flight_around(falling, 0.5) is not None
+    assert find_flight_around(falling, 0.5) is not None
 
 
 def impulse_of(force: Samples) -> Samples:
@@ -140,7 +140,9 @@ def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
 ) -> None:
     impulse = impulse_of(5e3 * (1 + TIME / 0.1) ** -3.1)
     found = sure(
-        flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95)
+        find_flight_around(
+            aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95
+        )
     )
     assert found.gravity == pytest.approx(gravity, rel=1e-3)
     left = impulse[-1] - impulse[int(np.searchsorted(TIME, found.start))]
@@ -150,9 +152,11 @@ def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
 def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
     push = 3e2 * np.sin(np.pi * np.minimum(TIME / 0.6, 1))
     body = aslant(0.8 * impulse_of(push), 0.6 * impulse_of(push) - 98.1 * TIME)
-    found = sure(flight_around(body, 0.9))
+    found = sure(find_flight_around(body, 0.9))
     assert found.start == pytest.approx(0.6, abs=0.02)
-    assert not [td for td in np.linspace(0.02, 0.58, 29) if flight_around(body, td)]
+    assert not [
+        td for td in np.linspace(0.02, 0.58, 29) if find_flight_around(body, td)
+    ]
 
 
 @pytest.mark.parametrize("left", [0.005, 0.0])
@@ -164,7 +168,7 @@ def test_what_hardly_moves_flies_if_it_goes_on_as_it_does(left: float) -> None:
             500 * left,
         )
     )
-    assert bool(flight_around(thrown, 0.7)) is (left > 0)
+    assert bool(find_flight_around(thrown, 0.7)) is (left > 0)
 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])
@@ -177,10 +181,12 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(
         / 1000
     )
     assert (
-        flight_around(momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6)
+        find_flight_around(
+            momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6
+        )
         is None
     )
-    assert flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
+    assert find_flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
 
 
 @pytest.mark.parametrize(
@@ -234,8 +240,8 @@ def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     falling = np.where(TIME < 0.1, -2e3 * TIME, -200 - 40 * 9.81 * (TIME - 0.1))
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
     both = momenta(carried, falling, masses=(10.0, 40.0))
-    assert flight_around(both.choosing((0,)), 0.6) is None
-    found = sure(flight_around(both.choosing((1,)), 0.6))
+    assert find_flight_around(both.choosing((0,)), 0.6) is None
+    found = sure(find_flight_around(both.choosing((1,)), 0.6))
     assert found.gravity == pytest.approx(9.81, rel=1e-3)
 
 
@@ -243,24 +249,24 @@ def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
 def test_a_few_states_show_no_bodies_apart(states: int) -> None:
     whole = momenta(50 + 0 * TIME, -10 + 0 * TIME, axis=0)
     few = replace(whole, time=whole.time[:states], values=whole.values[:states])
-    assert bodies_apart(few, (0, 1)) == ()
-    assert flight_around(few, float(few.time[0])) is None
+    assert find_bodies_apart(few, (0, 1)) == ()
+    assert find_flight_around(few, float(few.time[0])) is None
 
 
 def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
     hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
     body = momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
-    assert bodies_apart(body, (0, 1)) == (0, 1)
-    found = sure(flight_around(body, 0.7))
+    assert find_bodies_apart(body, (0, 1)) == (0, 1)
+    found = sure(find_flight_around(body, 0.7))
     assert found.start == pytest.approx(0.4, abs=0.01)
-    assert flight_around(body, 0.35) is None
+    assert find_flight_around(body, 0.35) is None
 
 
 def test_a_motion_that_has_ended_is_no_flight() -> None:
     stopped = np.where(
         TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0
     )  # a motion that is prescribed, then none
-    assert flight_around(momenta(stopped), 0.8) is None
+    assert find_flight_around(momenta(stopped), 0.8) is None
 
 
 def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> (
@@ -283,7 +289,7 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
     internal = 100 * np.sin(60 * TIME) ** 2
     history = totals(internal, 100 - internal + kept - 10 * np.maximum(0.05 - TIME, 0))
     balance = sure(history.balance)
-    assert moves_as_a_whole(balance, 0.1, 1.0) is (kept > 0)
+    assert has_whole_motion(balance, 0.1, 1.0) is (kept > 0)
     assert bool(flights_of(history, PLAIN)) is (kept > 0)
 
 
@@ -291,15 +297,23 @@ def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by
     None
 ):
     ringing = np.sin(200 * TIME) ** 2
-    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) == 0.0
+    assert (
+        find_settled_time(TIME, 5 + ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) == 0.0
+    )
     lost = np.exp(-4 * TIME)
     assert (
-        settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0)
+        find_settled_time(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0)
         == 0.0
     )
-    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
-    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
-    late = settled_from(
+    assert (
+        find_settled_time(TIME, 5 + 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0)
+        is None
+    )
+    assert (
+        find_settled_time(TIME, 5 - 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0)
+        is None
+    )
+    late = find_settled_time(
         TIME,
         np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing,
         50 + 0 * TIME[np.newaxis],
@@ -313,9 +327,11 @@ def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_do
     None
 ):
     whole = 50 + 0 * TIME[np.newaxis]
-    assert settled_from(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
+    assert find_settled_time(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
     assert (
-        settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0)
+        find_settled_time(
+            TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0
+        )
         is None
     )
 
@@ -384,7 +400,7 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
         60 * np.exp(-2 * alpha * TIME)
         + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
     )
-    whole = 80 - 2 * alpha * integral(TIME, kinetic)
+    whole = 80 - 2 * alpha * integrate_by_trapezia(TIME, kinetic)
     record = totals(whole - kinetic, kinetic)
     assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
     flight = suggest(

@@ -16,13 +16,13 @@ from d2rpick.base.errors import FormatError
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.question import Settings
 from d2rpick.flight.momentum import (
-    _polished,
-    all_flights,
-    deformable_parts,
-    flight_around,
-    flight_of,
-    flying_parts,
-    with_parts_by_number,
+    _refine_attached_parts,
+    find_all_flights,
+    find_flight_around,
+    find_flight_of,
+    find_flying_parts,
+    list_deformable_parts,
+    replace_words_by_part_ids,
 )
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
@@ -198,7 +198,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     momenta = flown(
         trip(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
     )  # fmt: skip
-    found = sure(flight_around(momenta, td))
+    found = sure(find_flight_around(momenta, td))
     assert found.parts == PARTS[:2]
     # In these times the forces change the momentum by two thousandths of its range.
     load, contact = 5e-3 * start, 5e-4
@@ -218,8 +218,8 @@ def test_a_part_alone_does_not_fly_while_another_is_attached(
     td: float, frequency: float, share: float, digits: int
 ) -> None:
     momenta = flown(trip(), frequency=frequency, share=share, digits=digits, alpha=1.0)
-    assert flight_of(momenta, (0,), td) is None
-    assert flight_around(alone(momenta), td) is None
+    assert find_flight_of(momenta, (0,), td) is None
+    assert find_flight_around(alone(momenta), td) is None
 
 
 @pytest.mark.slow
@@ -227,7 +227,7 @@ def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight(
     None
 ):
     tried = [
-        flight_around(smooth(seed, waves, digits), td)
+        find_flight_around(smooth(seed, waves, digits), td)
         for waves in (1, 2, 3, 5, 10)
         for seed in range(4)
         for digits in (5, 17)
@@ -241,16 +241,16 @@ def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(
     sled: float,
 ) -> None:
     momenta = flown(trip(), sled=sled)
-    assert flight_around(momenta, TD) == flight_around(flown(trip()), TD)
+    assert find_flight_around(momenta, TD) == find_flight_around(flown(trip()), TD)
 
 
 def test_the_set_that_flies_together_can_be_named() -> None:
     named = replace(flown(trip(), sled=1e3), flying=(0, 1))
-    found = sure(flight_around(named, TD))
+    found = sure(find_flight_around(named, TD))
     assert found.parts == PARTS[:2]
-    assert flight_around(replace(named, flying=(0,)), TD) is None
+    assert find_flight_around(replace(named, flying=(0,)), TD) is None
     assert (
-        flight_around(replace(named, flying=(0, 1, 2)), TD) is None
+        find_flight_around(replace(named, flying=(0, 1, 2)), TD) is None
     )  # what stands does not fall with the others
 
 
@@ -264,7 +264,7 @@ def test_attached_parts_are_found_among_many() -> None:
     parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
     found = sure(
-        flight_around(
+        find_flight_around(
             Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD
         )
     )
@@ -280,14 +280,14 @@ def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
             [0.0],
         ]
         rests[2] = -rests[1]
-        assert 0 not in _polished(rests, {0}, [0], [0, 1, 2])
+        assert 0 not in _refine_attached_parts(rests, {0}, [0], [0, 1, 2])
 
 
 def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> None:
     momenta = flown(
         [*pulse(0.0, 0.06, -4e3), *pulse(0.18, 0.20, 9e4), *pulse(0.30, 0.33, 4e4)]
     )
-    flights = all_flights(momenta)
+    flights = find_all_flights(momenta)
     expected = [(0.06, 0.18), (0.20, 0.30), (0.33, END)]
     np.testing.assert_allclose(
         [(f.start, f.end) for f in flights], expected, atol=1.5e-3
@@ -295,7 +295,7 @@ def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> Non
     assert [f.end_seen for f in flights] == [True, True, False]
     assert all(one.end <= next_one.start for one, next_one in pairwise(flights))
     for flight in flights:
-        around = sure(flight_around(momenta, (flight.start + flight.end) / 2))
+        around = sure(find_flight_around(momenta, (flight.start + flight.end) / 2))
         assert (around.start, around.end) == pytest.approx(
             (flight.start, flight.end), abs=1e-3
         )
@@ -318,13 +318,15 @@ BEFORE_AND_AFTER = flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)])
 def test_there_is_no_flight_around_a_td_under_force_outside_the_record_or_at_rest(
     momenta: Momenta, td: float
 ) -> None:
-    assert flight_around(momenta, td) is None
+    assert find_flight_around(momenta, td) is None
 
 
 @pytest.mark.parametrize("digits", [5, 17])
 def test_a_momentum_that_never_changes_tells_of_flight_throughout(digits: int) -> None:
     free = flown([Piece(0.0, (0, 0, 0))], gravity=0.0, digits=digits)
-    assert flight_around(free, TD) == FreeFlight(0.0, END, PARTS[:2], end_seen=False)
+    assert find_flight_around(free, TD) == FreeFlight(
+        0.0, END, PARTS[:2], end_seen=False
+    )
 
 
 def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
@@ -341,8 +343,8 @@ def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
         Precision(5),
         (0,),
     )
-    assert flight_around(momenta, TD) is None
-    assert flight_around(replace(momenta, values=momenta.values + 5.0), TD)
+    assert find_flight_around(momenta, TD) is None
+    assert find_flight_around(replace(momenta, values=momenta.values + 5.0), TD)
 
 
 def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
@@ -353,7 +355,7 @@ def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
         np.array([*MASSES, 1e8]),
     )
     heavy = replace(light, values=values, parts=PARTS, flying=(0, 1, 2), masses=masses)
-    assert flight_around(heavy, TD) is None
+    assert find_flight_around(heavy, TD) is None
 
 
 def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() -> None:
@@ -362,8 +364,8 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
         Piece(0.08, (0, 0, 0)),
         Piece(0.33, (2e3, 0, 0)),
     ]
-    assert flight_around(flown(pieces, gravity=0.0, digits=17), TD)
-    assert flight_around(flown(pieces, gravity=0.0, digits=4), TD) is None
+    assert find_flight_around(flown(pieces, gravity=0.0, digits=17), TD)
+    assert find_flight_around(flown(pieces, gravity=0.0, digits=4), TD) is None
 
 
 # Runs that a solver computed.
@@ -372,7 +374,7 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
 def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
     run = read([BOX]).run
     (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
-    assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [
+    assert [find_flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [
         None
     ] * 15
 
@@ -398,7 +400,7 @@ def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
     found = sure(
-        flight_around(
+        find_flight_around(
             Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1
         )
     )
@@ -409,7 +411,9 @@ def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
 def titles(found: Run, *, flying: bool) -> set[str]:
     return {
         part.title
-        for part in (flying_parts(found) if flying else deformable_parts(found))
+        for part in (
+            find_flying_parts(found) if flying else list_deformable_parts(found)
+        )
     }
 
 
@@ -435,7 +439,7 @@ def test_all_parts_of_the_car_fly_but_the_ground() -> None:
 
 
 def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
-    selection = with_parts_by_number(
+    selection = replace_words_by_part_ids(
         read([BOX]).run, Selection(parts=("box", "FLYING"))
     )
     assert selection.parts == ("box", "1", "2")
@@ -450,7 +454,7 @@ def test_files_without_parts_say_so(word: str) -> None:
 def test_a_table_has_no_parts_that_could_fly() -> None:
     table = pd.DataFrame({"time": [0.0, 1.0, 2.0], "internal_energy": [0.0, 4.0, 1.0]})
     with pytest.raises(FormatError, match="no parts"):
-        flying_parts(d2.from_frame(table).files)
+        find_flying_parts(d2.from_frame(table).files)
 
 
 @pytest.mark.usefixtures("by_level")
@@ -504,7 +508,7 @@ def test_the_body_that_matters_is_named_where_loose_wheels_fly_longer(
     made = car_on_a_curb()
     assert [
         part.id
-        for part in flying_parts(open_run([as_t01(made, tmp_path)], Selection()))
+        for part in find_flying_parts(open_run([as_t01(made, tmp_path)], Selection()))
     ] == [1, 2, 3, 4]
 
 
@@ -524,7 +528,7 @@ def test_the_momentum_of_body_and_wheels_together_shows_no_flight_while_wheels_a
     for car, flies in ((made, False), (body, True)):
         reference = read([write(car, tmp_path, kinetic=kinetic)])
         (momenta,) = reference.history.momenta
-        flight = flight_around(momenta, 0.65, reference.history.balance)
+        flight = find_flight_around(momenta, 0.65, reference.history.balance)
         if flies:
             assert flight
         else:  # without mass and kinetic energy gravity is not known from a push

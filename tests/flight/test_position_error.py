@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.flight.chosen import find_flight
-from d2rpick.flight.flight import Flight, seen_flight
+from d2rpick.flight.flight import Flight, find_seen_flight
 from d2rpick.flight.position_error import (
     MOST_OF_PATH,
     Bodies,
     Drift,
     RigidBody,
-    bodies_in_flight,
-    drift_in_flight,
-    drift_of,
+    find_bodies_in_flight,
+    find_drift,
+    find_drift_in_flight,
 )
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, History, Momenta, Samples
@@ -78,7 +78,7 @@ def sliding(way: Samples, part: int = ENGINE) -> Samples:
 
 
 def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
-    return sure(drift_of(Flying(found, masses, range(masses.size), *FLIGHT)))
+    return sure(find_drift(Flying(found, masses, range(masses.size), *FLIGHT)))
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 def test_beyond_the_flight_nothing_is_known() -> None:
     found = sure(
-        drift_of(
+        find_drift(
             Flying(
                 momenta(np.zeros(3), sliding(np.ones(3) / 100)),
                 MASSES,
@@ -165,7 +165,7 @@ def test_beyond_the_flight_nothing_is_known() -> None:
 def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
     known = np.where(np.isnan(masses), 1.0, masses)
     found = momenta(np.ones(3), sliding(np.ones(3) / 50), known)
-    assert drift_of(Flying(found, masses, members, *FLIGHT)) is None
+    assert find_drift(Flying(found, masses, members, *FLIGHT)) is None
 
 
 def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
@@ -173,7 +173,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
         300 * TIME[:, None, None] + PLACES
     )
     assert (
-        drift_of(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT))
+        find_drift(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT))
         is None
     )
 
@@ -208,7 +208,7 @@ def computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
     """By the momenta of a run that a solver computed."""
     history = solved(name, parts).history
     return sure(
-        drift_of(
+        find_drift(
             Flying(
                 history.momenta[0],
                 sure(history.masses),
@@ -296,17 +296,17 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
     None
 ):
     history = solved("carT01.gz", "1-17").history
-    flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
-    found = sure(drift_in_flight(history, flight))
+    flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    found = sure(find_drift_in_flight(history, flight))
     assert found.part.title == "engine"
     assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(
         2.2e-3, abs=1e-3
     )
-    assert drift_in_flight(history, flight, [found.part]) is None
-    assert drift_in_flight(history, flight._replace(parts=None)) is None
+    assert find_drift_in_flight(history, flight, [found.part]) is None
+    assert find_drift_in_flight(history, flight._replace(parts=None)) is None
     assert (
-        drift_in_flight(
-            history, find_flight(history, 0.2, seen_flight(history, 0.2), None)
+        find_drift_in_flight(
+            history, find_flight(history, 0.2, find_seen_flight(history, 0.2), None)
         )
         is None
     )
@@ -381,7 +381,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 @cache
 def car(parts: str) -> tuple[History, Flight]:
     history = solved("carT01.gz", parts).history
-    return history, find_flight(history, 0.14, seen_flight(history, 0.14), None)
+    return history, find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
@@ -389,8 +389,8 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
     with results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])
-    alone = bodies_in_flight(*car("12-14"), told((12,), (13,), (14,)))
-    together = bodies_in_flight(*car("12-14"), None)
+    alone = find_bodies_in_flight(*car("12-14"), told((12,), (13,), (14,)))
+    together = find_bodies_in_flight(*car("12-14"), None)
     assert alone.errors(tr, td)[0] == pytest.approx(
         1e-3 * float(run["dcentre_td_mm"]), abs=1e-3
     )
@@ -401,8 +401,8 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
 @pytest.mark.slow
 def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     frame = (*range(1, 12), 13)
-    found = bodies_in_flight(*car("1-14"), told(frame, (12,), (14,)))
-    alone = bodies_in_flight(*car("1-11,13"), told(frame))
+    found = find_bodies_in_flight(*car("1-14"), told(frame, (12,), (14,)))
+    alone = find_bodies_in_flight(*car("1-11,13"), told(frame))
     tr = np.array([0.04, 0.0496, 0.09])
     np.testing.assert_allclose(found.errors(tr, 0.1464), alone.errors(tr, 0.1464))
     worst = sure(found.worst(0.0496, 0.1464))
@@ -412,16 +412,20 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
 
 @pytest.mark.parametrize("body", [(1, 2), (99,), (1, 99)])
 def test_what_is_not_known_of_a_body_is_not_zero(body: tuple[int, ...]) -> None:
-    found = bodies_in_flight(*car("1-14"), told((12,), body))
+    found = find_bodies_in_flight(*car("1-14"), told((12,), body))
     assert found.unknown == told(body)
     assert np.isnan(found.errors(np.array([0.05]), 0.14)).all()
 
 
 def test_a_part_in_pieces_and_one_that_does_not_fly_are_not_known() -> None:
     history, flight = car("12-14")
-    assert bodies_in_flight(history, flight, [RigidBody((14,), whole=False)]).unknown
-    assert bodies_in_flight(
+    assert find_bodies_in_flight(
+        history, flight, [RigidBody((14,), whole=False)]
+    ).unknown
+    assert find_bodies_in_flight(
         history, flight._replace(refusal="no flight"), told((14,))
     ).unknown
     others = tuple(part for part in flight.parts or () if part.id != 14)
-    assert bodies_in_flight(history, flight._replace(parts=others), told((14,))).unknown
+    assert find_bodies_in_flight(
+        history, flight._replace(parts=others), told((14,))
+    ).unknown

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.deck import read_inventory
-from d2rpick.deck.geometry import Placed, Placement
+from d2rpick.deck.geometry import PartPosition, Placement
 from d2rpick.flight.chosen import find_flight
-from d2rpick.flight.flight import seen_flight
-from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
+from d2rpick.flight.flight import find_seen_flight
+from d2rpick.flight.position_error import Drift, find_drift, find_drift_in_flight
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
@@ -71,7 +71,9 @@ def placement(places: Samples = PLACES) -> Placement:
     return cast(
         "Placement",
         SimpleNamespace(
-            parts={i + 1: Placed(place, SPREAD, {}) for i, place in enumerate(places)},
+            parts={
+                i + 1: PartPosition(place, SPREAD, {}) for i, place in enumerate(places)
+            },
             watched_centre=lambda _parts: LOOKED_AT,
             hanging_together=lambda parts: frozenset(parts) - {ENGINE + 1},
         ),
@@ -86,7 +88,7 @@ def drift(
     momenta = Momenta(
         TIME, velocity * MASSES[:, np.newaxis], parts, EXACT, tuple(range(MASSES.size))
     )
-    return drift_of(Flying(momenta, MASSES, list(members), 0.01, 0.1, range(5)), deck)
+    return find_drift(Flying(momenta, MASSES, list(members), 0.01, 0.1, range(5)), deck)
 
 
 @pytest.mark.slow
@@ -235,5 +237,5 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
 @cache
 def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
     history = solved("carT01.gz", *parts).history
-    flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
-    return sure(drift_in_flight(history, flight, None, where))
+    flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    return sure(find_drift_in_flight(history, flight, None, where))

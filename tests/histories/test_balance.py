@@ -7,7 +7,7 @@ import pytest
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
-from d2rpick.histories.balance import spring_energy, springs_among
+from d2rpick.histories.balance import find_spring_energy, find_springs
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
@@ -38,7 +38,7 @@ class Made:
 
 
 def find_spring_ids(database: Made, energies: Samples = ENERGIES) -> tuple[int, ...]:
-    return tuple(part.id for part in springs_among([database], PARTS, energies, TIME))  # type: ignore[list-item]
+    return tuple(part.id for part in find_springs([database], PARTS, energies, TIME))  # type: ignore[list-item]
 
 
 def test_the_parts_that_add_up_to_the_energy_of_the_springs_are_springs() -> None:
@@ -70,7 +70,7 @@ def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
 
 
 def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
-    assert spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
+    assert find_spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
 
 
 CAR = stored("carT01.gz")

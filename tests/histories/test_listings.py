@@ -6,10 +6,10 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.listings import (
-    printed_steps,
+    find_printed_steps,
+    find_wrong_energies,
     read_timing,
     read_zone_times,
-    wrong_energies,
 )
 from d2rpick.histories.opening import open_run
 from tests.command import GLSTAT, put
@@ -42,7 +42,7 @@ def find_wrong_listings(
     folder: Path, text: str, leg: int = 2, history: str = ""
 ) -> list[str]:
     (folder / f"CAR_{leg:04d}.out").write_text(text)
-    return list(wrong_energies([str(folder / (history or f"CART{leg:02d}"))]))
+    return list(find_wrong_energies([str(folder / (history or f"CART{leg:02d}"))]))
 
 
 BEFORE, FIX, AFTER = (
@@ -167,7 +167,7 @@ def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothi
 
 def test_smallest_steps_of_a_d3hsp_are_found_beside_the_deck(tmp_path: Path) -> None:
     (tmp_path / "d3hsp").write_text(D3HSP)
-    steps = printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))
+    steps = find_printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))
     assert (steps[7], steps[101]) == ((5e-5, "d3hsp"), (8e-5, "d3hsp"))
 
 
@@ -175,7 +175,7 @@ def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) ->
     (tmp_path / "glstat").write_bytes(
         glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"0.00000E+00", b"2.50000E-06")
     )
-    assert printed_steps(open_run([str(tmp_path / "glstat")])) == {
+    assert find_printed_steps(open_run([str(tmp_path / "glstat")])) == {
         10: (2.5e-6, "glstat")
     }
 

@@ -21,7 +21,13 @@ from d2rpick.histories.formats import (
     radioss_th,
 )
 from d2rpick.histories.history import Samples
-from d2rpick.histories.opening import Run, Selection, check_companions, open_run, reader
+from d2rpick.histories.opening import (
+    Run,
+    Selection,
+    check_companions,
+    load_reader,
+    open_run,
+)
 from d2rpick.histories.source import Source
 from tests.command import put
 from tests.computed import stored
@@ -48,7 +54,7 @@ def open_companions(
         if any(name.startswith(kind) for name in files)
     }
     databases = tuple(
-        Legs(reader(kind).open_legs(sources, selection or Selection()))
+        Legs(load_reader(kind).open_legs(sources, selection or Selection()))
         for kind, sources in legs.items()
     )
     check_companions(databases)

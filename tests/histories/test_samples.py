@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.histories.samples import (
+    draw_outline,
     find_crossings,
+    find_first_above,
     find_turns,
-    first_above,
-    narrow,
-    outline,
+    narrow_brackets,
 )
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
@@ -133,7 +133,7 @@ def test_an_outline_keeps_ends_and_extremes_and_stays_small(
     states: int, seed: int, stretches: int
 ) -> None:
     energy = np.random.default_rng(seed).standard_normal(states)
-    time, drawn = outline(np.arange(states, dtype=float), energy, stretches)
+    time, drawn = draw_outline(np.arange(states, dtype=float), energy, stretches)
     assert time.size <= min(states, 2 * stretches + 2)
     assert (drawn.min(), drawn.max()) == (energy.min(), energy.max())
     assert (time[0], time[-1]) == (0, states - 1)
@@ -144,7 +144,7 @@ def test_an_outline_keeps_ends_and_extremes_and_stays_small(
 @given(st.integers(10, 3000), st.integers(0, 100))
 def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
     energy = np.random.default_rng(seed).standard_normal(states)
-    time, _ = outline(np.arange(states, dtype=float), energy, 4)
+    time, _ = draw_outline(np.arange(states, dtype=float), energy, 4)
     for piece in np.array_split(np.arange(states), 4):
         assert {
             piece[0] + energy[piece].argmin(),
@@ -158,7 +158,7 @@ ROOTS = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=8).map(np.array)
 @pytest.mark.parametrize("with_slope", [False, True])
 @given(ROOTS)
 def test_every_bracket_narrows_on_its_root(with_slope: bool, roots: np.ndarray) -> None:
-    narrowed = narrow(
+    narrowed = narrow_brackets(
         lambda t: roots**3 - t**3, np.zeros(roots.size), np.ones(roots.size),
         slope=(lambda t: -3 * t**2) if with_slope else None, steps=64,
     )  # fmt: skip
@@ -169,8 +169,12 @@ def test_every_bracket_narrows_on_its_root(with_slope: bool, roots: np.ndarray) 
 
 @given(ROOTS)
 def test_what_is_within_stays_within_either_way_round(roots: np.ndarray) -> None:
-    upwards = narrow(lambda t: t < roots, np.zeros(roots.size), np.ones(roots.size))
-    downwards = narrow(lambda t: t >= roots, np.ones(roots.size), np.zeros(roots.size))
+    upwards = narrow_brackets(
+        lambda t: t < roots, np.zeros(roots.size), np.ones(roots.size)
+    )
+    downwards = narrow_brackets(
+        lambda t: t >= roots, np.ones(roots.size), np.zeros(roots.size)
+    )
     assert np.all(upwards.within < roots)
     assert np.all(downwards.within >= roots)
     np.testing.assert_allclose(upwards.within, downwards.within, atol=1e-12)
@@ -185,7 +189,9 @@ def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(
         return [
             *map(
                 float,
-                narrow(lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2).at,
+                narrow_brackets(
+                    lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2
+                ).at,
             )
         ]
 
@@ -201,7 +207,9 @@ def test_the_first_value_above_a_limit_is_the_one_that_a_walk_meets(
 ) -> None:
     start, limit = (np.array(column) for column in zip(*asked, strict=True))
     start = np.minimum(start, len(values))
-    indices = first_above(np.array(values, dtype=float), start, limit.astype(float))
+    indices = find_first_above(
+        np.array(values, dtype=float), start, limit.astype(float)
+    )
     for at, above, index in zip(
         start.tolist(), limit.tolist(), indices.tolist(), strict=True
     ):

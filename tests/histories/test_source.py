@@ -16,7 +16,7 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.histories.source import expand, later_legs, open_files
+from d2rpick.histories.source import expand, find_later_legs, open_files
 from tests.command import refused
 from tests.computed import stored
 from tests.hdf5_files import plain, written
@@ -202,7 +202,7 @@ def test_legs_are_files_of_the_same_name_with_a_higher_number(
 ) -> None:
     for name in (*(n for n in named if "/" not in n), *beside):
         (tmp_path / name).touch()
-    assert later_legs([str(tmp_path / name) for name in named]) == [
+    assert find_later_legs([str(tmp_path / name) for name in named]) == [
         str(tmp_path / name) for name in later
     ]
 

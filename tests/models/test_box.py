@@ -12,17 +12,17 @@ from d2rpick.models.box_model import (
     Bars,
     Parameters,
     Truss,
-    build,
-    stiffest_rate,
+    build_structure,
+    compute_stiffest_rate,
 )
 from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
 from d2rpick.models.box_run import (
     BOX,
     Record,
     RigidWindow,
-    compare,
-    comparison_end,
-    proceed,
+    compare_runs,
+    continue_motion,
+    find_comparison_end,
     run_to,
     scan,
     scan_times,
@@ -225,7 +225,7 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
     )
     rigid = switched.time > 0.14
     assert np.ptp(switched.internal_energy[rigid, BOX]) < 1e-9
-    structure = build(COARSE)
+    structure = build_structure(COARSE)
     of_box, of_step = structure.box.rest.size, structure.step.rest.size
     steps = whole.bar_updates / (of_box + of_step)
     assert switched.bar_updates == pytest.approx(
@@ -237,7 +237,7 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
 def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(
     angle: float, seed: int
 ) -> None:
-    structure = build(COARSE)
+    structure = build_structure(COARSE)
     shaken = structure.places + 1e-4 * np.random.default_rng(seed).normal(
         size=structure.places.size
     )
@@ -254,7 +254,7 @@ def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(
 
 
 def test_forces_are_the_slope_of_the_elastic_energy() -> None:
-    structure = build(Parameters(mesh=4, yield_strain=1.0))
+    structure = build_structure(Parameters(mesh=4, yield_strain=1.0))
     bars = Bars(structure.box, structure.places.size)
     points = structure.places + 1e-3 * np.random.default_rng(1).normal(
         size=structure.places.size
@@ -289,7 +289,7 @@ def test_a_bar_yields_at_its_strength_and_keeps_the_plastic_work() -> None:
 
 @pytest.mark.parametrize("mesh", [4, 7])
 def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
-    structure = build(Parameters(mesh=mesh))
+    structure = build_structure(Parameters(mesh=mesh))
     count = structure.places.size
     stiffness = np.zeros((2 * count, 2 * count))
     for truss in (structure.box, structure.step):
@@ -306,7 +306,7 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
     fastest = np.sqrt(
         np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(masses, masses)))[-1]
     )
-    bound = stiffest_rate(
+    bound = compute_stiffest_rate(
         structure.masses, structure.box, structure.step, extra=np.zeros(count)
     )
     assert fastest <= bound <= 2 * fastest
@@ -328,7 +328,7 @@ def test_a_body_without_forces_moves_and_turns_evenly() -> None:
 
 def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() -> None:
     p = Parameters(tilt=0.0, mesh=4)
-    structure = build(p)
+    structure = build_structure(p)
     for depth, level in ((0.001, 0.0), (0.002, -p.ground - 5.0)):
         contact = Contact(
             structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0)
@@ -351,7 +351,7 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
 
 def test_the_cushion_is_crushed_for_good_at_its_force_until_it_is_solid() -> None:
     p = Parameters(tilt=0.0, mesh=4, friction=0.0)
-    structure = build(p)
+    structure = build_structure(p)
     contact = Contact(structure, p)
     undeformed = structure.places + p.speed * p.braking / 2 + 0.01j
 
@@ -381,7 +381,7 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference, times, td = simulate_box(COARSE), [0.02, 0.15], 0.36
     alone = [
-        compare(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
+        compare_runs(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
         for tr in times
     ]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
@@ -392,7 +392,10 @@ def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> 
 def test_a_run_goes_on_from_a_copy_as_it_would_have() -> None:
     motion = copy_at(0.08)
     twin = motion.copy()
-    assert proceed(twin, 0.12).roll.tolist() == proceed(motion, 0.12).roll.tolist()
+    assert (
+        continue_motion(twin, 0.12).roll.tolist()
+        == continue_motion(motion, 0.12).roll.tolist()
+    )
 
 
 def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
@@ -423,7 +426,10 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
             ),
             "begins before the one up to",
         ),
-        (lambda: comparison_end(simulate(COARSE, 0.05), 0.06), "end of the flight"),
+        (
+            lambda: find_comparison_end(simulate(COARSE, 0.05), 0.06),
+            "end of the flight",
+        ),
     ):
         with pytest.raises(RangeError, match=why):
             refused()

@@ -7,7 +7,7 @@ import pytest
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
-from d2rpick.models.box_run import history_of
+from d2rpick.models.box_run import make_history
 from tests.energies import sure
 from tests.faults import some
 from tests.rehearsals import SETS, rehearse
@@ -27,7 +27,7 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     assert rehearsal.roll_share < 0.1
     assert abs(rehearsal.energy_off) < 0.25
     pair = sure(
-        suggest(history_of(rehearsal.reference), rehearsal.td, Settings()).recommended
+        suggest(make_history(rehearsal.reference), rehearsal.td, Settings()).recommended
     )
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
     released = sure(rehearsal.reference.released)

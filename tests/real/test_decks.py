@@ -93,7 +93,7 @@ def test_swapped_codes_are_named() -> None:
         for finding in check("koo_pair_code42_wrong.k").findings
         if finding.rule == "D2R005"
     )
-    assert "seem to be swapped" in finding.message
+    assert "exchange the CODEs" in finding.message
     assert finding.severity == "error"
 
 
@@ -151,7 +151,7 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
         )
         if reading and line[:1] not in "*$" and line.strip():
             plain[int(line[8:16])] += 1
-    found = ls_dyna_inventory.read(read_deck(real("decks/nodes.k")))
+    found = ls_dyna_inventory.read_ls_dyna_inventory(read_deck(real("decks/nodes.k")))
     assert {part: counts.total() for part, counts in found.counts.items()} == plain
 
 

@@ -29,7 +29,7 @@ LISTING = "this is a listing of LS-DYNA"
 REFUSED = {
     "lasso-python__sph_models-R12_2_1-d3hsp": LISTING,
     "lasso-python__sph_models-R7_1_2-d3hsp": LISTING,
-    "qd-cae-python__test-binout": "no glstat or matsum in it, but swforc; name the binout of the run that holds it",
+    "qd-cae-python__test-binout": "no glstat or matsum in it, but swforc; name the binout of the run that contains it",
 }
 
 

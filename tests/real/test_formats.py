@@ -11,7 +11,7 @@ import pytest
 
 from d2rpick.histories.formats import matsum
 from d2rpick.histories.formats.radioss_th import TimeHistory
-from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times
+from d2rpick.histories.listings import find_printed_steps, read_timing, read_zone_times
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import GLSTAT
 from tests.histories.formats.test_glstat import assert_numbers_of_float
@@ -215,7 +215,7 @@ def test_smallest_steps_of_a_real_d3hsp_are_found_beside_the_history(
 ) -> None:
     (tmp_path / "d3hsp").write_bytes(content(name))
     expected = 5.4722e-5 if "R12" in name else 6.0802e-5
-    assert printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))[101] == (
+    assert find_printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))[101] == (
         expected,
         "d3hsp",
     )
@@ -223,7 +223,7 @@ def test_smallest_steps_of_a_real_d3hsp_are_found_beside_the_history(
 
 def test_the_part_that_controls_the_step_is_found_in_a_real_glstat() -> None:
     run = open_run([real("histories/PILLARS-LSDyna__Bolt_B_Explicit-glstat")])
-    steps = printed_steps(run)
+    steps = find_printed_steps(run)
     assert {part: source for part, (_, source) in steps.items()} == {10: "glstat"}
     assert steps[10][0] == pytest.approx(1.97875e-4)
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.suggest_td import STEPS
-from d2rpick.histories.digits import window_as_read
+from d2rpick.histories.digits import format_window
 from d2rpick.report.page import resource
 from d2rpick.report.tables import measure, short
 from tests.command import ENERGY, ROLLOVER, run
@@ -448,7 +448,7 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
         browser.find(".handle").send_keys(Keys.ARROW_LEFT)
         found = suggested(browser.value("command"))
         (kept,) = (one for one in found["acceptable_windows"] if one["recommended"])
-        assert window_as_read(kept["start"], kept["end"]) in browser.value("windows")
+        assert format_window(kept["start"], kept["end"]) in browser.value("windows")
         share = [f"{found[end]:.0%}" for end in ("mean_energy_low", "mean_energy_high")]
         assert browser.value("after").startswith(
             f"{share[0]} to {share[1]} of what the reference has"

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from d2rpick.report import findings as report, formats
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, automatic
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
 from tests.deck.test_radioss_run import write_run
 from tests.decks import write
 from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
@@ -19,8 +19,8 @@ from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
 BAD = (
     HEAD
     + PARTS
-    + automatic(1, "0.02", rigid=["1", "2"])
-    + automatic(2, "0.5", deformable=["1"])
+    + write_automatic_card(1, "0.02", rigid=["1", "2"])
+    + write_automatic_card(2, "0.5", deformable=["1"])
     + END
 )
 

@@ -8,7 +8,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.rules import RULES
-from d2rpick.rules.rule import engine_files, starter_deck
+from d2rpick.rules.rule import write_engine_files, write_starter_deck
 from tests.command import answer, put, run
 from tests.decks import wide, write
 from tests.histories.test_contact_forces import TIMES, t01
@@ -87,9 +87,9 @@ def test_of_several_contacts_nobody_knows_which_one_pushes(
 def write_radioss_run(
     folder: Path, sensor: str, further_cards: str = "/RWALL/PLANE/3\nground\n"
 ) -> str:
-    for name, text in engine_files(("1.2", "")).items():
+    for name, text in write_engine_files(("1.2", "")).items():
         put(folder / name, text)
-    deck = starter_deck(more=sensor + further_cards).replace(
+    deck = write_starter_deck(more=sensor + further_cards).replace(
         wide(1808, 0)[:-1], wide(1808, 5)[:-1]
     )
     return str(put(folder / "box_0000.rad", deck))

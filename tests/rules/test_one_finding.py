@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.rules import RULES, Configuration, check_deck, find_rules
-from d2rpick.rules.rule import HEAD, PARTS, automatic
+from d2rpick.rules.rule import HEAD, PARTS, write_automatic_card
 from tests.command import answer, run
 from tests.decks import write
 
@@ -16,7 +16,9 @@ OSCILLATOR = (
 
 
 def write_timed_deck(folder: Path, tr: str, td: str, end: str = "       0.2") -> str:
-    cards = automatic(1, tr, rigid=["1"]) + automatic(2, td, deformable=["1"])
+    cards = write_automatic_card(1, tr, rigid=["1"]) + write_automatic_card(
+        2, td, deformable=["1"]
+    )
     return write(folder, HEAD.replace("       0.2", end) + PARTS + cards + "*END\n")
 
 

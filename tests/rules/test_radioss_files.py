@@ -4,19 +4,19 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.deck import main_decks
-from d2rpick.deck.radioss_bodies import bodies_for
+from d2rpick.deck import find_main_decks
+from d2rpick.deck.radioss_bodies import find_bodies
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import engine_files, starter_deck
+from d2rpick.rules.rule import write_engine_files, write_starter_deck
 from tests.command import put, run
 
-ENGINE = engine_files(("0.2", "OFF"))["box_0001.rad"]
+ENGINE = write_engine_files(("0.2", "OFF"))["box_0001.rad"]
 SENSED = "/RBODY/2\nbody\n      1809         7         0         0                   0         7\n"
 
 
 def write_run(folder: Path, starter: str = "", engine: str = ENGINE) -> str:
     put(folder / "box_0001.rad", engine)
-    return str(put(folder / "box_0000.rad", starter or starter_deck()))
+    return str(put(folder / "box_0000.rad", starter or write_starter_deck()))
 
 
 def list_rules(path: str) -> list[str]:
@@ -39,11 +39,13 @@ def test_a_last_line_that_can_lose_nothing_needs_no_line_end(
 ) -> None:
     path = write_run(tmp_path, engine=ENGINE + last)
     assert list_rules(path) == []
-    starter = starter_deck(
+    starter = write_starter_deck(
         more="/NODE\n"
         + "".join(f"{node:10d}{node:20}{0:20}{0:20}\n" for node in (1, 2, 3, 4))
     )
-    assert bodies_for(write_run(tmp_path, starter, ENGINE + last), [1]).nodes == (1808,)
+    assert find_bodies(write_run(tmp_path, starter, ENGINE + last), [1]).nodes == (
+        1808,
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,8 +77,8 @@ def test_what_stands_behind_the_end_is_not_read(tmp_path: Path) -> None:
 def test_a_missing_include_is_an_error_whatever_the_legs_say(tmp_path: Path) -> None:
     path = write_run(
         tmp_path,
-        starter_deck(more="#include body.inc\n"),
-        engine_files(("0.2", ""))["box_0001.rad"],
+        write_starter_deck(more="#include body.inc\n"),
+        write_engine_files(("0.2", ""))["box_0001.rad"],
     )
     (finding,) = check_deck(path).findings
     assert (finding.rule, str(finding.severity)) == ("D2R003", "error")
@@ -87,26 +89,28 @@ def test_a_missing_include_is_an_error_whatever_the_legs_say(tmp_path: Path) -> 
 
 def test_no_switching_cards_is_not_said_above_windows(tmp_path: Path) -> None:
     sensor = "/SENSOR/TIME/7\ntime\n                0.02\n"
-    body = starter_deck(more=sensor).replace(f"{1808:10d}{0:10d}", f"{1808:10d}{7:10d}")
-    path = write_run(tmp_path, body, engine_files(("0.2", ""))["box_0001.rad"])
+    body = write_starter_deck(more=sensor).replace(
+        f"{1808:10d}{0:10d}", f"{1808:10d}{7:10d}"
+    )
+    path = write_run(tmp_path, body, write_engine_files(("0.2", ""))["box_0001.rad"])
     output = run("check", path).stdout
     assert "no switching cards" not in output
     assert "part 1: rigid from 0 to 0.02" in output
 
 
 def test_included_files_are_no_decks_of_their_own(tmp_path: Path) -> None:
-    path = write_run(tmp_path, starter_deck(more="#include body.inc\n"))
+    path = write_run(tmp_path, write_starter_deck(more="#include body.inc\n"))
     put(tmp_path / "body.inc", "/BEGIN\nbody\n      2022         0\n" + SENSED)
-    assert main_decks(str(tmp_path)) == [path]
+    assert find_main_decks(str(tmp_path)) == [path]
 
 
 def test_what_is_no_main_node_is_told_once(tmp_path: Path) -> None:
-    for name, text in engine_files(("0.02", "OFF"), ("0.2", "ON")).items():
+    for name, text in write_engine_files(("0.02", "OFF"), ("0.2", "ON")).items():
         put(
             tmp_path / name,
             text.replace("1808", "1808 1 2") if "0002" in name else text,
         )
-    path = str(put(tmp_path / "box_0000.rad", starter_deck()))
+    path = str(put(tmp_path / "box_0000.rad", write_starter_deck()))
     assert [rule for rule in list_rules(path) if rule.startswith("D2R4")] == [
         "D2R402",
         "D2R402",

@@ -14,11 +14,20 @@ from d2rpick.rules import (
     RULES,
     Configuration,
     check_deck,
-    configuration_for,
+    find_configuration,
     read_configuration,
 )
 from d2rpick.rules.base import Severity
-from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, Example, Rule, automatic
+from d2rpick.rules.rule import (
+    END,
+    GOOD,
+    HEAD,
+    PARTS,
+    THERE,
+    Example,
+    Rule,
+    write_automatic_card,
+)
 from tests.command import answer, run
 from tests.decks import found, write
 
@@ -83,8 +92,8 @@ def test_every_rule_has_examples_and_an_explanation() -> None:
 SWAPPED = (
     HEAD
     + PARTS
-    + automatic(1, "0.09", rigid=["1"])
-    + automatic(2, "0.02", deformable=["1"])
+    + write_automatic_card(1, "0.09", rigid=["1"])
+    + write_automatic_card(2, "0.02", deformable=["1"])
     + END
 )
 
@@ -139,7 +148,7 @@ def test_an_unknown_rule_is_an_error(
 
 
 def test_decks_are_judged_apart(tmp_path: Path) -> None:
-    cards = {"cards.k": automatic(1, "0.5", rigid=["1"])}
+    cards = {"cards.k": write_automatic_card(1, "0.5", rigid=["1"])}
     decks = []
     for name in "ab":
         (tmp_path / name).mkdir()
@@ -162,15 +171,19 @@ def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:
     deck = (
         HEAD
         + PARTS
-        + automatic(1, "0.02", rigid=["7", "8", "1"])
-        + automatic(1, "0.3", deformable=["1"])
+        + write_automatic_card(1, "0.02", rigid=["7", "8", "1"])
+        + write_automatic_card(1, "0.3", deformable=["1"])
         + END
     )
     assert found(tmp_path, deck) == {"D2R106": 1, "D2R101": 1, "D2R004": 1, "D2R104": 1}
 
 
 def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
-    deck = HEAD + automatic(1, "0.02", rigid=[str(part) for part in range(1, 40)]) + END
+    deck = (
+        HEAD
+        + write_automatic_card(1, "0.02", rigid=[str(part) for part in range(1, 40)])
+        + END
+    )
     (finding,) = check_deck(write(tmp_path, deck)).findings
     assert "parts 1-39" in finding.message
 
@@ -229,12 +242,14 @@ def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
     tmp_path: Path, codes: tuple[int, int], weight: set[str], paired: bool
 ) -> None:
     pairs = ((2, 1), (1, -1)) if paired else ((0, 0), (0, 0))
-    rigid_card = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0])
+    rigid_card = write_automatic_card(
+        1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0]
+    )
     deck = (
         HEAD
         + PARTS
         + rigid_card
-        + automatic(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1])
+        + write_automatic_card(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1])
         + END
     )
     findings = check_deck(write(tmp_path, deck)).findings
@@ -251,7 +266,9 @@ def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
 
 def test_an_unknown_part_lists_its_neighbours_with_their_titles(tmp_path: Path) -> None:
     text = find_message(
-        tmp_path, "D2R106", HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END
+        tmp_path,
+        "D2R106",
+        HEAD + PARTS + write_automatic_card(1, "0.02", rigid=["7"]) + END,
     )
     assert text.startswith("part 7 not in the deck (nearest to 7: 1 'door', 2 'frame')")
 
@@ -263,7 +280,9 @@ def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
     )
     sets = "*SET_PART\n         3\n         1         2\n"
     line = "         3         0      PSET"
-    deck = HEAD + PARTS + mesh + sets + automatic(1, "0.02", rigid=[line]) + END
+    deck = (
+        HEAD + PARTS + mesh + sets + write_automatic_card(1, "0.02", rigid=[line]) + END
+    )
     assert (
         "part 1 (of part set 3) and part 2 (of part set 3) share node 8"
         in find_message(tmp_path, "D2R108", deck)
@@ -361,7 +380,7 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
 
 
 def read_configuration_in(folder: Path) -> Configuration:
-    return configuration_for(str(folder / "deck.k"), Configuration())
+    return find_configuration(str(folder / "deck.k"), Configuration())
 
 
 OWN = 'select = ["D2R1"]\nignore = ["D2R104"]\n[severity]\nD2R101 = "warning"\n'

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 
 from d2rpick.deck.ls_dyna_sensors import follow_control, read_controls
 from d2rpick.deck.reader import read_deck
-from d2rpick.rules.rule import HEAD, PARTS, automatic, deck
+from d2rpick.rules.rule import HEAD, PARTS, make_deck, write_automatic_card
 from tests.command import answer, put, refused, run
 from tests.rules.test_by_force import list_windows
 
@@ -52,11 +52,11 @@ CONTACT = (
     "         7     floor\n"
     "         8\n*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n         8      wall\n"
 )
-SET = automatic(20, "0.0", rigid=["1"], code=5)
+SET = write_automatic_card(20, "0.0", rigid=["1"], code=5)
 
 
 def write(folder: Path, *cards: str, switch_set: str = SET) -> str:
-    text = deck("".join(cards) + CONTACT + switch_set).deck.replace(
+    text = make_deck("".join(cards) + CONTACT + switch_set).deck.replace(
         "       0.2", f"{END:10g}", 1
     )
     return str(put(folder / "main.k", text))
@@ -111,7 +111,7 @@ def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> 
 
 def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
     folder = history(tmp_path, [(0.5, 0.6)])
-    sets = automatic(10, "0.1", rigid=["1"]) + automatic(
+    sets = write_automatic_card(10, "0.1", rigid=["1"]) + write_automatic_card(
         20, "0.0", deformable=["1"], code=5
     )
     cards = control("1") + by_force(1, "GT", 1.0) + force_of()
@@ -126,8 +126,8 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
     found = {}
     for contact in (7, 8):
-        there = automatic(20, "0.0", rigid=["1"], code=2, pair=(21, 1))
-        back = automatic(21, "0.0", deformable=["1"], code=4, pair=(20, -1))
+        there = write_automatic_card(20, "0.0", rigid=["1"], code=2, pair=(21, 1))
+        back = write_automatic_card(21, "0.0", deformable=["1"], code=4, pair=(20, -1))
         pair = "".join(
             text.replace("0.0         0", f"0.0{contact:10d}", 1)
             for text in (there, back)
@@ -151,7 +151,7 @@ def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
     tmp_path: Path,
 ) -> None:
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
-    there = automatic(20, "0.0", rigid=["1"], code=2).replace(
+    there = write_automatic_card(20, "0.0", rigid=["1"], code=2).replace(
         "0.0         0", f"0.0{7:10d}", 1
     )
     path = Path(write(tmp_path, switch_set=there))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
-from d2rpick.histories.history import EXACT, Given, History, Momenta, rows_of
+from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import Evidence, highest_energy, quiet_times
@@ -166,7 +166,7 @@ def test_a_record_of_as_many_states_as_parts_keeps_the_masses_of_all() -> None:
         (0, 1, 2),
         masses=np.array([1.0, 2.0, 3.0]),
     )
-    assert rows_of(momenta, slice(0, 2)).mass((0, 1, 2)) == 6.0
+    assert select_states(momenta, slice(0, 2)).mass((0, 1, 2)) == 6.0
 
 
 @cache
@@ -233,11 +233,11 @@ def test_what_is_seen_does_not_depend_on_when_somebody_looked(
 
 def states_of(history: History, states: NDArray[np.bool_]) -> History:
     given_ = Given(
-        tuple(rows_of(one, states) for one in history.momenta),
-        history.balance and rows_of(history.balance, states),
+        tuple(select_states(one, states) for one in history.momenta),
+        history.balance and select_states(history.balance, states),
         history.masses,
     )
-    return replace(rows_of(history, states), evidence=given_)
+    return replace(select_states(history, states), evidence=given_)
 
 
 @pytest.mark.parametrize("jump", [True, False])

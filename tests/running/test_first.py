@@ -94,7 +94,7 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
     checked = d2.check(found.files[0])
     assert not checked.windows
     assert {one.rule for one in checked.findings} == {"D2R302"}
-    assert "leg 1 ends when sensor" in checked.findings[0].message
+    assert "engine file 1 ends when sensor" in checked.findings[0].message
 
 
 @pytest.mark.parametrize(

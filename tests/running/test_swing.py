@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.position_error import Drift, drift_in_flight
+from d2rpick.flight.position_error import Drift, find_drift_in_flight
 from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.running.swing import find_swing
@@ -25,7 +25,9 @@ def car() -> tuple[History, Drift]:
     history = solved("carT01.gz").history
     (momenta,) = (one for one in history.momenta if one.parts is not None)
     moving = tuple(sure(momenta.parts)[i] for i in momenta.moving)
-    return history, sure(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
+    return history, sure(
+        find_drift_in_flight(history, Flight(FREE, TD, "momentum", moving))
+    )
 
 
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])

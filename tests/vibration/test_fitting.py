@@ -11,11 +11,11 @@ from d2rpick.vibration.fitting import (
     fit,
     fit_all,
     fit_few,
-    structure_of,
-    surely_structured,
+    has_clear_structure,
+    measure_structure,
 )
 from d2rpick.vibration.identify import HOPELESS, identify
-from d2rpick.vibration.modes import energy_and_jacobian
+from d2rpick.vibration.modes import compute_energy_and_jacobian
 
 S = np.linspace(0.0, 1.0, 20_000)
 
@@ -27,11 +27,11 @@ def noise(size: int, seed: int = 14) -> np.ndarray:
 
 def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
     wave = np.sin(40 * S)
-    assert structure_of(wave) == pytest.approx(np.sqrt(0.5), rel=0.05)
-    assert structure_of(noise(S.size)) < 0.05
-    assert surely_structured(0.1 * wave, 1.0)
-    assert not surely_structured(MAX_STRUCTURE * wave, 1.0)
-    assert not any(surely_structured(noise(2000, seed), 1.0) for seed in range(200))
+    assert measure_structure(wave) == pytest.approx(np.sqrt(0.5), rel=0.05)
+    assert measure_structure(noise(S.size)) < 0.05
+    assert has_clear_structure(0.1 * wave, 1.0)
+    assert not has_clear_structure(MAX_STRUCTURE * wave, 1.0)
+    assert not any(has_clear_structure(noise(2000, seed), 1.0) for seed in range(200))
 
 
 @pytest.mark.slow
@@ -105,12 +105,12 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
 
     def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         asked.append(s.size)
-        return energy_and_jacobian(parameters, s, VIBRATION)
+        return compute_energy_and_jacobian(parameters, s, VIBRATION)
 
     start = np.array([20.0, 1.0, 0.7, 0.7, 0.0, 0.0])
     for energy, all_of_them in (
         (noise(S.size), False),
-        (energy_and_jacobian(start, S, VIBRATION)[0], True),
+        (compute_energy_and_jacobian(start, S, VIBRATION)[0], True),
     ):
         asked.clear()
         fit_all(start, model, S, energy, np.inf, slice(1))

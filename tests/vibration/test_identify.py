@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.optimize import least_squares
 
 from d2rpick.histories.history import Samples
-from d2rpick.vibration.fitting import covariance
+from d2rpick.vibration.fitting import compute_covariance
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.modes import Mode
 from tests.command import ROLLOVER
@@ -321,7 +321,7 @@ def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
     jacobian = np.stack([np.ones(30), np.linspace(0, 1, 30), np.full(30, 1e-155)])
     assert np.all(
-        np.isfinite(covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30)))
+        np.isfinite(compute_covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30)))
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.vibration.lines import Exponentials, even_grid, fit_spectrum, predict
+from d2rpick.vibration.lines import Exponentials, fit_spectrum, make_even_grid, predict
 from tests.energies import sure
 from tests.vibration.linear_structure import LinearStructure
 
@@ -19,7 +19,7 @@ def test_each_mode_has_a_line_at_twice_its_rate_and_decay(
     seed: int, count: int
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    found = sure(predict(even_grid(TIME, structure.elastic_energy(TIME))))
+    found = sure(predict(make_even_grid(TIME, structure.elastic_energy(TIME))))
     lines = found.spectrum.lines
     for rate, damping, amplitude in zip(
         structure.rate, structure.damping, structure.amplitude, strict=True
@@ -33,7 +33,7 @@ def test_each_mode_has_a_line_at_twice_its_rate_and_decay(
 def test_the_mean_over_a_block_of_a_wave_is_the_wave_with_a_gain() -> None:
     time = np.linspace(0.0, 40.0, 20001)
     wave = Exponentials(np.array([-0.05 + 3.0j]), np.array([2.0 - 1.0j]), 0.0)
-    grid = even_grid(time, wave.at(time))
+    grid = make_even_grid(time, wave.at(time))
     assert grid.size > 10
     expected = wave._replace(weights=wave.weights * grid.gain(wave.poles)).at(grid.time)
     np.testing.assert_allclose(grid.energy, expected, atol=1e-12)
@@ -43,7 +43,7 @@ def test_the_mean_over_a_block_of_a_wave_is_the_wave_with_a_gain() -> None:
 
 
 def test_a_growing_pole_is_held_level_and_a_fast_decay_is_no_line() -> None:
-    grid = even_grid(TIME, np.cos(20.0 * TIME))
+    grid = make_even_grid(TIME, np.cos(20.0 * TIME))
     found = fit_spectrum(grid, np.array([3.0 + 20.0j, -15.0 + 30.0j]), grid.span)
     assert found.lines.poles.size == 1
     assert found.lines.poles.real[0] == pytest.approx(0.2 / grid.span)
@@ -53,14 +53,14 @@ def test_a_growing_pole_is_held_level_and_a_fast_decay_is_no_line() -> None:
     "energy", [np.zeros(TIME.size), np.ones(10)], ids=["nothing", "short"]
 )
 def test_an_energy_without_a_swing_has_no_lines(energy: np.ndarray) -> None:
-    assert predict(even_grid(TIME[: energy.size], energy)) is None
+    assert predict(make_even_grid(TIME[: energy.size], energy)) is None
 
 
 def test_uneven_states_show_the_same_lines() -> None:
     structure = LinearStructure.draw(3, 2)
     random = np.random.default_rng(1)
     time = np.sort(random.uniform(0.0, 8.0, 1500))
-    found = sure(predict(even_grid(time, structure.elastic_energy(time))))
+    found = sure(predict(make_even_grid(time, structure.elastic_energy(time))))
     strongest = np.sort(
         found.spectrum.lines.poles.imag[
             np.argsort(-np.abs(found.spectrum.lines.weights))[:2]
@@ -74,4 +74,4 @@ def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
     energy = np.where(
         TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME)
     )
-    assert sure(predict(even_grid(TIME, energy))).missed > 0.3
+    assert sure(predict(make_even_grid(TIME, energy))).missed > 0.3

@@ -6,7 +6,7 @@ from hypothesis import assume, given, strategies as st
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator import Replay, from_mode, to_mode
+from d2rpick.vibration.oscillator import Replay, make_from_mode, to_mode
 from tests import paper
 from tests.records import MODES, replayed_residual
 
@@ -16,7 +16,7 @@ def test_measures_by_formula_are_those_of_the_motion(
     mode: Mode, tr: float, window: float
 ) -> None:
     td = tr + window
-    oscillator, start = from_mode(mode, tr)
+    oscillator, start = make_from_mode(mode, tr)
     replay = Replay(oscillator, start, tr, tr, td)
     at_td = replay.reference(td)
     whole = float(oscillator.vibration_energy(at_td))

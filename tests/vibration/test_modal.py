@@ -12,7 +12,11 @@ from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.measures import Profile, kinetic_share, lock_in_error, residual
-from d2rpick.vibration.modal import ModalVibration, confirm, identify_modal
+from d2rpick.vibration.modal import (
+    ModalVibration,
+    confirm_by_kinetic_energy,
+    identify_modal,
+)
 from tests.energies import of, sure
 from tests.vibration.linear_structure import LinearStructure
 
@@ -75,7 +79,7 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
         np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2))
         < 0.02
     )
-    both = sure(confirm(internal, kinetic))
+    both = sure(confirm_by_kinetic_energy(internal, kinetic))
     assert both.second is kinetic.reading
     assert np.all(both.half_width(*PAIRS) >= internal.half_width(*PAIRS))
 
@@ -88,16 +92,20 @@ def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     )
     drifting = sure(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
     assert not drifting.signed
-    assert confirm(drifting, None) is drifting
+    assert confirm_by_kinetic_energy(drifting, None) is drifting
     calm = replace(drifting, doubts=drifting.doubts._replace(beyond=0.0))
-    assert confirm(calm, kinetic) is kinetic
+    assert confirm_by_kinetic_energy(calm, kinetic) is kinetic
     assert (
-        confirm(replace(calm, doubts=calm.doubts._replace(beyond=0.5)), kinetic)
+        confirm_by_kinetic_energy(
+            replace(calm, doubts=calm.doubts._replace(beyond=0.5)), kinetic
+        )
         is not kinetic
     )
     lacking = sure(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
     lacking = replace(lacking, doubts=calm.doubts)
-    assert confirm(lacking, kinetic) is lacking  # it holds less than what vibrates
+    assert (
+        confirm_by_kinetic_energy(lacking, kinetic) is lacking
+    )  # it holds less than what vibrates
     assert "kinetic energy" in kinetic.told
 
 

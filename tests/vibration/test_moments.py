@@ -13,14 +13,14 @@ from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.measures import Profile
-from d2rpick.vibration.model import Evidence, energy_at
+from d2rpick.vibration.model import Evidence, find_energy_at
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import (
     Moments,
-    curvature,
-    fitted_reach,
-    reach,
-    sampled_reach,
+    compute_fitted_reach,
+    compute_reach,
+    compute_sampled_reach,
+    estimate_curvature,
 )
 from d2rpick.vibration.span import Span
 from tests.energies import sure
@@ -74,7 +74,7 @@ def test_a_td_at_which_a_mode_sets_in_has_nothing_before_it_to_compare() -> None
     mode = Mode(8.0, 0.05, 1.0, 0.4, 0.0)
     time = np.linspace(0.0, 6.0, 1201)
     history = table(time, np.asarray(mode.energy(time)))
-    vibration = energy_at(
+    vibration = find_energy_at(
         history, 2.0, Evidence(identify(time, history.energy), Span(2.0, 6.0))
     )
     crossings = vibration.moments(0.2)
@@ -143,7 +143,7 @@ def covered(
         rising = np.array(
             [float(mode.deformation(t) * mode.velocity(t)) > 0 for t in true]
         )
-        half = sampled_reach(history, times, td, history.energy_at(td))
+        half = compute_sampled_reach(history, times, td, history.energy_at(td))
         for one, rises_there, width in zip(times, rises, half, strict=False):
             distance = np.abs(np.array(true)[rising == rises_there] - one).min()
             if distance < 0.25 / 2:  # a true crossing that the samples show
@@ -185,7 +185,7 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
                 fit.mode.crossings(sign * float(fit.mode.deformation(td)), 0.45, 3.05)
             )
             if times.size:
-                half = fitted_reach(history, fit, fit.mode, times, td)
+                half = compute_fitted_reach(history, fit, fit.mode, times, td)
                 inside += [bool(np.any(np.abs(times - t) <= half)) for t in true]
     assert len(inside) > 200
     assert np.mean(inside) >= 0.99
@@ -230,7 +230,7 @@ def test_an_interval_from_samples_grows_by_what_the_level_is_off_them() -> None:
     time = np.linspace(0, 1, 101)
     history = table(time, 3 * time)
     (exact,), (off,) = (
-        sampled_reach(history, np.array([0.3]), 0.755, 2.265 + error)
+        compute_sampled_reach(history, np.array([0.3]), 0.755, 2.265 + error)
         for error in (0.0, 0.009)
     )
     assert off - exact == pytest.approx(0.009 / 3)
@@ -242,7 +242,7 @@ sizes = st.one_of(st.just(0.0), st.floats(1e-100, 1e3))
 
 @given(sizes, sizes, sizes)
 def test_reach_uses_up_the_error(slope: float, bend: float, error: float) -> None:
-    x = float(reach(slope, bend, error))
+    x = float(compute_reach(slope, bend, error))
     assert x >= 0
     if np.isfinite(x):
         assert slope * x + bend * x**2 / 2 >= error * (1 - 1e-9)
@@ -251,5 +251,7 @@ def test_reach_uses_up_the_error(slope: float, bend: float, error: float) -> Non
 def test_curvature_of_a_parabola_is_exact_on_uneven_times() -> None:
     time = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])
     np.testing.assert_allclose(
-        curvature(time, 3 * time**2, np.array([0.0, 0.5, 1.0])), 6.0, rtol=1e-12
+        estimate_curvature(time, 3 * time**2, np.array([0.0, 0.5, 1.0])),
+        6.0,
+        rtol=1e-12,
     )

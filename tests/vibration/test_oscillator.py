@@ -13,9 +13,9 @@ from d2rpick.vibration.oscillator import (
     Oscillator,
     Replay,
     State,
-    from_mode,
+    compute_trajectory,
+    make_from_mode,
     to_mode,
-    trajectory,
 )
 from tests import paper
 from tests.records import MODES
@@ -228,7 +228,7 @@ def test_the_residual_stays_what_it_is_at_td_while_nothing_damps(
     mode: Mode, tr: float, window: float
 ) -> None:
     still = Mode(mode.omega, 0.0, mode.cosine, mode.sine, mode.origin)
-    oscillator, start = from_mode(still, tr)
+    oscillator, start = make_from_mode(still, tr)
     replay = Replay(oscillator, start, tr, tr, tr + window)
     later = tr + window + np.linspace(0, 3, 20)
     lack = State(
@@ -257,7 +257,7 @@ def test_td_on_an_energy_peak_continues_the_reference_exactly() -> None:
 
 def test_at_tr_itself_stands_the_state_after_the_switch() -> None:
     replay = Replay(paper.OSCILLATOR, paper.START, 0.0, 0.006, 0.08)
-    motion = trajectory(paper.OSCILLATOR, paper.START, 0.1, 0.001, replay)
+    motion = compute_trajectory(paper.OSCILLATOR, paper.START, 0.1, 0.001, replay)
     assert motion.time[6] == 0.006
     assert (
         motion.state.vz[6]
@@ -268,8 +268,12 @@ def test_at_tr_itself_stands_the_state_after_the_switch() -> None:
 
 
 def test_the_grid_of_a_trajectory_ends_where_it_should() -> None:
-    assert trajectory(paper.OSCILLATOR, paper.START, 0.15, 1e-4).time[-1] == 0.15
-    assert trajectory(paper.OSCILLATOR, paper.START, 0.01, 0.003).time.tolist() == [
+    assert (
+        compute_trajectory(paper.OSCILLATOR, paper.START, 0.15, 1e-4).time[-1] == 0.15
+    )
+    assert compute_trajectory(
+        paper.OSCILLATOR, paper.START, 0.01, 0.003
+    ).time.tolist() == [
         0.0,
         0.003,
         0.006,

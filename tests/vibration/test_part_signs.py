@@ -17,8 +17,8 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.model import SUNK
-from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, by_own_mode
-from d2rpick.vibration.waves import PartMotion, Waves, all_zeros, followed
+from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, find_own_mode
+from d2rpick.vibration.waves import PartMotion, Waves, find_all_zeros, follow_waves
 from tests import chain
 from tests.benchmarks.promise_parts import Motion, history
 from tests.command import BOX
@@ -386,10 +386,10 @@ def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
 
 def test_minima_that_stay_above_zero_prove_no_sign() -> None:
     energy = planes(0.03).energies(SPAN)[:, 0]
-    (zeros,) = all_zeros(SPAN, np.sqrt(energy)[np.newaxis])
+    (zeros,) = find_all_zeros(SPAN, np.sqrt(energy)[np.newaxis])
     tracked = np.where(np.searchsorted(zeros.sure, SPAN) % 2, -1, 1) * np.sqrt(energy)
-    assert followed(SPAN, tracked, zeros) is None
-    assert by_own_mode(SPAN, energy, None) is None
+    assert follow_waves(SPAN, tracked, zeros) is None
+    assert find_own_mode(SPAN, energy, None) is None
 
 
 def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:

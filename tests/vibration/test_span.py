@@ -15,9 +15,9 @@ from d2rpick.vibration.oscillator_band import residual_band
 from d2rpick.vibration.span import (
     Fits,
     Span,
-    described_span,
-    hidden_share,
-    span_of,
+    estimate_hidden_share,
+    find_described_span,
+    find_span,
 )
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
@@ -61,7 +61,7 @@ def test_a_span_ends_where_running_means_leave_the_fit(
         (TIME < 0.0311) | (TIME > 0.1234)
     )
     fit = judge_given(MODE, TIME, ENERGY)
-    assert span_of(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(
+    assert find_span(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(
         energy, anchor
     )
 
@@ -69,7 +69,7 @@ def test_a_span_ends_where_running_means_leave_the_fit(
 def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     rng = np.random.default_rng(1)
     energy = rng.normal(size=TIME.size)
-    span, fit = described_span(of(energy), 0.1, Span(0.0, 0.15))
+    span, fit = find_described_span(of(energy), 0.1, Span(0.0, 0.15))
     assert span is None
     before = TIME <= 0.1
     assert fit.reason == identify(TIME[before], energy[before]).reason
@@ -86,7 +86,7 @@ def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record
 ):
     energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
     tracemalloc.start()
-    span, fit = described_span(
+    span, fit = find_described_span(
         table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
     )
     most = tracemalloc.get_traced_memory()[1]
@@ -155,7 +155,9 @@ def test_the_share_of_a_small_second_mode_is_estimated(
     one = identify(TIMES, energy)
     assert one.mode is not None  # its rest is too small to refuse it
     assert one.describes_record
-    assert hidden_share(TIMES, energy, one.mode) == pytest.approx(share, rel=0.5)
+    assert estimate_hidden_share(TIMES, energy, one.mode) == pytest.approx(
+        share, rel=0.5
+    )
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -165,13 +167,18 @@ def test_white_noise_hides_a_second_mode_of_its_own_size(
 ) -> None:
     energy = noisy(MAIN.energy(TIMES), noise, seed)
     assert (
-        0 < hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode)) < 3 * noise
+        0
+        < estimate_hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode))
+        < 3 * noise
     )
 
 
 def test_a_clean_or_printed_record_hides_nothing() -> None:
     for energy, most in ((ENERGY, 1e-12), (printed(ENERGY), 1e-5)):
-        assert hidden_share(TIME, energy, sure(identify(TIME, energy).mode)) < most
+        assert (
+            estimate_hidden_share(TIME, energy, sure(identify(TIME, energy).mode))
+            < most
+        )
 
 
 def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
@@ -181,7 +188,7 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
         energy = noisy(energy_of(truth, TIMES), 0.03, seed)
         found = identify(TIMES, energy)
         mode = sure(found.mode)
-        found = found._replace(hidden_share=hidden_share(TIMES, energy, mode))
+        found = found._replace(hidden_share=estimate_hidden_share(TIMES, energy, mode))
         true, told = replayed_residual(truth, tr, td), replayed_residual(mode, tr, td)
         _, low, high = residual_band(found, told, tr, td)
         assert np.all(high > true - 0.05)

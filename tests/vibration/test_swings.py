@@ -16,7 +16,7 @@ from d2rpick.histories.history import Memory, Samples
 from d2rpick.report.situation import heading
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import identify
-from d2rpick.vibration.model import Evidence, energy_at, model_at
+from d2rpick.vibration.model import Evidence, find_energy_at, model_at
 from d2rpick.vibration.span import Span
 from d2rpick.vibration.swings import Swings, count_swings
 from tests.energies import sure
@@ -150,4 +150,4 @@ def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
     counted = sure(count_swings(time, record.energy))
     fit = identify(time, record.energy)._replace(hidden_share=hidden)
     evidence = Evidence(fit, Span(0.0, 6.0), models={"swings": Told(**vars(counted))})
-    assert model_at(energy_at(record, 4.1, evidence), evidence).basis == basis
+    assert model_at(find_energy_at(record, 4.1, evidence), evidence).basis == basis

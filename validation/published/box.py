@@ -11,7 +11,13 @@ import numpy as np
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.choice.study import common_tr, row_of
-from d2rpick.models.box_run import BOX, RigidWindow, compare, history_of, simulate
+from d2rpick.models.box_run import (
+    BOX,
+    RigidWindow,
+    compare_runs,
+    make_history,
+    simulate,
+)
 from validation.published.exhibits import Curve, Exhibit, Panel, Shape
 
 if TYPE_CHECKING:
@@ -223,7 +229,7 @@ def tried(variants: Sequence[Variant]) -> Trial:
     landings = [_run(one.parameters).landed or _END for one in variants]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     rows = [
-        row_of(one.name, suggest(history_of(_run(one.parameters)), td, Settings()))
+        row_of(one.name, suggest(make_history(_run(one.parameters)), td, Settings()))
         for one in variants
     ]
     common = common_tr(rows)
@@ -247,7 +253,7 @@ def tried(variants: Sequence[Variant]) -> Trial:
 
 def _at(variant: Variant, row: StudyRow, error: float, common: RigidWindow) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
-    outcome = compare(reference, run, common.tr, common.td)
+    outcome = compare_runs(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
     return Tried(variant, row, error, outcome.roll_error, end)
 
@@ -376,7 +382,7 @@ def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
 
 
 def _own(reference: Record, td: float) -> float | None:
-    recommended = suggest(history_of(reference), td, Settings()).recommended
+    recommended = suggest(make_history(reference), td, Settings()).recommended
     return recommended.tr if recommended else None
 
 

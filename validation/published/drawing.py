@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from d2rpick.models.box_model import Parameters, build
+from d2rpick.models.box_model import Parameters, build_structure
 from d2rpick.report.figures import (
     FLIGHT,
     GOOD,
@@ -139,7 +139,7 @@ def _show_level(axes: Axes, level: float, highest: float) -> None:
 def box(axes: Axes) -> None:
     """The rollover box on its sled."""
     parameters = Parameters()
-    structure = build(parameters)
+    structure = build_structure(parameters)
     draw_sled(axes, parameters, 0.0)
     for truss, colour, width in (
         (structure.box, REFERENCE, 0.4),

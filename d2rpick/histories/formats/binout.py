@@ -11,10 +11,14 @@ import os
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.binout_branch import Branch
-from d2rpick.histories.formats.binout_forces import FORCES, forces_of, writes_forces
+from d2rpick.histories.formats.binout_forces import (
+    FORCES,
+    has_forces,
+    read_binout_forces,
+)
 from d2rpick.histories.formats.lsda import Lsda, recognises
 from d2rpick.histories.names import Part, Selection
 
@@ -56,7 +60,7 @@ class Binout(Database):
             Branch(name, self._files, by_part=name == "matsum") for name in _BRANCHES
         ]
         head = whole or parts
-        self.only_forces = not head and writes_forces(self._files)
+        self.only_forces = not head and has_forces(self._files)
         if not head and not self.only_forces:
             raise FormatError(self._without("glstat or matsum"))
         revision = head.text("revision")
@@ -88,7 +92,7 @@ class Binout(Database):
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts, both sides as one, and of the rigid walls."""
-        return forces_of(self._files)
+        return read_binout_forces(self._files)
 
     def branch(self, name: str) -> Branch:
         """Return a branch by name; raise FormatError if there is none, or if records of any branch are lost."""
@@ -106,6 +110,6 @@ class Binout(Database):
         """Return the message that no file of the leg has a branch of this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
-            f"{self.source}: no {name} in it, but {listing(names) or 'nothing'}; "
+            f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "
             "name the binout of the run that contains it (binout0000, binout0001, ...) or let the run write it"
         )

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.names import plain_text
+from d2rpick.histories.names import clean_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -59,7 +59,7 @@ class Group:
             return values.astype(np.float64)
 
 
-def _start(file: Lsda, branch: str) -> float:
+def _read_start(file: Lsda, branch: str) -> float:
     """Return the time of the first state of a branch in a file, -inf if the state has none."""
     _, start, layout = file.visits[branch][:3]
     variable = file.layouts[layout].variables.get("time")
@@ -74,7 +74,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
     return file.unfinished == branch and len({*layouts}) > 1
 
 
-def _damages(
+def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
     """Yield what shows, in the states of one file, that records are lost or out of place."""
@@ -89,7 +89,7 @@ def _damages(
         yield f"{where} begins a new leg whose states have other variables"
 
 
-def _groups(
+def _group_states(
     layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices
 ) -> Iterator[Group]:
     """Yield the states grouped by layout; ``kinds`` are the indices of their layouts in ``layouts``."""
@@ -127,7 +127,7 @@ class Branch(Database):
         self.name, self._by_part, self._files = name, by_part, files
         visited = sorted(
             (file for file in files if file.visits[name]),
-            key=lambda file: _start(file, name),
+            key=lambda file: _read_start(file, name),
         )
         # Files whose last state is left out.
         self._unfinished = [
@@ -146,14 +146,14 @@ class Branch(Database):
                 states = states[:-1]
             file_numbers, file_starts, file_kinds = states.T
             used = [file.layouts[kind] for kind in {*file_kinds.tolist()}]
-            damages += _damages(file_numbers, used, f"{file.source}: {name}")
+            damages += _find_damages(file_numbers, used, f"{file.source}: {name}")
             numbers = np.append(numbers, file_numbers)
             starts = np.append(starts, file_starts)
             kinds = np.append(kinds, file_kinds + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
         self.damage = damages[-1] if damages else ""
         self._numbers = numbers
-        self._groups = tuple(_groups(layouts, kinds, starts))
+        self._groups = tuple(_group_states(layouts, kinds, starts))
         self._variables = [group.layout.variables for group in self._groups]
         holes = np.flatnonzero(np.diff(numbers) > 1)
         self._missing = tuple(
@@ -182,7 +182,7 @@ class Branch(Database):
                 f"{self.source} begins with state {first}, not 1; is a file of the family missing or damaged?"
             )
         if self._missing:
-            holes = listing(self._missing, most=3)
+            holes = list_names(self._missing, most=3)
             notes.append(
                 f"{self.source} lacks the states {holes}; is a file of the family missing?"
             )
@@ -192,13 +192,15 @@ class Branch(Database):
             for name in names
             if all(name in variables for variables in self._variables)
         }
-        if late := listing(sorted(names - common)):
+        if late := list_names(sorted(names - common)):
             notes.append(f"{self.source} has {late} in some states only")
         kinds = {
             name: {variables[name].dtype.kind for variables in self._variables}
             for name in common
         }
-        if changing := listing(sorted(name for name in common if len(kinds[name]) > 1)):
+        if changing := list_names(
+            sorted(name for name in common if len(kinds[name]) > 1)
+        ):
             notes.append(
                 f"{self.source} has {changing} of another type in some states: damaged there, and left out"
             )
@@ -213,7 +215,10 @@ class Branch(Database):
         return tuple(
             name
             for name in first
-            if all(_is_scalar(variables.get(name)) for variables in self._variables)
+            if all(
+                _is_scalar_variable(variables.get(name))
+                for variables in self._variables
+            )
         )
 
     @property
@@ -231,14 +236,14 @@ class Branch(Database):
         """Titles of the parts by id."""
         titles: dict[int, str] = {}
         for file, start, layout in self._metadata:
-            ids = _integers(file, start, layout, "legend_ids")
+            ids = _read_integers(file, start, layout, "legend_ids")
             legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
                 continue  # the titles cannot be separated: their length is not constant
             raw = file.raw(start, legend)
             width = legend.count // ids.size
             for i, id_ in enumerate(ids.tolist()):
-                titles[id_] = plain_text(raw[i * width : (i + 1) * width])
+                titles[id_] = clean_text(raw[i * width : (i + 1) * width])
         return titles
 
     @cached_property
@@ -256,7 +261,7 @@ class Branch(Database):
         """Return a text of the metadata, empty if it has none of this name."""
         for file, start, layout in self._metadata:
             if name in layout.variables:
-                return plain_text(file.raw(start, layout.variables[name]))
+                return clean_text(file.raw(start, layout.variables[name]))
         return ""
 
     @cached_property
@@ -306,7 +311,7 @@ class Branch(Database):
             if name not in variables:
                 raise self.refused(
                     group,
-                    f"no {name}, only {listing(list(variables), most=40)}; ask for one of these",
+                    f"no {name}, only {list_names(list(variables), most=40)}; ask for one of these",
                 )
             if variables[name].dtype.kind != "f":
                 raise self.refused(
@@ -316,7 +321,7 @@ class Branch(Database):
             for checked_name, variable in variables.items():
                 fitting = self._fitting(group, checked_name)
                 if variable.count not in fitting:
-                    counts = f"{variable.count} values of {checked_name} where {listing(sorted(fitting))} would fit"
+                    counts = f"{variable.count} values of {checked_name} where {list_names(sorted(fitting))} would fit"
                     raise self.refused(group, f"{counts}; the file is damaged there")
             yield group, variables[name]
 
@@ -352,7 +357,7 @@ class Branch(Database):
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
         """The lists of part ids in the metadata, each with the number of its file and its byte."""
         lists = (
-            (file, at, _integers(file, at, layout, "ids"))
+            (file, at, _read_integers(file, at, layout, "ids"))
             for file, at, layout in self._metadata
         )
         return [
@@ -397,7 +402,7 @@ class Branch(Database):
         times = is_part.sum(axis=1)
         if (times != 1).any():
             row = int(np.argmax(times != 1))
-            hint = f"there are {listing(self.part_ids)}"
+            hint = f"there are {list_names(self.part_ids)}"
             if id_ in self.part_ids:
                 hint = "it is there in some states only"
             raise self.refused(
@@ -406,12 +411,14 @@ class Branch(Database):
         return np.asarray(is_part.argmax(axis=1))
 
 
-def _is_scalar(variable: Variable | None) -> bool:
+def _is_scalar_variable(variable: Variable | None) -> bool:
     """Return True if a variable is a single floating-point value."""
     return variable is not None and variable.count == 1 and variable.dtype.kind == "f"
 
 
-def _integers(file: Lsda, start: int, layout: DirectoryLayout, name: str) -> Indices:
+def _read_integers(
+    file: Lsda, start: int, layout: DirectoryLayout, name: str
+) -> Indices:
     """Return the list of integers of this name in a directory, empty if there is none."""
     variable = layout.variables.get(name)
     if variable is None or variable.dtype.kind not in "iu":

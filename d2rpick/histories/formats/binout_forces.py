@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
-def writes_forces(files: Sequence[Lsda]) -> bool:
+def has_forces(files: Sequence[Lsda]) -> bool:
     """Return True if any state of a family contains forces."""
     return any(ForceBranch(name, files, by_part=True).writes_forces for name in FORCES)
 
 
-def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
+def read_binout_forces(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
     """Return the forces of all contacts and rigid walls of a family; raise FormatError if they cannot be assigned."""
     branches = [ForceBranch(name, files, by_part=True) for name in FORCES]
     return tuple(
         force
         for branch in branches
         if branch.writes_forces
-        for force in _forces_of(branch)
+        for force in _join_sides(branch)
     )
 
 
@@ -76,7 +76,7 @@ class ForceBranch(Branch):
         return listed, forces
 
 
-def _forces_of(branch: ForceBranch) -> Iterator[ContactForce]:
+def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
     """Yield one force for each contact: its sides have the same force in opposite directions, or one side has none."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(

@@ -92,7 +92,7 @@ class Grammar(NamedTuple):
         return BlockLayout(fields, literal, last, broken_off=b"ls-dyna" in block)
 
 
-def head(data: bytes | Content) -> tuple[str, str, int]:
+def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
     """Read the head of an LS-DYNA text file.
 
     Returns
@@ -109,7 +109,7 @@ def head(data: bytes | Content) -> tuple[str, str, int]:
     return title.strip(), " ".join(version.split()), len(title) + len(version) + 2
 
 
-def written_head(title: str, database: str) -> str:
+def make_head(title: str, database: str) -> str:
     """Return the two head lines of a made-up file. They name no release of a solver, since no solver wrote the file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
@@ -123,7 +123,7 @@ class Stretch(NamedTuple):
     example: int
 
 
-def like_example(
+def count_like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
@@ -146,7 +146,7 @@ def like_example(
     --------
     >>> from d2rpick.histories.content import Content
     >>> literal, varied = np.array([255, 255, 0, 0], np.uint8), np.zeros(4, np.uint8)
-    >>> like_example(Content(b"a=10a=12b=14"), Stretch(0, 4, 3, 0), 0, literal, varied), varied.tolist()
+    >>> count_like_example(Content(b"a=10a=12b=14"), Stretch(0, 4, 3, 0), 0, literal, varied), varied.tolist()
     (2, [0, 0, 0, 2])
     """
     size = literal.size
@@ -157,19 +157,19 @@ def like_example(
         largest_step -= largest_step % _FOLD
     alike = True
     while alike and done < run.repeats:
-        rows = _rows(
+        rows = _view_rows(
             data,
             run.start + done * run.stride + offset,
             run.stride,
             min(step, run.repeats - done),
             size,
         )
-        differing = _differing(rows, example)
+        differing = _find_differing_bits(rows, example)
         alike = not (differing & literal).any()
         if not alike:
             rows = rows[: int(((rows ^ example) & literal).any(axis=1).argmax())]
             if len(rows):
-                differing = _differing(rows, example)
+                differing = _find_differing_bits(rows, example)
             else:
                 differing = np.zeros_like(example)
         if varied is not None:
@@ -181,7 +181,7 @@ def like_example(
     return done
 
 
-def _rows(data: Content, first: int, stride: int, count: int, size: int) -> Bytes:
+def _view_rows(data: Content, first: int, stride: int, count: int, size: int) -> Bytes:
     """Return ``size`` bytes of each of ``count`` blocks, shape (count, size)."""
     if 2 * size < stride:
         return data.fields(first + stride * np.arange(count), size)
@@ -189,7 +189,7 @@ def _rows(data: Content, first: int, stride: int, count: int, size: int) -> Byte
     return np.ndarray((count, size), np.uint8, span, strides=(stride, 1))
 
 
-def _differing(rows: Bytes, example: Bytes) -> Bytes:
+def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
     """Return the bits in which any of the rows differs from the example, shape (size,)."""
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
@@ -206,7 +206,7 @@ def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
     return np.asarray(operation.reduce(folded))
 
 
-def repeats(
+def count_repetitions(
     data: Content, begin: int, fixed: Bytes, numbers: Sequence[tuple[int, int]]
 ) -> tuple[int, list[int]]:
     """Count the whole repetitions that follow the block at ``begin`` without a gap.
@@ -232,19 +232,21 @@ def repeats(
     >>> from d2rpick.histories.content import Content
     >>> blocks = Content(b"[d01:x][d02:y][d03:z][d05:x]")
     >>> fixed = np.frombuffer(b"~~00~0~", dtype=np.uint8) // 126 * 255
-    >>> repeats(blocks, 0, fixed, [(2, 2)])
+    >>> count_repetitions(blocks, 0, fixed, [(2, 2)])
     (2, [1])
     """
     run = Stretch(begin, fixed.size, (len(data) - begin) // fixed.size, begin)
     if fixed.size > _LONGEST:
         return 0, []
     numbers_of_blocks: list[NDArray[np.int64]] = []
-    like_example(
+    count_like_example(
         data,
         run,
         0,
         fixed,
-        take=lambda rows: numbers_of_blocks.append(_decimals(rows, numbers)),
+        take=lambda rows: numbers_of_blocks.append(
+            _decode_state_numbers(rows, numbers)
+        ),
     )
     states = np.concatenate(numbers_of_blocks)
     steps = np.diff(states[:2], axis=0)
@@ -256,7 +258,9 @@ def repeats(
     return (len(even) if even.all() else int(even.argmin())) - 1, steps[0].tolist()
 
 
-def _decimals(blocks: Bytes, fields: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+def _decode_state_numbers(
+    blocks: Bytes, fields: Sequence[tuple[int, int]]
+) -> NDArray[np.int64]:
     """Return the decimal numbers of each block, shape (blocks, fields); -1 if a byte of a number is not a digit."""
     numbers = np.empty((len(blocks), len(fields)), dtype=np.int64)
     for column, (offset, width) in enumerate(fields):
@@ -269,7 +273,7 @@ def _decimals(blocks: Bytes, fields: Sequence[tuple[int, int]]) -> NDArray[np.in
 
 
 @cache
-def _scales(decimals: int) -> tuple[Samples, Samples]:
+def _make_scales(decimals: int) -> tuple[Samples, Samples]:
     """Return factors and divisors of mantissas without point, by exponent and signs: one is 1, or NaN if inexact."""
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
@@ -281,14 +285,14 @@ def _scales(decimals: int) -> tuple[Samples, Samples]:
     )
 
 
-def number(text: bytes) -> float:
+def parse_number(text: bytes) -> float:
     """Return the value of a right-justified Fortran field, NaN if it is not a finite number.
 
     Examples
     --------
-    >>> [number(text) for text in (b"   4.87301E-03", b"   1.23457-100", b"   1.00000D+00", b"     1447")]
+    >>> [parse_number(text) for text in (b"   4.87301E-03", b"   1.23457-100", b"   1.00000D+00", b"     1447")]
     [0.00487301, 1.23457e-100, 1.0, 1447.0]
-    >>> [number(text) for text in (b"**************", b"      NaN", b"  1.0E+00 ", b"   1.0E+999")]
+    >>> [parse_number(text) for text in (b"**************", b"      NaN", b"  1.0E+00 ", b"   1.0E+999")]
     [nan, nan, nan, nan]
     """
     match = _NUMBER.fullmatch(text)
@@ -299,7 +303,7 @@ def number(text: bytes) -> float:
     return value if np.isfinite(value) else np.nan
 
 
-def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
+def parse_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     """Return the values of fixed-width fields, exactly those of ``float()``; NaN for a field that is not a number.
 
     Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
@@ -318,7 +322,7 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
 
     Examples
     --------
-    >>> decode(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
+    >>> parse_numbers(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
     [0.00487301, -805.0, 2e-20]
     """
     if not fields.size:
@@ -350,12 +354,12 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
         + shrinks * np.uint16(_SHRINKS)
         + negative * np.uint16(_NEGATIVE)
     )
-    factors, divisors = (table.take(scale) for table in _scales(decimals))
+    factors, divisors = (table.take(scale) for table in _make_scales(decimals))
     values *= factors
     values /= divisors
 
     far = usual & np.isnan(values)
     values[far] = [float(text) for text in fields[far].tolist()]
     for row in np.flatnonzero(~usual):
-        values[row] = number(fields[row : row + 1].tobytes())
+        values[row] = parse_number(fields[row : row + 1].tobytes())
     return values

@@ -51,12 +51,12 @@ _RULE: Final = "-=+|:_ \t"  # characters of a line drawn between rows or around 
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
-def split(line: str, separator: str | None) -> list[str]:
+def split_cells(line: str, separator: str | None) -> list[str]:
     """Split a line into its cells, without outer blanks and quotes; a separator inside quotes is part of its cell.
 
     Examples
     --------
-    >>> split('"part 3, left", 1.5 ,', ",")
+    >>> split_cells('"part 3, left", 1.5 ,', ",")
     ['part 3, left', '1.5', '']
     """
     if '"' not in line and separator is None:
@@ -94,12 +94,12 @@ def is_skipped(line: str) -> bool:
     return line.startswith(_RULE_STARTS) and len(line) > 2 and not line.strip(_RULE)
 
 
-def as_number(cell: str, decimal: str, thousands: str = "") -> float | None:
+def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
     """Return the number in a cell, or None; unlike Python's float, refuse words (``nan``) and underscores.
 
     Examples
     --------
-    >>> as_number("1.234,5", ",", "."), as_number("1.23,5", ",", "."), as_number("1,5D3", ",")
+    >>> parse_cell("1.234,5", ",", "."), parse_cell("1.23,5", ",", "."), parse_cell("1,5D3", ",")
     (1234.5, None, 1500.0)
     """
     number = _written_number(cell, decimal, thousands)

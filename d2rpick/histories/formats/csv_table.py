@@ -8,22 +8,27 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, if_written, listing
+from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import is_number, is_skipped, split
+from d2rpick.histories.formats.cells import is_number, is_skipped, split_cells
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import Layout, find_layout, unique, with_thousands
+from d2rpick.histories.formats.layout import (
+    Layout,
+    add_thousands,
+    find_layout,
+    number_duplicates,
+)
 from d2rpick.histories.formats.rows import find_line, read_columns
-from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
+from d2rpick.histories.formats.text import UTF16, Text, find_precisions, is_whole_field
 from d2rpick.histories.meaning import (
     find_internal_energies,
     find_meaning,
+    find_quantity,
     is_time,
-    quantity_of,
     refuse_other_quantity,
 )
-from d2rpick.histories.names import meant, near_miss
-from d2rpick.histories.samples import count_rows_per_time, of_one_run
+from d2rpick.histories.names import match_names, suggest_name
+from d2rpick.histories.samples import check_one_run, count_rows_per_time
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,14 +58,14 @@ _ROW_NUMBERS: Final = frozenset(
 )
 
 
-def labelled(layout: Layout, time: int) -> dict[str, int]:
+def label_columns(layout: Layout, time: int) -> dict[str, int]:
     """Return the columns apart from the time by their names; a name that is not unique gets the column number."""
-    names = unique([*map(layout.channel, range(layout.trusted))], "column")
-    times = {time, *own_times(layout)}
+    names = number_duplicates([*map(layout.channel, range(layout.trusted))], "column")
+    times = {time, *find_own_times(layout)}
     return {name: column for column, name in enumerate(names) if column not in times}
 
 
-def own_times(layout: Layout) -> tuple[int, ...]:
+def find_own_times(layout: Layout) -> tuple[int, ...]:
     """Return the time columns of curves side by side, each with its own times (x, y, x, y); () for another table."""
     times = tuple(
         column for column in range(0, layout.trusted, 2) if is_time(layout.name(column))
@@ -73,7 +78,9 @@ def own_times(layout: Layout) -> tuple[int, ...]:
     return times
 
 
-def numeric_columns(layout: Layout, sample: Sequence[Sequence[str]]) -> frozenset[int]:
+def find_numeric_columns(
+    layout: Layout, sample: Sequence[Sequence[str]]
+) -> frozenset[int]:
     """Return the columns with a number in at least one sampled row; all columns if there is no row."""
     columns = range(layout.columns)
     if not sample:
@@ -85,14 +92,14 @@ def numeric_columns(layout: Layout, sample: Sequence[Sequence[str]]) -> frozense
     )
 
 
-def _sampled_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
+def _sample_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
     """Return the cells of sampled rows, from the start, from the end and evenly between."""
     lines = [line for line in text.sample(begin) if not is_skipped(line)]
-    rows = [split(line, layout.separator) for line in lines]
+    rows = [split_cells(line, layout.separator) for line in lines]
     return [row for row in rows if len(row) >= layout.columns]
 
 
-def time_column(
+def find_time_column(
     source: str,
     layout: Layout,
     wanted: str | None,
@@ -105,17 +112,19 @@ def time_column(
     named like row numbers.
     """
     if wanted is not None:
-        return named_column(source, layout, wanted), []
+        return find_column(source, layout, wanted), []
     times = [
         i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)
     ]
-    if own_times(layout):
+    if find_own_times(layout):
         if energies:
-            return named_column(source, layout, energies[0]) // 2 * 2, []
-        return internal_energy(source, layout, times, numeric) // 2 * 2, []
+            return find_column(source, layout, energies[0]) // 2 * 2, []
+        return find_internal_energy(source, layout, times, numeric) // 2 * 2, []
     if len(times) > 1:
         problem = f"{source}: {len(times)} columns are named like a time"
-        raise FormatError(f"{problem}; choose with `time`: {_menu(layout, times)}")
+        raise FormatError(
+            f"{problem}; choose with `time`: {_list_columns(layout, times)}"
+        )
     if times:
         return times[0], []
     if not layout.names:
@@ -128,7 +137,7 @@ def time_column(
     if not candidates:
         problem = f"{source}: no column has the name of a time"
         raise FormatError(
-            f"{problem}; choose with `time`: {_menu(layout, range(layout.columns))}"
+            f"{problem}; choose with `time`: {_list_columns(layout, range(layout.columns))}"
         )
     first = candidates[0]
     return first, [
@@ -136,7 +145,7 @@ def time_column(
     ]
 
 
-def internal_energy(
+def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
     """Return the only numeric column apart from the times, or else the only one named like an internal energy."""
@@ -156,42 +165,42 @@ def internal_energy(
     if len(energies) == 1:
         return energies[0]
     count = f"{len(energies)} columns are" if energies else "no column is"
-    menu = _menu(layout, energies or candidates)
+    menu = _list_columns(layout, energies or candidates)
     raise FormatError(
         f"{source}: {count} named like an internal energy; choose with `energy`: {menu}"
     )
 
 
-def named_column(source: str, layout: Layout, wanted: str) -> int:
+def find_column(source: str, layout: Layout, wanted: str) -> int:
     """Return the column with this name or 1-based number; raise FormatError if there is none, or several."""
-    columns = meant(wanted, layout.names)
+    columns = match_names(wanted, layout.names)
     if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
         columns = [*({*columns} | {int(wanted) - 1})]
     if not columns:
-        problem = f"{source}: no column {wanted!r}{near_miss(wanted, layout.names)}"
-        menu = _menu(layout, range(layout.columns))
+        problem = f"{source}: no column {wanted!r}{suggest_name(wanted, layout.names)}"
+        menu = _list_columns(layout, range(layout.columns))
         raise FormatError(f"{problem}; there are: {menu}")
     if len(columns) > 1:
-        problem = f"{source}: {wanted!r} may be any of these columns: {_menu(layout, columns)}"
+        problem = f"{source}: {wanted!r} may be any of these columns: {_list_columns(layout, columns)}"
         raise FormatError(f"{problem}; choose by another name or number")
     if columns[0] >= layout.trusted:
         raise FormatError(
             f"{source}: the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes "
             f"such files), so the name of column {columns[0] + 1} is not sure; "
-            f"only these may be used: {_menu(layout, range(layout.trusted))}"
+            f"only these may be used: {_list_columns(layout, range(layout.trusted))}"
         )
     return columns[0]
 
 
-def _unsure_columns(layout: Layout) -> str:
+def _note_unsure_columns(layout: Layout) -> str:
     """Return the note on a header with more or fewer names than columns."""
     problem = f"the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes such files)"
     return f"{problem}: only the first {layout.trusted} columns are sure to have their own name and are used"
 
 
-def _menu(layout: Layout, columns: Sequence[int]) -> str:
+def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
     """Return numbers and names of the columns that can be chosen."""
-    return listing([f"{column + 1} {layout.name(column)!r}" for column in columns])
+    return list_names([f"{column + 1} {layout.name(column)!r}" for column in columns])
 
 
 def recognises(head: bytes) -> bool:
@@ -217,18 +226,18 @@ class Table(Database):
         self.source, self._text = text.name, text
         layout = find_layout(text)
         self._begin = text.place(layout.start)
-        sample = _sampled_rows(text, self._begin, layout)
-        self._layout = layout = with_thousands(layout, sample)
+        sample = _sample_rows(text, self._begin, layout)
+        self._layout = layout = add_thousands(layout, sample)
         # cells of the sampled rows, with decimal points
         self._sample = sample
         if layout.decimal != "." or layout.thousands:
             self._sample = [[layout.plain(cell) for cell in row] for row in sample]
-        self._numeric = numeric_columns(layout, self._sample)
-        self._own_times = own_times(layout)
-        self._time, notes = time_column(
+        self._numeric = find_numeric_columns(layout, self._sample)
+        self._own_times = find_own_times(layout)
+        self._time, notes = find_time_column(
             text.name, layout, selection.time, selection.energy, self._numeric
         )
-        self._columns = labelled(layout, self._time)
+        self._columns = label_columns(layout, self._time)
         self.channels, left_out = self._split_channels()
         self.time_unit = layout.unit(self._time)
         self._failed: dict[int, FormatError] = {}
@@ -237,7 +246,9 @@ class Table(Database):
         self._read: dict[int, Samples] = {}
         self._together = True  # until a row shows that a column is not numeric
         if not is_skipped(text.unended):
-            self.complete = _is_whole(text.unended, self._sample, layout, self._needed)
+            self.complete = _is_whole_row(
+                text.unended, self._sample, layout, self._needed
+            )
             if self.complete:
                 text.take_rest()
             else:
@@ -245,13 +256,13 @@ class Table(Database):
                     "the last line has no line end and may be cut; it was left out"
                 )
         if layout.sure not in (None, layout.columns) and layout.columns > 2:
-            notes.append(_unsure_columns(layout))
+            notes.append(_note_unsure_columns(layout))
         self._notes += [*notes, *left_out]
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]
         """Notes on what was assumed and left out; complete only once the needed columns were read."""
-        if_written(lambda: self.time)
+        give_if_written(lambda: self.time)
         return tuple(self._notes)
 
     def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:
@@ -272,7 +283,7 @@ class Table(Database):
     @property
     def energy_channel(self) -> str:
         """The column named like an internal energy, or the only one apart from the time; FormatError otherwise."""
-        column = internal_energy(
+        column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
         return next(
@@ -283,7 +294,7 @@ class Table(Database):
         """Return the channel name of a column given by its name or 1-based number; FormatError lists the columns."""
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
-        column = named_column(self.source, self._layout, wanted)
+        column = find_column(self.source, self._layout, wanted)
         labels = [
             name for name, position in self._columns.items() if position == column
         ]
@@ -298,7 +309,7 @@ class Table(Database):
     def time(self) -> Samples:
         """Times as in the file, shape (n,) [time]; FormatError if they are not those of one run."""
         find_row = partial(find_line, self._text, self._begin, self._layout, self._time)
-        times = of_one_run(
+        times = check_one_run(
             self._values(self._time), lambda state: f"{self.source}:{find_row(state)}"
         )
         if count_rows_per_time(times) > 1:
@@ -311,7 +322,7 @@ class Table(Database):
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
         for column in self._needed[1:]:
-            energy = if_written(partial(self._values, column))
+            energy = give_if_written(partial(self._values, column))
             if energy is not None and energy.size == times.size:
                 rows = self._sample[: self._text.some]
                 printed = {
@@ -324,7 +335,7 @@ class Table(Database):
         """Return one column, shape (n,); raise FormatError with the line of a value that is not a number."""
         if name not in self._columns:
             raise FormatError(
-                f"{self.source}: no column {name!r}, only {listing(self.channels)}"
+                f"{self.source}: no column {name!r}, only {list_names(self.channels)}"
             )
         column = self._columns[name]
         time = column - 1 if column - 1 in self._own_times else self._time
@@ -343,7 +354,7 @@ class Table(Database):
         """Return the precision with which the times and these columns were printed."""
         times = [row[self._time] for row in self._printed]
         energies = [row[self._columns[name]] for row in self._printed for name in names]
-        return precisions(times, energies, self.time)
+        return find_precisions(times, energies, self.time)
 
     @cached_property
     def _printed(self) -> list[list[str]]:
@@ -372,7 +383,7 @@ class Table(Database):
             quantities = [
                 position
                 for name, position in self._columns.items()
-                if quantity_of(name)
+                if find_quantity(name)
             ]
             wanted = {*self._needed, *quantities, column}
             if self._read:
@@ -414,15 +425,15 @@ class Table(Database):
             self._read[column] = values
 
 
-def _is_whole(
+def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
     """Return True if a line without end has all values, and its last one is unused or has a constant printed length."""
-    cells = split(line, layout.separator)
+    cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
         return len(cells) >= layout.columns
-    return is_whole(layout.plain(cells[last]), [row[last] for row in sample])
+    return is_whole_field(layout.plain(cells[last]), [row[last] for row in sample])
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import as_number
-from d2rpick.histories.formats.layout import unique
-from d2rpick.histories.formats.text import is_whole, precisions
+from d2rpick.histories.formats.cells import parse_cell
+from d2rpick.histories.formats.layout import number_duplicates
+from d2rpick.histories.formats.text import find_precisions, is_whole_field
 from d2rpick.histories.meaning import (
     find_internal_energies,
     is_time,
     refuse_other_quantity,
 )
-from d2rpick.histories.names import Selection, resolve, unit_of
-from d2rpick.histories.samples import of_one_run
+from d2rpick.histories.names import Selection, find_unit, resolve_name
+from d2rpick.histories.samples import check_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ _FEWEST_LABELS: Final = 3
 _MOST_DIGITS: Final = 12  # of a number of pairs; a longer one is damaged
 
 
-class _Curve:
+class _TextCurve:
     """A curve: its name, its pairs as text cells, and the line numbers of the pairs."""
 
     def __init__(self, name: str) -> None:
@@ -60,7 +60,7 @@ class _Curve:
 def find_curves(text: Text, selection: Selection) -> Curves | None:
     """Read a text of curves, with the times of the first curve of the selection; return None for any other text."""
     curves = _CurveText(text)
-    for read in (_curveplot, _t_his, _dynaform, _counted):
+    for read in (_read_curveplot, _read_t_his, _read_dynaform, _read_xy_pairs):
         if read(curves):
             return Curves(curves, selection)
     return None
@@ -72,7 +72,7 @@ class _CurveText:
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
         self.unended = bool(text.unended.strip())
-        self.curves: list[_Curve] = []
+        self.curves: list[_TextCurve] = []
         self.x_label = self.time_unit = ""
         self.stops = ""
         self.last = 0  # number of the last line
@@ -80,15 +80,17 @@ class _CurveText:
     def top(self, count: int) -> list[str]:
         """Return the first lines that are neither blank nor comments."""
         unended = [self._text.unended] if self._text.is_short else []
-        return list(islice(filter(_counts, chain(self._text.head, unended)), count))
+        return list(
+            islice(filter(_has_content, chain(self._text.head, unended)), count)
+        )
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield number and text of all lines that are neither blank nor comments."""
         for number, line in enumerate(self._text.lines(0), 1):
             self.last = number
-            if _counts(line):
+            if _has_content(line):
                 yield number, line
-        if _counts(self._text.unended):
+        if _has_content(self._text.unended):
             self.last += 1
             yield self.last, self._text.unended
 
@@ -129,10 +131,10 @@ class Curves(Database):
 
     def __init__(self, text: _CurveText, selection: Selection) -> None:
         self.source = text.source
-        self.time_unit = unit_of(text.x_label) or text.time_unit
+        self.time_unit = find_unit(text.x_label) or text.time_unit
         self._curves = dict(
             zip(
-                unique([curve.name for curve in text.curves], "curve"),
+                number_duplicates([curve.name for curve in text.curves], "curve"),
                 text.curves,
                 strict=True,
             )
@@ -145,7 +147,7 @@ class Curves(Database):
             )
         last = text.curves[-1]
         breaks_off = text.unended and bool(last.times) and last.lines[-1] == text.last
-        cut = breaks_off and not is_whole(last.values[-1], last.values[:-1])
+        cut = breaks_off and not is_whole_field(last.values[-1], last.values[:-1])
         if cut:
             for cells in (last.times, last.values, last.lines):
                 cells.pop()
@@ -183,14 +185,14 @@ class Curves(Database):
             and 0 < int(wanted) <= len(self.channels)
         ):
             return self.channels[int(wanted) - 1]
-        return resolve(wanted, self.channels, self.source)
+        return resolve_name(wanted, self.channels, self.source)
 
     @cached_property
     def time(self) -> Samples:
         """Times of the first requested curve, shape (n,) [time]."""
         name = self.find(self._asked[0]) if self._asked else self.energy_channel
         lines = self._curves[name].lines
-        return of_one_run(
+        return check_one_run(
             self._numbers(name, "times"),
             lambda state: f"{self.source}:{lines[state]}, {name!r}",
         )
@@ -210,14 +212,14 @@ class Curves(Database):
         curves = [self._curves[name] for name in names or self.channels[:1]]
         times = [cell for curve in curves for cell in curve.times]
         values = [cell for curve in curves for cell in curve.values]
-        return precisions(times, values, self.time)
+        return find_precisions(times, values, self.time)
 
     def _numbers(self, name: str, axis: str) -> Samples:
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
         # None becomes NaN
-        numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)
+        numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
             line = curve.lines[bad[0]]
@@ -230,12 +232,12 @@ class Curves(Database):
 
     def _menu(self) -> str:
         """Return numbers and names of the curves that can be chosen."""
-        return listing(
+        return list_names(
             [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
         )
 
 
-def _curveplot(text: _CurveText) -> bool:
+def _read_curveplot(text: _CurveText) -> bool:
     """Read a Curveplot of LS-PrePost; return False for any other text."""
     word, *labels = [line.strip() for line in text.top(4)] or [""]
     if word != "Curveplot":
@@ -247,7 +249,7 @@ def _curveplot(text: _CurveText) -> bool:
         if mark and digits.isdecimal():
             points = text.count(number, digits)
             text.curves.append(
-                _Curve(name if name == y_label else f"{name}: {y_label}")
+                _TextCurve(name if name == y_label else f"{name}: {y_label}")
             )
             text.stops = f"the curve {name!r}"
         elif line.strip() == "endcurve" and text.stops:
@@ -261,27 +263,27 @@ def _curveplot(text: _CurveText) -> bool:
     return True
 
 
-def _t_his(text: _CurveText) -> bool:
+def _read_t_his(text: _CurveText) -> bool:
     """Read a .cur file of T/HIS; return False for any other text."""
-    top = [_without_type(line) for line in text.top(5)]
+    top = [_remove_type(line) for line in text.top(5)]
     # the title may be blank, so the x label is the first or second label
     labels = list(takewhile(lambda line: not _is_pair(line), top))
     x_label = next((i for i in (0, 1) if i < len(labels) and is_time(labels[i])), None)
     if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):
         return False
     text.x_label = labels[x_label]
-    text.time_unit = _unit_of_type(text.top(5)[x_label])
+    text.time_unit = _find_unit_of_type(text.top(5)[x_label])
     labels = []
     in_head = True
     for number, line in text.lines():
         if line.strip().upper() == "CONTINUE":
             in_head, labels = True, []
         elif in_head and not _is_pair(line):
-            labels.append(_without_type(line))
+            labels.append(_remove_type(line))
         else:
             if in_head:
                 text.curves.append(
-                    _Curve(
+                    _TextCurve(
                         ": ".join(reversed(labels[-2:]))
                         or f"curve {len(text.curves) + 1}"
                     )
@@ -291,25 +293,27 @@ def _t_his(text: _CurveText) -> bool:
     return True
 
 
-def _without_type(line: str) -> str:
+def _remove_type(line: str) -> str:
     """Return a label without its type and factor.
 
     Examples
     --------
-    >>> _without_type(" Time <TIME/0.001>;"), _unit_of_type("Time <TIME/1.0E-3>;"), _unit_of_type("Time <TIME>;")
-    ('Time', 'ms', '')
+    >>> _remove_type(" Time <TIME/0.001>;")
+    'Time'
+    >>> _find_unit_of_type("Time <TIME/1.0E-3>;"), _find_unit_of_type("Time <TIME>;")
+    ('ms', '')
     """
     return re.sub(_TYPE, "", line.strip()[:_LONGEST_LABEL]).strip()
 
 
-def _unit_of_type(line: str) -> str:
+def _find_unit_of_type(line: str) -> str:
     """Return the unit of time that the factor of a label stands for, empty if there is none."""
     match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
-    factor = as_number(match[2].strip(), ".") if match and match[2] else None
+    factor = parse_cell(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")
 
 
-def _dynaform(text: _CurveText) -> bool:
+def _read_dynaform(text: _CurveText) -> bool:
     """Read a text of curves from DYNAFORM; return False for any other text."""
     top = text.top(2)
     if (
@@ -324,7 +328,7 @@ def _dynaform(text: _CurveText) -> bool:
     expected = text.count(number, first.strip())
     for number, line in lines:
         if start := head.fullmatch(line):
-            text.curves.append(_Curve(start[1].strip()))
+            text.curves.append(_TextCurve(start[1].strip()))
         else:
             text.add(number, line)
     if len(text.curves) < expected:
@@ -332,7 +336,7 @@ def _dynaform(text: _CurveText) -> bool:
     return True
 
 
-def _counted(text: _CurveText) -> bool:
+def _read_xy_pairs(text: _CurveText) -> bool:
     """Read the XY pairs of LS-PrePost; return False for any other text."""
     top = text.top(2)
     if len(top) < 2 or not top[0].strip().isdecimal() or not _is_pair(top[1]):
@@ -343,7 +347,7 @@ def _counted(text: _CurveText) -> bool:
             if text.stops:
                 text.close(number, points)
             points = text.count(number, line.strip())
-            text.curves.append(_Curve(f"curve {len(text.curves) + 1}"))
+            text.curves.append(_TextCurve(f"curve {len(text.curves) + 1}"))
             text.stops = f"the {text.curves[-1].name}"
         else:
             text.add(number, line)
@@ -352,7 +356,7 @@ def _counted(text: _CurveText) -> bool:
     return True
 
 
-def _counts(line: str) -> bool:
+def _has_content(line: str) -> bool:
     """Return True if a line is neither blank nor a comment."""
     return bool(line.strip()) and line[0] != "$"
 
@@ -360,4 +364,4 @@ def _counts(line: str) -> bool:
 def _is_pair(line: str) -> bool:
     """Return True if a line is a pair of numbers."""
     cells = line.replace(",", " ").split()
-    return len(cells) == 2 and all(as_number(cell, ".") is not None for cell in cells)
+    return len(cells) == 2 and all(parse_cell(cell, ".") is not None for cell in cells)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.contact_forces import ContactForce
-from d2rpick.histories.content import content_of
+from d2rpick.histories.content import make_content
 from d2rpick.histories.database import DIGITS, Database
-from d2rpick.histories.formats.d3plot_head import GLOBALS, Head, read_head
-from d2rpick.histories.formats.d3plot_words import END, family_of
+from d2rpick.histories.formats.d3plot_head import GLOBALS, Head, read_d3plot_head
+from d2rpick.histories.formats.d3plot_words import END, detect_family
 from d2rpick.histories.names import number_in_family
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ _TAIL: Final = 1 << 16  # bytes at the end of a file in which its end mark is se
 
 def recognises(head: bytes) -> bool:
     """Return True if these first bytes are those of a d3plot or d3part; never raises."""
-    return family_of(head) in ("d3plot", "d3part")
+    return detect_family(head) in ("d3plot", "d3part")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
@@ -99,11 +99,11 @@ class D3plot(Database):
 
     def __init__(self, first: Source, other_files: Mapping[int, Source]) -> None:
         files = [first, *(other_files[number] for number in sorted(other_files))]
-        self._head = head = read_head(content_of(first.data), first.name)
+        self._head = head = read_d3plot_head(make_content(first.data), first.name)
         self.source = first.name
         if len(files) > 1:
             self.source = f"{first.name} and {len(files) - 1} files after it"
-        states = _states_of(files, head)
+        states = _read_states(files, head)
         self._rows = states.rows
         self.title, self.version, self.parts, self.no_parts = (
             head.title,
@@ -114,7 +114,7 @@ class D3plot(Database):
         self.digits = DIGITS[head.form.width]
         walls = [_WALL.format(number) for number in range(1, head.walls + 1)]
         self.channels = (*_MODEL, *walls)
-        missing = _missing(first.name, sorted(other_files))
+        missing = _note_missing_files(first.name, sorted(other_files))
         self.complete = not missing and states.ended
         self.notes = (*missing, *states.notes)
 
@@ -132,7 +132,7 @@ class D3plot(Database):
         """Return a value of the whole model, or the force of a rigid wall, shape (n,)."""
         if name not in self.channels:
             raise FormatError(
-                f"{self.source}: no {name}, there are {listing(self.channels)}; ask for one of these"
+                f"{self.source}: no {name}, there are {list_names(self.channels)}; ask for one of these"
             )
         index = self.channels.index(name)
         # the forces of rigid walls come after the values of the parts
@@ -164,8 +164,8 @@ class D3plot(Database):
             raise FormatError(self.no_parts)
         index_of = {part.id: index for index, part in enumerate(self.parts)}
         if missing := [id_ for id_ in ids if id_ not in index_of]:
-            problem = f"{self.source}: no part {listing(missing)}"
-            raise FormatError(f"{problem}; choose from {listing(list(index_of))}")
+            problem = f"{self.source}: no part {list_names(missing)}"
+            raise FormatError(f"{problem}; choose from {list_names(list(index_of))}")
         indices = np.array([index_of[id_] for id_ in ids], np.intp)
         if quantity in _MOMENTA:
             velocity = self.part_channel(_VELOCITIES[_MOMENTA.index(quantity)], ids)
@@ -186,11 +186,11 @@ class D3plot(Database):
         return self._rows[:, index].astype(np.float64)
 
 
-def _states_of(files: Sequence[Source], head: Head) -> _States:
+def _read_states(files: Sequence[Source], head: Head) -> _States:
     """Read the first words of all states of a family; in its first file the states begin after the head."""
     real = head.form.real
     values = 1 + head.globals
-    contents = [content_of(file.data) for file in files]
+    contents = [make_content(file.data) for file in files]
     begins = [head.begin] + [0] * (len(files) - 1)
     counts = [
         max(0, len(content) - begin) // head.state
@@ -214,14 +214,14 @@ def _states_of(files: Sequence[Source], head: Head) -> _States:
     if (
         first_is_empty
         and set(first_words_after[1:]) == {end_mark}
-        and _ascend(rows[:, 0], ends)
+        and _is_ascending(rows[:, 0], ends)
     ):
         return _States(rows)  # the usual case, without a look at each file
     states_of_files = []
     for file, begin, piece, word in zip(
         files, begins, np.split(rows, ends[:-1]), first_words_after, strict=True
     ):
-        states_of_files.append(_whole_states(file, head, begin, piece, word))
+        states_of_files.append(_check_states(file, head, begin, piece, word))
     notes = tuple(note for states in states_of_files for note in states.notes)
     return _States(
         np.concatenate([states.rows for states in states_of_files]),
@@ -230,7 +230,7 @@ def _states_of(files: Sequence[Source], head: Head) -> _States:
     )
 
 
-def _ascend(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
+def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
     """Return True if times are finite and ascend in each file; ``ends`` counts the states up to the end of each."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
@@ -239,11 +239,11 @@ def _ascend(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
 
-def _whole_states(
+def _check_states(
     file: Source, head: Head, begin: int, rows: Rows, word_after: bytes
 ) -> _States:
     """Return the states of one file up to its end mark; ``word_after`` is the word after the last whole state."""
-    content = content_of(file.data)
+    content = make_content(file.data)
     name = file.name
     ends = np.flatnonzero(rows[:, 0] == END)
     if ends.size:
@@ -267,10 +267,12 @@ def _whole_states(
         raise FormatError(
             f"{problem}, not {time[first]:g}; the file is damaged, copy it again"
         )
-    return _States(rows, ended, () if ended else (_cut(content, name, end, rows),))
+    return _States(
+        rows, ended, () if ended else (_note_cut_file(content, name, end, rows),)
+    )
 
 
-def _cut(content: Content, name: str, end: int, rows: Rows) -> str:
+def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
     """Return the note on a file that does not end with its end mark."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
@@ -299,7 +301,7 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
         raise FormatError(f"{problem}; {cure}")
 
 
-def _missing(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
+def _note_missing_files(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
     """Return a note on the file numbers that a family leaves out."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
@@ -311,5 +313,5 @@ def _missing(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"{first}: of the files after it {listing(names, most=5)} are not there; are they missing?",
+        f"{first}: of the files after it {list_names(names, most=5)} are not there; are they missing?",
     )

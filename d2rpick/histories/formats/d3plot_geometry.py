@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.histories.formats.d3plot_words import CONTROL, LONG_IDS, dimensions_of
-from d2rpick.histories.names import plain_text
+from d2rpick.histories.formats.d3plot_words import CONTROL, LONG_IDS, count_dimensions
+from d2rpick.histories.names import clean_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -111,7 +111,7 @@ class Geometry:
         """Skip nodes and elements; the two additional nodes of solids follow the solids or, in other releases, all."""
         control = self._control
         solids = abs(self._control["nel8"])
-        self.at += dimensions_of(control) * control["numnp"] + 9 * solids
+        self.at += count_dimensions(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
         # where the section of numbers begins shows where the additional nodes are
@@ -216,7 +216,7 @@ class Titles:
         """Read the section that begins here; return False if it is not a section of titles."""
         (kind,), width = self._integers(1), self._words.form.width
         if kind == _RUN_TITLE:
-            self.of_run = plain_text(self._words.bytes(self.at + width, _TITLE))
+            self.of_run = clean_text(self._words.bytes(self.at + width, _TITLE))
             self.at += width + _TITLE
             return True
         if kind not in (_PART_TITLES, _KEYWORDS, *_OTHER_TITLES):
@@ -231,7 +231,7 @@ class Titles:
                         rows[begin : begin + width], self._words.form.integer
                     )[0]
                 )
-                self.of_parts[id_] = plain_text(rows[begin + width : begin + size])
+                self.of_parts[id_] = clean_text(rows[begin + width : begin + size])
         self.at += 2 * width + len(rows)
         return True
 

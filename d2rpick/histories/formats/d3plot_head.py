@@ -15,10 +15,10 @@ from d2rpick.histories.formats.d3plot_words import (
     HEAD,
     Form,
     Words,
-    dimensions_of,
-    form_of,
+    count_dimensions,
+    detect_form,
 )
-from d2rpick.histories.names import Part, plain_text
+from d2rpick.histories.names import Part, clean_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,7 +58,7 @@ class Head(NamedTuple):
     no_parts: str
 
 
-def read_head(content: Content, source: str) -> Head:
+def read_d3plot_head(content: Content, source: str) -> Head:
     """Read the head of the first file of a family.
 
     Raises
@@ -66,7 +66,7 @@ def read_head(content: Content, source: str) -> Head:
     FormatError
         If the file ends within its head, is packed by femzip, or a section does not end where it should.
     """
-    form = form_of(content[:HEAD])
+    form = detect_form(content[:HEAD])
     if form is None:
         raise FormatError(
             f"{source}: this is not the first file of a d3plot or d3thdt; name the first file of the run"
@@ -84,39 +84,39 @@ def read_head(content: Content, source: str) -> Head:
     geometry.pass_over()
     titles = Titles(words, geometry.at * form.width)
     titles.read()
-    number = _number_of_parts(control)
-    values, no_parts = _values_of_parts(control["nglbv"], number, source)
-    ids = _ids_by(geometry, titles, number) if values else ()
+    number = _count_parts(control)
+    values, no_parts = _count_values_of_part(control["nglbv"], number, source)
+    ids = _order_ids(geometry, titles, number) if values else ()
     if len({*ids}) < len(ids):
         raise words.damaged("the id of a part twice")
     parts = tuple(Part(id_, titles.of_parts.get(id_, "")) for id_ in ids)
-    state = form.width * _words_of_state(control, geometry)
+    state = form.width * _count_words_of_state(control, geometry)
     if state < form.width * (1 + control["nglbv"]):
         raise words.damaged(
             f"states of {state} bytes, too few for the values of the model,"
         )
     return Head(
         form=form,
-        title=plain_text(content[: 10 * form.width]) or titles.of_run,
+        title=clean_text(content[: 10 * form.width]) or titles.of_run,
         version=words.version(),
         begin=titles.at,
         state=state,
         globals=control["nglbv"],
         parts=parts,
         part_values=values,
-        walls=_walls(control["nglbv"], len(parts), values, words),
+        walls=_count_walls(control["nglbv"], len(parts), values, words),
         no_parts=no_parts,
     )
 
 
-def _number_of_parts(control: Mapping[str, int]) -> int:
+def _count_parts(control: Mapping[str, int]) -> int:
     """Return the number of parts, which older files give for each kind of element."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )
 
 
-def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
+def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
     """Return the ids of the parts in the order of their values.
 
     A file of parts that are numbered consecutively has no list of their ids; the titles have their ids too.
@@ -128,7 +128,7 @@ def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
     return lists[0]
 
 
-def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
+def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, str]:
     """Return the number of quantities of a part (7, fewer in older files), or 0 and the reason why there are none."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
@@ -144,7 +144,7 @@ def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
     return per_part, ""
 
 
-def _walls(values: int, parts: int, of_part: int, words: Words) -> int:
+def _count_walls(values: int, parts: int, of_part: int, words: Words) -> int:
     """Return the number of rigid walls, whose forces follow the values of the parts; 0 if they cannot be told apart.
 
     Releases with a name (R9 and later) are newer than 971, although the number in their files is 960.
@@ -155,7 +155,7 @@ def _walls(values: int, parts: int, of_part: int, words: Words) -> int:
     return of_walls // per_wall if parts and of_walls % per_wall == 0 else 0
 
 
-def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
+def _count_words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
     """Count the words of a state: time, global values, nodes, elements, deleted elements, SPH, airbags, roads."""
     solids = abs(control["nel8"])
     elements = (
@@ -171,11 +171,18 @@ def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
         + 6 * geometry.roads
         + geometry.rigid_bodies * words_of_body
     )
-    nodes = control["numnp"] * _values_of_node(control)
-    return 1 + control["nglbv"] + nodes + elements + _deletions(control) + special
+    nodes = control["numnp"] * _count_words_of_node(control)
+    return (
+        1
+        + control["nglbv"]
+        + nodes
+        + elements
+        + _count_deletion_words(control)
+        + special
+    )
 
 
-def _values_of_node(control: Mapping[str, int]) -> int:
+def _count_words_of_node(control: Mapping[str, int]) -> int:
     """Count the words of a node in a state."""
     vectors = sum(control[name] != 0 for name in ("iu", "iv", "ia"))
     heat = control["it"] % 10
@@ -184,7 +191,7 @@ def _values_of_node(control: Mapping[str, int]) -> int:
     residuals = control["idtdt"] // 10 % 10 == 1
     contact = control["penout"] + (control["engout"] == 1)
     return (
-        dimensions_of(control) * vectors
+        count_dimensions(control) * vectors
         + _THERMAL.get(heat, 0)
         + scaled_mass
         + rates
@@ -193,7 +200,7 @@ def _values_of_node(control: Mapping[str, int]) -> int:
     )
 
 
-def _deletions(control: Mapping[str, int]) -> int:
+def _count_deletion_words(control: Mapping[str, int]) -> int:
     """Count the words that mark deleted elements or nodes."""
     if control["maxint"] <= _BY_ELEMENT:
         return (

@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.names import plain_text
+from d2rpick.histories.names import clean_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -57,7 +57,7 @@ class Form(NamedTuple):
         return np.dtype(f"{self.order}i{self.width}")
 
 
-def form_of(head: bytes) -> Form | None:
+def detect_form(head: bytes) -> Form | None:
     """Return the form of the numbers in a file with these first bytes; None if it belongs to no known family."""
     for form in (Form(width, order) for width in (4, 8) for order in "<>"):
         if len(head) < CONTROL * form.width:
@@ -72,9 +72,9 @@ def form_of(head: bytes) -> Form | None:
     return None
 
 
-def family_of(head: bytes) -> str | None:
+def detect_family(head: bytes) -> str | None:
     """Return the family (d3plot, d3thdt or d3part) of a file with these first bytes; None if there is none."""
-    form = form_of(head)
+    form = detect_form(head)
     if form is None:
         return None
     words = np.frombuffer(head[: CONTROL * form.width], form.integer)
@@ -115,7 +115,7 @@ class Words:
 
     def version(self) -> str:
         """Return solver and name of the release, such as LS-DYNA R920; older files have no name."""
-        name = plain_text(self.bytes(_RELEASE * self.form.width, 4))
+        name = clean_text(self.bytes(_RELEASE * self.form.width, 4))
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
     def integers(self, word: int, count: int) -> tuple[int, ...]:
@@ -147,6 +147,6 @@ class Words:
         return self._content[at : at + size]
 
 
-def dimensions_of(control: Mapping[str, int]) -> int:
+def count_dimensions(control: Mapping[str, int]) -> int:
     """Return the number of coordinates of a node; the control word has flags above 3."""
     return min(control["ndim"], 3)

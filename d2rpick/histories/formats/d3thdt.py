@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.histories.formats import d3plot
-from d2rpick.histories.formats.d3plot_words import family_of
+from d2rpick.histories.formats.d3plot_words import detect_family
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def recognises(head: bytes) -> bool:
     """Return True if these first bytes are those of a d3thdt; never raises."""
-    return family_of(head) == "d3thdt"
+    return detect_family(head) == "d3thdt"
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[d3plot.D3plot]:

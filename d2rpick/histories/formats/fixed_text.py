@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.content import content_of, line_at
+from d2rpick.histories.content import count_line_number, make_content
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import (
     UNSURE,
     BlockLayout,
     Grammar,
     Stretch,
-    decode,
-    head,
-    like_example,
+    count_like_example,
+    parse_numbers,
+    read_head_of_listing,
 )
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ class Blocks(Database):
         ahead: Sequence[Hashable] = (),
     ) -> None:
         self.source = source
-        self.title, self.version, self._begin = head(data)
-        self._data = content_of(data)
+        self.title, self.version, self._begin = read_head_of_listing(data)
+        self._data = make_content(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         # Packed, so that a file whose blocks all differ does not fill the memory.
@@ -146,7 +146,7 @@ class Blocks(Database):
                 is_scattered[rows] = False
             else:  # write the addresses first; the numbers replace them below
                 np.add(
-                    _starts(run, 0, run.repeats),
+                    _compute_starts(run, 0, run.repeats),
                     offsets,
                     out=values[rows].view(np.int64),
                 )
@@ -197,17 +197,17 @@ class Blocks(Database):
         for begin in range(0, run.repeats if moves.any() else 0, step):
             end = min(begin + step, run.repeats)
             if taken is None:
-                addresses = (_starts(run, begin, end) + offsets[moving]).ravel()
+                addresses = (_compute_starts(run, begin, end) + offsets[moving]).ravel()
                 numbers = self._decoded(addresses)
             else:
                 fields = taken[begin:end, moving].ravel()
-                numbers = decode(fields, self._grammar.decimals)
+                numbers = parse_numbers(fields, self._grammar.decimals)
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
         """Return the numbers at these addresses, NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
-        return decode(
+        return parse_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
         )
 
@@ -222,7 +222,7 @@ class Blocks(Database):
             run.start + state * run.stride + int(self._offsets(run, names)[column])
         )
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
-        problem = f"{self.source}:{line_at(self._data, address)}: {_spoken(names[column])} is {text!r}"
+        problem = f"{self.source}:{count_line_number(self._data, address)}: {_name_field(names[column])} is {text!r}"
         raise FormatError(
             f"{problem}, a number in its columns was expected; cut the file before this state"
         )
@@ -240,8 +240,9 @@ class Blocks(Database):
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
+                line = count_line_number(self._data, run.start)
                 raise FormatError(
-                    f"{self.source}:{line_at(self._data, run.start)}: {_spoken(name)} is missing, cut or doubled in "
+                    f"{self.source}:{line}: {_name_field(name)} is missing, cut or doubled in "
                     "the state that begins here, each state should have it once; leave it out or cut the file"
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
@@ -288,7 +289,7 @@ class Blocks(Database):
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
         self.notes += (
-            f"{where} ends within the state of line {line_at(self._data, block.start)}, which was left out",
+            f"{where} ends within the state of line {count_line_number(self._data, block.start)}, which was left out",
         )
 
     def _known(
@@ -324,7 +325,7 @@ class Blocks(Database):
             example
             for example, stride in recent
             if stride == last.stride
-            and like_example(
+            and count_like_example(
                 self._data,
                 last._replace(example=example),
                 0,
@@ -341,11 +342,11 @@ class Blocks(Database):
         if self._compared and run.repeats >= self.many:
             count = self._count_and_take(run, literal)
         elif self._compared:
-            count = like_example(self._data, run, 0, literal)
+            count = count_like_example(self._data, run, 0, literal)
         else:
             first_line = self.text(example, _LINE).find(b"\n") + 1
-            count = like_example(self._data, run, 0, literal[:first_line])
-            count = like_example(
+            count = count_like_example(self._data, run, 0, literal[:first_line])
+            count = count_like_example(
                 self._data, run._replace(repeats=count), stride - 1, literal[-1:]
             )
         if self.text(position + count * stride, len(start)) == start:
@@ -372,7 +373,7 @@ class Blocks(Database):
             )
             ahead.append(starts[:, offsets])
 
-        count = like_example(
+        count = count_like_example(
             self._data, run, 0, literal, varied, take if sure else None
         )
         if count > self.many:
@@ -402,7 +403,7 @@ class Blocks(Database):
         text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride
-            and like_example(self._data, run, first, text) == run.repeats
+            and count_like_example(self._data, run, first, text) == run.repeats
         )
 
     def _is_even(self) -> bool:
@@ -414,7 +415,7 @@ class Blocks(Database):
         literal = self.layout(first.example, first.stride).literal
         last = first.repeats - 1
         return [run.start for run in runs[1:]] in ([], [self.tail]) and all(
-            like_example(
+            count_like_example(
                 self._data,
                 first._replace(start=first.start + block * first.stride, repeats=1),
                 0,
@@ -443,11 +444,11 @@ class Blocks(Database):
         return address if 0 < address < self._end else None
 
 
-def _starts(run: Stretch, first: int, end: int) -> Addresses:
+def _compute_starts(run: Stretch, first: int, end: int) -> Addresses:
     """Return the addresses of the blocks ``first`` to ``end - 1`` of a run, shape (end - first, 1)."""
     return run.start + run.stride * np.arange(first, end)[:, np.newaxis]
 
 
-def _spoken(name: Hashable) -> str:
+def _name_field(name: Hashable) -> str:
     """Return the name of a field for a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"

@@ -16,11 +16,11 @@ from d2rpick.histories.formats.blocks import (
     UNSURE,
     BlockLayout,
     Grammar,
-    head,
-    written_head,
+    make_head,
+    read_head_of_listing,
 )
 from d2rpick.histories.formats.fixed_text import Blocks
-from d2rpick.histories.history import Samples, frozen
+from d2rpick.histories.history import Samples, freeze
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ def recognises(data: bytes) -> bool:
     """Return True if ``data``, the start of a file, looks like a glstat; a head without states is enough."""
     if b"\n" + _START in data or data.startswith(_START):
         return True
-    _, version, begin = head(data)
+    _, version, begin = read_head_of_listing(data)
     states = data[begin:].strip()
     return bool(version) and (not states or states.startswith(_CONTROL.strip()))
 
@@ -118,7 +118,7 @@ class Glstat(Blocks):
         except FormatError:
             self._even, names = False, needed_names
             columns = self.numbers(needed_names)
-        return dict(zip(names, map(frozen, columns.T), strict=True))
+        return dict(zip(names, map(freeze, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
         """Return the labels of all lines with values, without the time."""
@@ -133,7 +133,7 @@ class Glstat(Blocks):
         return tuple(name for name in names if name != _TIME)
 
 
-def _describe(
+def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
     """Return the offsets of the values of a block by label, and the last label; UNSURE for a value that is cut."""
@@ -160,7 +160,7 @@ def _describe(
     return fields, name
 
 
-def _is_whole(layout: BlockLayout) -> bool:
+def _has_last_line(layout: BlockLayout) -> bool:
     """Return True if a block has the last line of a state."""
     return _LAST in layout.fields
 
@@ -168,10 +168,10 @@ def _is_whole(layout: BlockLayout) -> bool:
 _GRAMMAR: Final = Grammar(
     _START,
     _LINE,
-    _describe,
+    _describe_glstat_block,
     _CHANGING,
     _TIME,
-    _is_whole,
+    _has_last_line,
     width=_WIDTH,
     decimals=5,
     compare_all=True,
@@ -189,4 +189,4 @@ def write(title: str, lines: Mapping[str, Samples]) -> bytes:
         )
         for cycle, values in enumerate(states, start=1)
     )
-    return (written_head(title, "glstat") + "\n\n" + "\n\n".join(blocks)).encode()
+    return (make_head(title, "glstat") + "\n\n" + "\n\n".join(blocks)).encode()

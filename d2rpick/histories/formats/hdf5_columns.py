@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.files import unpacked_beyond
+from d2rpick.base.files import describe_unpacked_excess
 from d2rpick.histories.meaning import is_time
 
 if TYPE_CHECKING:
@@ -72,9 +72,9 @@ class Column(NamedTuple):
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
-            return finite(_values(dataset, content), self.path, source).reshape(
-                self.size
-            )
+            return check_finite(
+                _read_values(dataset, content), self.path, source
+            ).reshape(self.size)
         whole = dataset if self.field is None else dataset.fields(self.field)
         if self.place is None:
             values = whole[()]
@@ -83,14 +83,14 @@ class Column(NamedTuple):
         else:
             axis, index = self.place
             values = whole[index, :] if axis == 0 else whole[:, index]
-        return finite(values, self.path, source).reshape(self.size)
+        return check_finite(values, self.path, source).reshape(self.size)
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
     """Raise FormatError if data of a dataset are missing (they would read as zeros) or have a type that is damaged."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
-    if too_much := unpacked_beyond(stored, dataset.nbytes):
+    if too_much := describe_unpacked_excess(stored, dataset.nbytes):
         raise FormatError(f"{source}: {dataset.name} becomes {too_much}")
     if dataset.size and not stored:
         raise FormatError(
@@ -116,23 +116,23 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
     """Raise FormatError for numbers of a type that HDF5 does not define: a changed byte would change them all."""
-    for kind in _numbers(dataset.id.get_type()):
-        if not any(kind.equal(standard) for standard in _standard_types()):
+    for kind in _list_number_types(dataset.id.get_type()):
+        if not any(kind.equal(standard) for standard in _list_standard_types()):
             raise FormatError(
                 f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5; "
                 "the file is damaged, copy it again, or write it with a standard type"
             )
 
 
-def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
+def _list_number_types(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
     """Yield the types of the numbers in a type, which may be composed of others."""
     import h5py
 
     if isinstance(kind, h5py.h5t.TypeCompoundID):
         for member in range(kind.get_nmembers()):
-            yield from _numbers(kind.get_member_type(member))
+            yield from _list_number_types(kind.get_member_type(member))
     elif isinstance(kind, h5py.h5t.TypeArrayID | h5py.h5t.TypeEnumID):
-        yield from _numbers(kind.get_super())
+        yield from _list_number_types(kind.get_super())
     elif isinstance(kind, h5py.h5t.TypeAtomicID) and kind.get_class() in (
         h5py.h5t.INTEGER,
         h5py.h5t.FLOAT,
@@ -141,7 +141,7 @@ def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
 
 
 @cache
-def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
+def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
     """Return the integer and floating-point types that HDF5 defines."""
     import h5py
 
@@ -153,7 +153,7 @@ def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
     )
 
 
-def _values(dataset: h5py.Dataset, content: bytes) -> Any:
+def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; one that is contiguous and most of the file is a view of ``content``."""
     start = dataset.id.get_offset()  # None for data in chunks or in other files
     if start is None:
@@ -164,7 +164,7 @@ def _values(dataset: h5py.Dataset, content: bytes) -> Any:
     return values.reshape(dataset.shape)
 
 
-def finite(values: Any, path: str, source: str) -> Samples:
+def check_finite(values: Any, path: str, source: str) -> Samples:
     """Return ``values`` as read-only doubles, which callers can share; raise FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
     is_finite = np.isfinite(numbers)
@@ -176,7 +176,7 @@ def finite(values: Any, path: str, source: str) -> Samples:
     return numbers
 
 
-def columns_of(file: h5py.File) -> tuple[Column, ...]:
+def find_columns(file: h5py.File) -> tuple[Column, ...]:
     """Return all columns of numbers in ``file``, sorted by path."""
     import h5py
 
@@ -189,11 +189,11 @@ def columns_of(file: h5py.File) -> tuple[Column, ...]:
         if name.startswith(tuple(read_groups)):
             return
         if isinstance(item, h5py.Dataset):
-            columns.extend(_dataset_columns(name, item))
+            columns.extend(_list_dataset_columns(name, item))
             return
-        pandas_type = _text(item.attrs.get("pandas_type"))
+        pandas_type = _read_attribute_text(item.attrs.get("pandas_type"))
         if name.endswith(_ERF_BLOCK):
-            columns.extend(_erf_block(name, item))
+            columns.extend(_list_erf_columns(name, item))
             read_groups.append(name + "/")
         elif pandas_type in _PANDAS:
             columns.extend(_PANDAS[pandas_type](name, item))
@@ -203,7 +203,7 @@ def columns_of(file: h5py.File) -> tuple[Column, ...]:
     return tuple(sorted(columns, key=lambda column: column.path))
 
 
-def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
+def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     """Yield the columns of a dataset: members of a compound type, a vector, or the columns of a matrix."""
     import h5py
 
@@ -217,7 +217,7 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     ):
         return
     if dtype.names is not None:
-        yield from _compound_columns(name, dataset, index_name="index")
+        yield from _list_compound_columns(name, dataset, index_name="index")
         return
     if dtype.kind not in "iuf" or not shape:
         return
@@ -225,13 +225,13 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     if max(shape) == size:
         yield Column(name, size, str(dtype), name)
     elif len(shape) == 2:
-        titles = _exodus_titles(dataset) or _titles(
+        titles = _read_exodus_titles(dataset) or _split_titles(
             dataset.attrs.get("columns", dataset.attrs.get("names"))
         )
-        yield from _matrix_columns(name, dataset, titles)
+        yield from _list_matrix_columns(name, dataset, titles)
 
 
-def _matrix_columns(
+def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
     """Yield the columns of a matrix along the axis with as many entries as there are titles, or the shorter one."""
@@ -252,7 +252,7 @@ def _matrix_columns(
         )
 
 
-def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
+def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     """Yield the columns of a time history of ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
 
     ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the
@@ -286,7 +286,7 @@ def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
         )
 
 
-def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
+def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
     """Return the column names that Exodus stores next to a matrix: ``name_glo_var`` next to ``vals_glo_var``."""
     import h5py
 
@@ -306,7 +306,7 @@ def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
     ]
 
 
-def _compound_columns(
+def _list_compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
     """Yield a column for each member, several for a vector, whose names pandas stores in an attribute."""
@@ -321,7 +321,7 @@ def _compound_columns(
             path = f"{base}/{index_name if field == 'index' else field}"
             yield Column(path, dataset.shape[0], str(kind), name, field)
             continue
-        titles = _pickled_names(dataset.attrs.get(f"{field}_kind"))
+        titles = _read_pickled_names(dataset.attrs.get(f"{field}_kind"))
         has_titles = len(titles) == kind.shape[0]
         for index in range(kind.shape[0]):
             leaf = titles[index] if has_titles else f"{field}[{index}]"
@@ -331,20 +331,20 @@ def _compound_columns(
             )
 
 
-def _pandas_table(name: str, group: h5py.Group) -> Iterator[Column]:
+def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
     """Yield the columns of a frame in the "table" store."""
-    info = bytes(_text(group.attrs.get("info")), "utf-8")
+    info = bytes(_read_attribute_text(group.attrs.get("info")), "utf-8")
     match = _PICKLED_INDEX_NAME.search(info)
     index_name = match[1].decode() if match else "index"
-    yield from _compound_columns(f"{name}/table", group["table"], index_name)
+    yield from _list_compound_columns(f"{name}/table", group["table"], index_name)
 
 
-def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
+def _list_frame_columns(name: str, group: h5py.Group) -> Iterator[Column]:
     """Yield the columns of a frame in the "fixed" store: the index, and blocks of columns of one type."""
     index = group["axis1"]
-    yield from _pandas_index(name, index)
+    yield from _list_index_column(name, index)
     for number in range(int(group.attrs["nblocks"])):
-        titles = _titles(group[f"block{number}_items"][()])
+        titles = _split_titles(group[f"block{number}_items"][()])
         values = group[f"block{number}_values"]
         if values.dtype.kind not in "iuf" or values.shape not in (
             (index.size, len(titles)),
@@ -365,30 +365,30 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
             )
 
 
-def _pandas_series(name: str, group: h5py.Group) -> Iterator[Column]:
+def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
     """Yield the index and the values of a series."""
     values = group["values"]
-    yield from _pandas_index(name, group["index"])
+    yield from _list_index_column(name, group["index"])
     if values.dtype.kind in "iuf" and values.ndim == 1:
         yield Column(f"{name}/values", values.size, str(values.dtype), values.name[1:])
 
 
-def _pandas_index(name: str, index: h5py.Dataset) -> Iterator[Column]:
+def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
     """Yield the index of a frame or series, if it consists of numbers."""
-    title = _text(index.attrs.get("name"))
+    title = _read_attribute_text(index.attrs.get("name"))
     title = "index" if title in ("", "N.") else title  # "N." is a pickled None
     if index.dtype.kind in "iuf" and index.ndim == 1:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
 
 
 _PANDAS: Final = {
-    "frame": _pandas_frame,
-    "series": _pandas_series,
-    "frame_table": _pandas_table,
+    "frame": _list_frame_columns,
+    "series": _list_series_columns,
+    "frame_table": _list_table_columns,
 }
 
 
-def _text(value: object) -> str:
+def _read_attribute_text(value: object) -> str:
     """Return an attribute as text, however it was stored; empty if it is not text."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
@@ -397,17 +397,17 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _titles(value: object) -> list[str]:
+def _split_titles(value: object) -> list[str]:
     """Return the names in an array of texts, or in one text with commas."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
-        return [_text(entry) for entry in value.tolist()]
-    text = _text(value)
+        return [_read_attribute_text(entry) for entry in value.tolist()]
+    text = _read_attribute_text(value)
     return [title.strip() for title in text.split(",")] if text else []
 
 
-def _pickled_names(value: object) -> list[str]:
+def _read_pickled_names(value: object) -> list[str]:
     """Return the names in a list of texts that pandas pickled."""
     return [
         name.decode("raw-unicode-escape")
-        for name in _PICKLED_NAME.findall(bytes(_text(value), "utf-8"))
+        for name in _PICKLED_NAME.findall(bytes(_read_attribute_text(value), "utf-8"))
     ]

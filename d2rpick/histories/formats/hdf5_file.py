@@ -17,20 +17,20 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing, printable
-from d2rpick.base.files import beyond, unpacked_beyond
+from d2rpick.base.errors import FormatError, list_names, make_printable
+from d2rpick.base.files import describe_excess, describe_unpacked_excess
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.hdf5_columns import (
     Column,
     check_data,
-    columns_of,
-    finite,
+    check_finite,
+    find_columns,
 )
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.interleaved import refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, refuse_other_quantity
-from d2rpick.histories.names import Part, Selection, near_miss
-from d2rpick.histories.samples import count_rows_per_time, of_one_run
+from d2rpick.histories.names import Part, Selection, suggest_name
+from d2rpick.histories.samples import check_one_run, count_rows_per_time
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -70,25 +70,25 @@ def recognises(data: bytes) -> bool:
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
     """Open each file as a leg of the run; columns of the selection take precedence over those of a saved binout."""
-    return [_opened_leg(source, selection) for source in sources]
+    return [_open_leg(source, selection) for source in sources]
 
 
-def _opened_leg(source: Source, selection: Selection) -> Database:
+def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as columns."""
     _import_library(source.name)
     # In memory whatever its size: the library crashes on some mixtures of two versions of a file.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
-        branches = _branches(file, source.name)
+        branches = _open_branches(file, source.name)
         if branches:
             return SavedBinout(source.name, branches)
     return Columns(file, source.name, selection)
 
 
-def _branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
+def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; {} for a file of another layout."""
-    with _opened(file, source) as opened:
+    with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
             for name in _BRANCHES
@@ -106,13 +106,13 @@ class Columns(Database):
 
     def __init__(self, file: io.BytesIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
-        with _opened(file, source) as opened:
-            self._columns = columns_of(opened)
+        with _open_hdf5(file, source) as opened:
+            self._columns = find_columns(opened)
         self._named_time: Column | None = None
         if selection.time:
-            self._named_time = _named(selection.time, self._columns, source)
+            self._named_time = _find_named_column(selection.time, self._columns, source)
         self._energies = [
-            _named(path, self._columns, source) for path in selection.energy
+            _find_named_column(path, self._columns, source) for path in selection.energy
         ]
         self.channels = tuple(
             column.path for column in self._columns if column is not self._named_time
@@ -121,23 +121,23 @@ class Columns(Database):
     @property
     def energy_channel(self) -> str:
         """The only column named like an internal energy, or next to the time; FormatError lists them otherwise."""
-        return _only_energy(self._columns, self._named_time, self.source).path
+        return _find_only_energy(self._columns, self._named_time, self.source).path
 
     def find(self, wanted: str) -> str:
         """Return the path of the column that ``wanted`` means."""
-        return _named(wanted, self._columns, self.source).path
+        return _find_named_column(wanted, self._columns, self.source).path
 
     @cached_property
     def time(self) -> Samples:
         """Values of the time column, shape (n,) [time]; FormatError if they are not those of one run."""
         path = self._time_column.path
-        times = of_one_run(
+        times = check_one_run(
             self._load(self._time_column),
             lambda state: f"{self.source}: {path}, value {state + 1}",
         )
         if count_rows_per_time(times) > 1:
             energies = self._energies or [
-                _only_energy(self._columns, self._named_time, self.source)
+                _find_only_energy(self._columns, self._named_time, self.source)
             ]
             whole_numbers = {
                 column.path: self._load(column).astype(int).tolist()
@@ -150,7 +150,7 @@ class Columns(Database):
 
     def channel(self, name: str) -> Samples:
         """Return one column, shape (n,); raise FormatError if its length or times differ from those of the energy."""
-        column = _named(name, self._columns, self.source)
+        column = _find_named_column(name, self._columns, self.source)
         if column.size != self._time_column.size:
             raise FormatError(
                 f"{self.source}: {column.path} has {column.size} values, {self._time_column.path} has "
@@ -179,7 +179,9 @@ class Columns(Database):
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Return the precisions of the stored types of the times and of these columns."""
-        energies = [_named(name, self._columns, self.source) for name in names]
+        energies = [
+            _find_named_column(name, self._columns, self.source) for name in names
+        ]
         digits = [
             DIGITS[4 if column.dtype.endswith("32") else 8]
             for column in (self._time_column, *energies)
@@ -194,12 +196,12 @@ class Columns(Database):
         if self._energies:
             energy = self._energies[0]
         else:
-            energy = _only_energy(self._columns, None, self.source)
-        return _only_time(self._columns, energy, self.source)
+            energy = _find_only_energy(self._columns, None, self.source)
+        return _find_only_time(self._columns, energy, self.source)
 
     def _load(self, column: Column) -> Samples:
         """Return the values of a column, shape (size,)."""
-        with _opened(self._file, self.source) as opened:
+        with _open_hdf5(self._file, self.source) as opened:
             return column.load(opened, self._file.getvalue(), self.source)
 
 
@@ -232,20 +234,22 @@ class PartGroup(Database):
     ) -> None:
         self._file, self.source, self.name = file, source, name
         group = opened[name]
-        self.title = _line(group, "title")
+        self.title = _read_line(group, "title")
         self.version = " ".join(
-            text for text in (_line(group, "version"), _line(group, "revision")) if text
+            text
+            for text in (_read_line(group, "version"), _read_line(group, "revision"))
+            if text
         )
         check_data(group["time"], source)
-        self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(
-            -1
-        )
+        self.time: Samples = check_finite(
+            group["time"][()], f"{name}/time", source
+        ).reshape(-1)
         if "ids" in group:
-            self.parts = _parts(group, source)
+            self.parts = _read_parts(group, source)
         else:
             self.channels = tuple(
                 column.path
-                for column in columns_of(group)
+                for column in find_columns(group)
                 if column.size == self.time.size
                 and column.place is None
                 and column.path != "time"
@@ -257,7 +261,7 @@ class PartGroup(Database):
             raise FormatError(
                 f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}"
             )
-        with _opened(self._file, self.source) as opened:
+        with _open_hdf5(self._file, self.source) as opened:
             return self._load(opened[self.name], name, (self.time.size,))
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
@@ -269,7 +273,7 @@ class PartGroup(Database):
                 f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}; "
                 f"choose from {', '.join(map(str, part_ids)) or 'none'}"
             )
-        with _opened(self._file, self.source) as opened:
+        with _open_hdf5(self._file, self.source) as opened:
             group = opened[self.name]
             if quantity not in group:
                 raise FormatError(f"{self.source}: {self.name} has no {quantity}")
@@ -286,10 +290,10 @@ class PartGroup(Database):
             raise FormatError(
                 f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected"
             )
-        return finite(dataset[()], dataset.name, self.source).reshape(shape)
+        return check_finite(dataset[()], dataset.name, self.source).reshape(shape)
 
 
-def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
+def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
     """Return the parts in the order of the columns; titles belong to ``legend_ids``, which may have another order."""
     check_data(group["ids"], source)
     titles: dict[int, str] = {}
@@ -307,7 +311,7 @@ def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
     )
 
 
-def _line(group: h5py.Group, name: str) -> str:
+def _read_line(group: h5py.Group, name: str) -> str:
     """Return a text that was saved as an array of one string, empty if there is none."""
     if name not in group:
         return ""
@@ -318,16 +322,18 @@ def _line(group: h5py.Group, name: str) -> str:
     return str(text).strip()
 
 
-def _named(path: str, columns: Sequence[Column], source: str) -> Column:
+def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Column:
     """Return the column with this path; raise FormatError, with a similar path if there is one."""
     matching = [column for column in columns if column.path == path.strip("/")]
     near = ""
     if not matching:
-        near = near_miss(path.strip("/"), [column.path for column in columns])
-    return _only(matching, columns, f"{path!r}{near}", source)
+        near = suggest_name(path.strip("/"), [column.path for column in columns])
+    return _choose_only_column(matching, columns, f"{path!r}{near}", source)
 
 
-def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
+def _find_only_energy(
+    columns: Sequence[Column], time: Column | None, source: str
+) -> Column:
     """Return the only column named like an internal energy, or the only one next to a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
@@ -341,10 +347,10 @@ def _only_energy(columns: Sequence[Column], time: Column | None, source: str) ->
         ]
         if len(fitting) == 1:
             refuse_other_quantity(fitting[0].path, source)
-    return _only(fitting, columns, "the internal energy", source)
+    return _choose_only_column(fitting, columns, "the internal energy", source)
 
 
-def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
+def _find_only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
     """Return the time in the group of the energy, or in the nearest group that contains it."""
     group = energy.group
     while True:
@@ -352,11 +358,13 @@ def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column
             column for column in columns if column.is_time and column.group == group
         ]
         if fitting or not group:
-            return _only(fitting, columns, f"the time of {energy.path}", source)
+            return _choose_only_column(
+                fitting, columns, f"the time of {energy.path}", source
+            )
         group = group.rpartition("/")[0]
 
 
-def _only(
+def _choose_only_column(
     fitting: Sequence[Column], columns: Sequence[Column], purpose: str, source: str
 ) -> Column:
     """Return the only fitting column; raise FormatError with the columns to choose from otherwise."""
@@ -364,7 +372,7 @@ def _only(
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
     paths = [f"{column.path} ({column.size})" for column in fitting or columns]
-    menu = listing(paths, most=_MANY) or "there is none"
+    menu = list_names(paths, most=_MANY) or "there is none"
     raise FormatError(
         f"{source}: {count} for {purpose}, one was expected; give its path: {menu}"
     )
@@ -381,7 +389,7 @@ def _import_library(source: str) -> None:
 
 
 @contextmanager
-def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
+def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
     """Open the file; turn any error of h5py for a damaged file into a FormatError."""
     import h5py
 
@@ -389,7 +397,7 @@ def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         with h5py.File(file, "r") as opened:
             yield opened
     except _DAMAGED as error:
-        reason = printable(" ".join(str(error).split()))
+        reason = make_printable(" ".join(str(error).split()))
         raise FormatError(
             f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter"
         ) from error
@@ -468,14 +476,14 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) ->
             limit = min(limit, hard_limit)
         resource.setrlimit(resource.RLIMIT_CPU, (limit, hard_limit))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-        _read(file, source)
+        _read_all_data(file, source)
     except FormatError as error:
         os.write(write_end, str(error).encode(errors="surrogateescape"))
     finally:
         os._exit(0)
 
 
-def _read(file: BinaryIO, source: str) -> None:
+def _read_all_data(file: BinaryIO, source: str) -> None:
     """Read the description of all data, and data in chunks; raise FormatError if the bounds are exceeded."""
     import h5py
 
@@ -484,13 +492,13 @@ def _read(file: BinaryIO, source: str) -> None:
 
     def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
         nonlocal unpacked
-        if too_deep := beyond("DEPTH", name.count(b"/")):
+        if too_deep := describe_excess("DEPTH", name.count(b"/")):
             raise FormatError(f"{source}: its data lie in {too_deep}")
         if info.type == h5py.h5o.TYPE_DATASET:
             dataset = h5py.h5d.open(opened.id, name)
             if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
                 unpacked += h5py.Dataset(dataset).nbytes
-                if too_much := unpacked_beyond(size, unpacked):
+                if too_much := describe_unpacked_excess(size, unpacked):
                     raise FormatError(f"{source}: its packed data become {too_much}")
                 with suppress(Exception):
                     check_data(h5py.Dataset(dataset), "")

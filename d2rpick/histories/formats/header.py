@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.cells import is_skipped, split
+from d2rpick.histories.formats.cells import is_skipped, split_cells
 from d2rpick.histories.meaning import is_time
-from d2rpick.histories.names import is_unit, normalised
+from d2rpick.histories.names import is_unit, normalise_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -75,8 +75,8 @@ def read_header(
     if len(rows) > 1 and len(rows[-1]) == columns and all(map(is_unit, rows[-1])):
         units = tuple(rows.pop())
     if not rows:
-        return Header(_commented_names(lines, separator, columns), units)
-    if composed := _compose_names(rows, columns):
+        return Header(_find_commented_names(lines, separator, columns), units)
+    if composed := _join_rows_of_names(rows, columns):
         return Header(tuple(composed), units)
     names = rows[-1]
     title = ""
@@ -98,7 +98,7 @@ def read_header(
     return Header(tuple(names), units, title, sure)
 
 
-def shorten(line: str) -> str:
+def quote_start(line: str) -> str:
     """Quote the start of a line for a message."""
     line = line.strip()
     return repr(line if len(line) <= _SHORT else line[:_SHORT] + "...")
@@ -108,22 +108,22 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
     """Return the number of columns that are sure of their name, None for all; raise FormatError if there is none."""
     if len(names) == columns:
         return None
-    if tuple(map(normalised, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
+    if tuple(map(normalise_name, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
         return min(len(_TH_TO_CSV), columns)
     if len(names) < columns or not is_time(names[0]):
         raise FormatError(
             f"{where}: {columns} values below a header of {len(names)} names "
-            f"({listing(names)}), expected as many of both; correct the header or delete it"
+            f"({list_names(names)}), expected as many of both; correct the header or delete it"
         )
     return _SURE_WITHOUT
 
 
-def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
+def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
     """Join rows of names, from the last one upwards, until all columns have different names; [] if one row is enough.
 
     Examples
     --------
-    >>> _compose_names([["Run 12", ""], ["Time", "Energy", "Energy"], ["", "internal", "kinetic"]], 3)
+    >>> _join_rows_of_names([["Run 12", ""], ["Time", "Energy", "Energy"], ["", "internal", "kinetic"]], 3)
     ['Time', 'Energy internal', 'Energy kinetic']
     """
     names: list[str] = []
@@ -133,14 +133,15 @@ def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
             return []
         upper = _fill_from_left(cells) if names else cells
         names = [
-            _join(*pair) for pair in zip(upper, names or [""] * columns, strict=True)
+            _join_names(*pair)
+            for pair in zip(upper, names or [""] * columns, strict=True)
         ]
         if all(names) and len({*names}) == columns:
             return names if names != cells else []
     return []
 
 
-def _join(upper: str, lower: str) -> str:
+def _join_names(upper: str, lower: str) -> str:
     """Join the names of a column from two rows; the name of a time stands alone."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
@@ -179,15 +180,15 @@ def _split_rows(
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
     """Split a header line. Names between blanks may contain single blanks; a line that does not fit is one title."""
     if separator is not None:
-        return split(line, separator)
+        return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
-    narrow = split(line, None)
+    narrow = split_cells(line, None)
     return next(
         (cells for cells in (wide, narrow) if len(cells) == columns), [line.strip()]
     )
 
 
-def _commented_names(
+def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
     """Return the names in the last comment line, as numpy.savetxt writes them: one for each column, with a time."""

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.cells import (
-    as_number,
     find_thousands,
     is_missing,
     is_number,
     is_skipped,
     is_word,
-    split,
+    parse_cell,
+    split_cells,
 )
-from d2rpick.histories.formats.header import Header, read_header, shorten
+from d2rpick.histories.formats.header import Header, quote_start, read_header
 from d2rpick.histories.formats.text import HEAD, Text
-from d2rpick.histories.names import unit_of
+from d2rpick.histories.names import find_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +68,7 @@ class Layout(NamedTuple):
 
     def number(self, cell: str) -> float | None:
         """Return the number in a cell, or None."""
-        return as_number(cell, self.decimal, self.thousands)
+        return parse_cell(cell, self.decimal, self.thousands)
 
     def plain(self, cell: str) -> str:
         """Return the text of a number with a decimal point and without thousands separators."""
@@ -88,15 +88,15 @@ class Layout(NamedTuple):
         """Return the unit of a column as the file names it, or an empty string."""
         if self.units:
             return self.units[column].strip("()[]")
-        return unit_of(self.names[column]) if self.names else ""
+        return find_unit(self.names[column]) if self.names else ""
 
 
-def unique(names: Sequence[str], kind: str) -> list[str]:
+def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
     """Add a number to names that occur more than once, as "IE (column 2)".
 
     Examples
     --------
-    >>> unique(["time", "IE", "IE"], "column")
+    >>> number_duplicates(["time", "IE", "IE"], "column")
     ['time', 'IE (column 2)', 'IE (column 3)']
     """
     bearers = Counter(names)
@@ -122,7 +122,7 @@ def find_layout(text: Text) -> Layout:
     if not table:
         table = _search_rows(lines_with_last, first, separator)
     if table is None:
-        raise _no_table(text, lines_with_last)
+        raise _report_no_table(text, lines_with_last)
     _refuse_odd_rows(text.name, lines, first, table)
     _refuse_decimal_commas(text.name, lines, table)
     header = read_header(
@@ -131,17 +131,17 @@ def find_layout(text: Text) -> Layout:
         table.separator,
         table.columns,
     )
-    return _with_header(table, header)
+    return _add_header(table, header)
 
 
-def _with_header(table: Layout, header: Header) -> Layout:
+def _add_header(table: Layout, header: Header) -> Layout:
     """Add the names, units and title of a header to a layout."""
     return table._replace(
         names=header.names, units=header.units, title=header.title, sure=header.sure
     )
 
 
-def with_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
+def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
     """Add the thousands separator that the cells of ``rows`` prove, if some of them are not numbers without it."""
     odd = [
         cell
@@ -154,7 +154,7 @@ def with_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
     return table
 
 
-def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
+def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     """Return the error for a text without a table; it quotes the first line that may be a row, else the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
@@ -162,7 +162,7 @@ def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
     rows = [(number, line) for number, line in numbered if line.lstrip()[0].isdigit()]
     number, line = next(iter(rows or numbered), (1, ""))
     below = "below" if text.is_short else f"in the first {HEAD} lines"
-    problem = f"{text.name}:{number}: {shorten(line)} and no rows of at least two numbers {below}"
+    problem = f"{text.name}:{number}: {quote_start(line)} and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
     return FormatError(f"{problem}; expected a table of time and energy; {cure}")
 
@@ -201,7 +201,7 @@ def _find_rows(
         for sign, decimal in forms:
             if sign and not any(sign in line for _, line in sample):
                 continue
-            cells = [(i, split(line, sign)) for i, line in sample]
+            cells = [(i, split_cells(line, sign)) for i, line in sample]
             if with_groups:
                 thousands = find_thousands(
                     [cell for _, row in cells for cell in row], decimal
@@ -211,7 +211,10 @@ def _find_rows(
             if with_groups and not thousands:
                 continue
             form = Layout(sign, decimal, 0, 0, thousands=thousands)
-            kinds = [(i, row, _kind(row, form, only_numbers)) for i, row in cells]
+            kinds = [
+                (i, row, _find_numbers_in_row(row, form, only_numbers))
+                for i, row in cells
+            ]
             kinds = [(i, row, kind) for i, row, kind in kinds if kind]
             if not kinds:
                 continue
@@ -229,7 +232,9 @@ def _find_rows(
     return None
 
 
-def _kind(cells: list[str], form: Layout, only_numbers: bool) -> tuple[bool, ...]:
+def _find_numbers_in_row(
+    cells: list[str], form: Layout, only_numbers: bool
+) -> tuple[bool, ...]:
     """Return, for each cell of a row, True if it is a number or missing; an empty tuple if the line is not a row."""
     if len(cells) < 2:  # the most frequent case: a wrong separator
         return ()
@@ -260,9 +265,11 @@ def _refuse_odd_rows(
 ) -> None:
     """Raise FormatError if a line above the rows begins with a number: it is a row unlike the others, not a header."""
     for number, line in enumerate(lines[first : table.start], first + 1):
-        cells = [] if is_skipped(line) else split(line, table.separator)
+        cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:
-            problem = f"{source}:{number}: {shorten(line)} differs from the rows below"
+            problem = (
+                f"{source}:{number}: {quote_start(line)} differs from the rows below"
+            )
             raise FormatError(
                 f"{problem}, {table.columns} values were expected; repair or delete the line"
             )
@@ -275,11 +282,11 @@ def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> 
     for number, line in enumerate(
         lines[table.start : table.start + _LOOK_AT], table.start + 1
     ):
-        cells = split(line, ",")
+        cells = split_cells(line, ",")
         if any(map(_DECIMAL_PART.fullmatch, cells)) and not any(
             "." in cell or "," in cell for cell in cells
         ):
-            problem = f"{source}:{number}: {shorten(line)} looks like decimal commas between commas"
+            problem = f"{source}:{number}: {quote_start(line)} looks like decimal commas between commas"
             raise FormatError(
                 f"{problem}, which cannot be told apart; write the file with semicolons or decimal points"
             )

@@ -23,8 +23,8 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.formats.blocks import repeats
+from d2rpick.histories.content import Content, make_content
+from d2rpick.histories.formats.blocks import count_repetitions
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -129,7 +129,7 @@ class Lsda:
     def __init__(
         self, content: bytes | Content, source: str, branches: Collection[str]
     ) -> None:
-        self.data = content_of(content)
+        self.data = make_content(content)
         self.source = source
         self.visits = {branch: array("q") for branch in branches}
         self.metadata: dict[str, list[tuple[int, int]]] = {
@@ -141,7 +141,9 @@ class Lsda:
         self.stop = self.unfinished = ""
         self._known: dict[tuple[bytes, ...], int] = {}
         self._forms: dict[str, tuple[int, _Form]] = {}
-        begin, self._order, self._head, self._type = _header(self.data, source)
+        begin, self._order, self._head, self._type = _read_lsda_header(
+            self.data, source
+        )
         self._walk(begin)
 
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -191,7 +193,7 @@ class Lsda:
                 text = data[position + head : end]
                 if not text.isascii() or not text.decode().isprintable():
                     break
-                entered = _resolved(path, text.decode())
+                entered = _resolve_path(path, text.decode())
                 state = _STATE.search(text)
                 if state:
                     branch = entered[:-1]
@@ -314,7 +316,7 @@ class Lsda:
                 return 0
         stride = position - previous
         fixed, numbers = self._pattern(previous, position)
-        times, steps = repeats(self.data, previous, fixed, numbers)
+        times, steps = count_repetitions(self.data, previous, fixed, numbers)
         if times < 2:
             return 0
         # A number ends its record: the next byte is where the state's records start.
@@ -371,7 +373,7 @@ class Lsda:
         return fixed, numbers
 
 
-def _header(
+def _read_lsda_header(
     data: Content, source: str
 ) -> tuple[int, str, struct.Struct, struct.Struct]:
     """Return the byte at which records begin, the byte order, the form of a record head and the form of a type."""
@@ -402,12 +404,12 @@ def recognises(head: bytes) -> bool:
     )
 
 
-def _resolved(path: tuple[str, ...], change: str) -> tuple[str, ...]:
+def _resolve_path(path: tuple[str, ...], change: str) -> tuple[str, ...]:
     """Return the directory to which a change of directory leads.
 
     Examples
     --------
-    >>> _resolved(("glstat", "metadata"), "../d000001"), _resolved(("glstat",), "/matsum/metadata")
+    >>> _resolve_path(("glstat", "metadata"), "../d000001"), _resolve_path(("glstat",), "/matsum/metadata")
     (('glstat', 'd000001'), ('matsum', 'metadata'))
     """
     names = [] if change.startswith("/") else list(path)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, written_head
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, make_head
 from d2rpick.histories.formats.fixed_text import Blocks
 from d2rpick.histories.names import Part, Selection
 
@@ -97,9 +97,9 @@ class Matsum(Blocks):
     )
 
     def __init__(self, data: bytes | Content, source: str) -> None:
-        self._legend = _legend(data)
-        describe = partial(_describe, self._legend)
-        whole = partial(_is_whole, self._legend)
+        self._legend = _read_legend(data)
+        describe = partial(_describe_matsum_block, self._legend)
+        whole = partial(_has_all_parts, self._legend)
         grammar = Grammar(
             _START,
             _LINE,
@@ -188,7 +188,7 @@ class Matsum(Blocks):
         return tuple(remarks)
 
 
-def _legend(data: bytes | Content) -> dict[int, str]:
+def _read_legend(data: bytes | Content) -> dict[int, str]:
     """Return the titles of the parts by number, in the order of the legend."""
     first_state = data.find(b"\n" + _START)
     match = _LEGEND.search(
@@ -221,15 +221,16 @@ def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
     blocks = (
         f"\n time ={moment:13.4E}\n"
         + "".join(
-            _written(number, *rows[i]) for number, rows in enumerate(columns, start=1)
+            _write_part(number, *rows[i])
+            for number, rows in enumerate(columns, start=1)
         )
         for i, moment in enumerate(time.tolist())
     )
-    head = f"{written_head(title, 'matsum')}\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
+    head = f"{make_head(title, 'matsum')}\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
     return (head + "\n".join(blocks)).encode()
 
 
-def _written(
+def _write_part(
     number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float
 ) -> str:
     """Return the lines of a part in one state."""
@@ -242,12 +243,12 @@ def _written(
     )
 
 
-def _is_whole(legend: Mapping[int, str], layout: BlockLayout) -> bool:
+def _has_all_parts(legend: Mapping[int, str], layout: BlockLayout) -> bool:
     """Return True if the only state of a file has all parts of the legend; without a legend this cannot be known."""
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
-def _describe(
+def _describe_matsum_block(
     legend: Mapping[int, str],
     block: bytes,
     lines: Sequence[re.Match[bytes]],
@@ -260,7 +261,7 @@ def _describe(
     name = _TIME
     for line in lines:
         if line[1] is not None:
-            part = _part_number(legend, line[1], block)
+            part = _find_part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
             if doubled:  # two groups of lines of one part: neither is sure
                 fields.update({field: UNSURE for field in fields if field[0] == part})
@@ -276,7 +277,7 @@ def _describe(
     return fields, name
 
 
-def _part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
+def _find_part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
     """Return the number of the part whose first line continues with ``text``.
 
     A single overflowed number is the only number of the legend that is too wide; several could not be told apart.

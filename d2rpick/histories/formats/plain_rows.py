@@ -17,7 +17,7 @@ _UNIT_SEPARATOR: Final = "\x1f"  # no table has this control character
 _ROUNDED: Final = 1e-9
 
 
-def plain_rows(
+def read_plain_rows(
     piece: bytes, layout: Layout, used: Sequence[int], *, is_large: bool
 ) -> Samples | None:
     """Read the columns ``used`` of whole lines, shape (rows, len(used)).
@@ -28,7 +28,7 @@ def plain_rows(
     if layout.thousands:
         return None
     if b'"' in piece:
-        unquoted = _without_quotes(piece, layout)
+        unquoted = _remove_quotes(piece, layout)
         if unquoted is None:
             return None
         piece = unquoted
@@ -49,7 +49,7 @@ def plain_rows(
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
-    read_table = _by_pandas if is_large else _by_numpy
+    read_table = _read_with_pandas if is_large else _read_with_numpy
     try:
         table = read_table(piece, layout, chosen)
     except ValueError:
@@ -63,7 +63,7 @@ def plain_rows(
     return table[:, np.searchsorted(read_columns, used)]
 
 
-def _without_quotes(piece: bytes, layout: Layout) -> bytes | None:
+def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
     """Replace the separators of rows with all cells in quotes by a control character; return None for other rows."""
     if layout.separator is None:
         return None
@@ -77,7 +77,9 @@ def _without_quotes(piece: bytes, layout: Layout) -> bytes | None:
     return None if b'"' in piece else piece
 
 
-def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
+def _read_with_numpy(
+    piece: bytes, layout: Layout, columns: Sequence[int] | None
+) -> Samples:
     """Read rows of numbers with numpy, all columns unless some are chosen; raise ValueError for anything else."""
     # no character outside latin-1 belongs to a number
     lines = piece.decode("latin-1").split("\n")[:-1]
@@ -88,7 +90,9 @@ def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Sa
     )
 
 
-def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
+def _read_with_pandas(
+    piece: bytes, layout: Layout, columns: Sequence[int] | None
+) -> Samples:
     """Read rows of numbers with pandas, which is five times as fast as numpy."""
     from csv import QUOTE_NONE
     from io import BytesIO
@@ -109,7 +113,7 @@ def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> S
             fast = pd.read_csv(
                 BytesIO(piece), sep=separator, float_precision="high", **options
             ).to_numpy()
-            exact = exact_numbers(piece, layout.separator, fast)
+            exact = read_exact_numbers(piece, layout.separator, fast)
             if exact is not None:
                 return exact
         options["float_precision"] = "round_trip"  # takes three times as long
@@ -117,7 +121,7 @@ def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> S
     return table
 
 
-def exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
+def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
     """Read rows of numbers exactly with scipy; return None if scipy fails or disagrees with the numbers ``fast``.
 
     Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its

@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import DIGITS
-from d2rpick.histories.formats.blocks import decode
+from d2rpick.histories.formats.blocks import parse_numbers
 
 if TYPE_CHECKING:
     from d2rpick.histories.content import Bytes, Content
@@ -56,7 +56,7 @@ def is_text(head: bytes) -> bool:
     return any(_MARK in line for line in head.split(b"\n", 4)[:4])
 
 
-def records_of(data: Content, source: str) -> Records:
+def open_records(data: Content, source: str) -> Records:
     """Return the records of a file; raise FormatError for text of another form, such as ``/TFILE/2``."""
     head = data[:_ROOM]
     begin = _BEGIN.match(head)
@@ -154,8 +154,8 @@ class _TextRecords(Records):
         end = len(body) - last * _SHORT
         title = body[begin:end].ljust(RUN - WIDTH if is_run else characters)
         try:
-            integers_before = _binary(body[:begin], first, width)
-            integers_after = _binary(body[end:], last, _SHORT)
+            integers_before = _pack_integers(body[:begin], first, width)
+            integers_after = _pack_integers(body[end:], last, _SHORT)
         except (ValueError, struct.error):
             return None
         return integers_before + title + integers_after
@@ -180,7 +180,7 @@ class _TextRecords(Records):
         return _MARK + number + b"R" + self._line_end
 
     def values(self, fields: Bytes) -> Samples:
-        values = decode(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
+        values = parse_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
         # a shifted or blanked number is often another one
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
@@ -197,14 +197,14 @@ class _TextRecords(Records):
         return DIGITS[WIDTH] if all(alike) else 1 + _DECIMALS
 
 
-def integers(record: bytes) -> tuple[int, ...]:
+def split_integers(record: bytes) -> tuple[int, ...]:
     """Return the integers of a record in binary form."""
     return tuple(
         number for (number,) in INT.iter_unpack(record[: len(record) // WIDTH * WIDTH])
     )
 
 
-def _binary(text: bytes, count: int, width: int) -> bytes:
+def _pack_integers(text: bytes, count: int, width: int) -> bytes:
     """Pack ``count`` integers of ``width`` columns; stars (for a material or property) become 1, not 0."""
     if len(text) != count * width:
         raise ValueError

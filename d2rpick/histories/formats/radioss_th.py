@@ -14,22 +14,22 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.contact_forces import ContactForce
-from d2rpick.histories.content import Content, content_of
+from d2rpick.histories.content import Content, make_content
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.radioss_records import (
     INT,
     RUN,
     WIDTH,
     Records,
-    integers,
     is_binary,
     is_text,
-    records_of,
+    open_records,
+    split_integers,
 )
-from d2rpick.histories.names import Part, Selection, plain_text
+from d2rpick.histories.names import Part, Selection, clean_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,9 +143,9 @@ class TimeHistory(Database):
     format = "radioss-th"
 
     def __init__(self, content: bytes | Content, source: str) -> None:
-        self._data = content_of(content)
+        self._data = make_content(content)
         self.source = source
-        self._records = records_of(self._data, source)
+        self._records = open_records(self._data, source)
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
         # only parts of a card /TH/PART have variables
@@ -174,7 +174,7 @@ class TimeHistory(Database):
         """Return a global variable, shape (n,)."""
         if name not in self.channels:
             raise FormatError(
-                f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}"
+                f"{self.source}: no global {name}, there are {list_names(self.channels, most=30)}"
             )
         return self._columns(1, [self.channels.index(name)])[:, 0]
 
@@ -230,10 +230,10 @@ class TimeHistory(Database):
         column = self._head.columns.get((id_, quantity))
         if column is None:
             quantities = [name for part, name in self._head.columns if part == id_]
-            parts = listing([part.id for part in self.parts]) or "none"
+            parts = list_names([part.id for part in self.parts]) or "none"
             choice = f"parts with variables: {parts}"
             if quantities:
-                choice = f"only {listing(quantities)}"
+                choice = f"only {list_names(quantities)}"
             raise FormatError(
                 f"{self.source}: no {quantity} of part {id_}, {choice}; ask for it with /TH/PART"
             )
@@ -288,7 +288,9 @@ class TimeHistory(Database):
         silent = [part.id for part in self._head.parts if part not in self.parts]
         if not silent:
             return ()
-        which = f"part {silent[0]}" if len(silent) == 1 else f"parts {listing(silent)}"
+        which = (
+            f"part {silent[0]}" if len(silent) == 1 else f"parts {list_names(silent)}"
+        )
         return (f"{self.source}: no variables of {which} in the file (card /TH/PART)",)
 
 
@@ -305,7 +307,7 @@ class _HeadRecords:
     def head(self) -> _Head:
         """Read the records up to the first state."""
         run = self._next(RUN)
-        version = plain_text(self._next(80))
+        version = clean_text(self._next(80))
         hierarchy = self._next()
         # newer releases write a record with the number of additional records
         if len(hierarchy) == WIDTH:
@@ -315,7 +317,7 @@ class _HeadRecords:
         if len(hierarchy) != 6 * WIDTH:
             raise self._broken("a record of 6 counts")
         parts, materials, properties, subsets, groups, variables = (
-            self._count(n) for n in integers(hierarchy)
+            self._count(n) for n in split_integers(hierarchy)
         )
         if self._integers(variables) != tuple(range(1, variables + 1)):
             raise self._broken("a numbering of the global variables")
@@ -332,7 +334,7 @@ class _HeadRecords:
             *(group.values for group in described_groups),
         ]
         return _Head(
-            title=plain_text(run[WIDTH:]),
+            title=clean_text(run[WIDTH:]),
             version=" ".join(version.split()),
             globals=(
                 *_GLOBALS[:variables],
@@ -354,7 +356,7 @@ class _HeadRecords:
         for _ in range(count):
             record = self._titled(5)
             id_ = INT.unpack_from(record)[0]
-            material, properties, variables = integers(record[-3 * WIDTH :])
+            material, properties, variables = split_integers(record[-3 * WIDTH :])
             codes = self._integers(self._count(variables))
             # An element group with a history is listed like a part, but without material and property.
             if material or properties:
@@ -363,7 +365,7 @@ class _HeadRecords:
                 is_repeated = len(set(nonzero_codes)) < len(nonzero_codes)
                 if id_ in described or is_repeated:
                     raise self._broken("a part, and a variable of it, only once")
-                described[id_] = Part(id_, plain_text(record[WIDTH : -4 * WIDTH]))
+                described[id_] = Part(id_, clean_text(record[WIDTH : -4 * WIDTH]))
                 for column, code in enumerate(codes, start=values):
                     if code in _PART_VARIABLES:
                         columns[id_, _PART_VARIABLES[code]] = column
@@ -373,7 +375,8 @@ class _HeadRecords:
     def _subset(self) -> int:
         """Skip a subset and its lists of children, parts and variables; return its number of variables."""
         children, parts, variables = (
-            self._count(n) for n in integers(self._titled(5)[2 * WIDTH : 5 * WIDTH])
+            self._count(n)
+            for n in split_integers(self._titled(5)[2 * WIDTH : 5 * WIDTH])
         )
         for count in (children, parts, variables):
             self._integers(count)
@@ -390,7 +393,7 @@ class _HeadRecords:
         members = [self._titled(1) for _ in range(elements)]
         forces = members if kind in _TOUCHING else []
         names = tuple(
-            (INT.unpack_from(member)[0], plain_text(member[WIDTH:]))
+            (INT.unpack_from(member)[0], clean_text(member[WIDTH:]))
             for member in forces
         )
         return _Group(kind, elements, names, self._integers(variables))
@@ -405,7 +408,7 @@ class _HeadRecords:
 
     def _integers(self, count: int) -> tuple[int, ...]:
         """Read a record of ``count`` integers; there is no record for 0."""
-        return integers(self._next(WIDTH * count)) if count else ()
+        return split_integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
         """Return a count from the file; raise FormatError if the file is too short for it."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.cells import is_skipped, split
-from d2rpick.histories.formats.header import shorten
-from d2rpick.histories.formats.plain_rows import plain_rows
+from d2rpick.histories.formats.cells import is_skipped, split_cells
+from d2rpick.histories.formats.header import quote_start
+from d2rpick.histories.formats.plain_rows import read_plain_rows
 from d2rpick.histories.meaning import is_time
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _read_tables(
     """Yield line numbers and values (rows, used) of each piece; read line by line only if its rows are not alike."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
-        table = plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
+        table = read_plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
         if (
             table is not None
             and np.isfinite(table).all()
@@ -119,7 +119,8 @@ class _Curve:
         """Notes on what was left out below the table."""
         if self._below is None:
             return ()
-        omitted = f"line {self._below.line} ({shorten(self._below.text)}) and the lines after it are below the table"
+        start = quote_start(self._below.text)
+        omitted = f"line {self._below.line} ({start}) and the lines after it are below the table"
         if self._repeated:
             repeated = f"the same table is repeated from line {self._repeated_from} on"
             return (f"{omitted}; {repeated}; they were left out",)
@@ -169,16 +170,17 @@ class _Curve:
     def _read_state(self, number: int, row: str) -> list[float] | None:
         """Return the values of the used columns of a row; None if all of them are empty after the first state."""
         where = f"{self._name}:{number}"
-        cells = _cells(where, row, self.layout)
+        cells = _split_row(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
             return None
         return [
-            _value(where, self.layout, column, cells[column]) for column in self.used
+            _parse_value(where, self.layout, column, cells[column])
+            for column in self.used
         ]
 
     def _is_below(self, row: str) -> bool:
         """Return True if a line that is not a row may be below the table: it begins with a word and has no time."""
-        cells = split(row, self.layout.separator)
+        cells = split_cells(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
             self._before is not None
@@ -216,20 +218,20 @@ class _Curve:
             self._repeated_from = self._repeated_from or number
             self._repeated = position + 1
             return
-        is_header = is_time(split(below.text, self.layout.separator)[0])
+        is_header = is_time(split_cells(below.text, self.layout.separator)[0])
         continues = state[0] > float(table[-1, 0])
         if is_header or continues:  # the table goes on, so the line between is damaged
             raise below.error
         problem = (
             f"{self._name}:{number}: another table begins here, after line {below.line} "
-            f"({shorten(below.text)}); one table was expected"
+            f"({quote_start(below.text)}); one table was expected"
         )
         raise FormatError(f"{problem}; put each table into its own file")
 
 
-def _cells(where: str, row: str, layout: Layout) -> list[str]:
+def _split_row(where: str, row: str, layout: Layout) -> list[str]:
     """Split a row into its cells; raise FormatError for a second header or another number of cells."""
-    cells = split(row, layout.separator)
+    cells = split_cells(row, layout.separator)
     if len(cells) == layout.columns + 1 and not cells[-1]:
         cells.pop()
     if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
@@ -244,7 +246,7 @@ def _cells(where: str, row: str, layout: Layout) -> list[str]:
     return cells
 
 
-def _value(where: str, layout: Layout, column: int, cell: str) -> float:
+def _parse_value(where: str, layout: Layout, column: int, cell: str) -> float:
     """Return the finite number in a cell; raise FormatError for anything else."""
     value = layout.number(cell)
     if value is None or not np.isfinite(value):

@@ -10,8 +10,8 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError
-from d2rpick.base.files import beyond, long_line
-from d2rpick.histories.content import Content, OnDisk, line_at
+from d2rpick.base.files import describe_excess, find_long_line
+from d2rpick.histories.content import Content, OnDisk, count_line_number
 from d2rpick.histories.history import EXACT, Precision, Samples
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Text:
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
-        self._data, self._encoding = _plain(source, self.piece)
+        self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
         # Address after the last line that has an end.
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
@@ -146,17 +146,17 @@ class Text:
 
     def _check_lines(self) -> None:
         """Raise FormatError with the number of a line that is too long."""
-        at = long_line(self._data)
+        at = find_long_line(self._data)
         if at >= 0:
             raise FormatError(
-                f"{self.name}:{line_at(self._data, at)}: the line has {beyond('LINE')}"
+                f"{self.name}:{count_line_number(self._data, at)}: the line has {describe_excess('LINE')}"
             )
 
     def _text(self, data: bytes) -> str:
         return data.decode(self._encoding)
 
 
-def _plain(source: Source, piece: int) -> tuple[Content, str]:
+def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
     """Return the text with line feeds only and without a byte order mark, and its encoding."""
     data = source.data
     if not isinstance(data, bytes):
@@ -175,7 +175,7 @@ def _plain(source: Source, piece: int) -> tuple[Content, str]:
     data = data.removeprefix(_UTF8)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return Content(data), _encoding(data)
+    return Content(data), _detect_encoding(data)
 
 
 def _is_plain(data: bytes) -> bool:
@@ -183,7 +183,7 @@ def _is_plain(data: bytes) -> bool:
     return data.isascii() and b"\r" not in data and b"\0" not in data
 
 
-def _encoding(data: bytes) -> str:
+def _detect_encoding(data: bytes) -> str:
     """Return "ascii" or "utf-8" if the data fit it, else "latin-1", which accepts any bytes."""
     if data.isascii():
         return "ascii"
@@ -194,7 +194,7 @@ def _encoding(data: bytes) -> str:
     return "utf-8"
 
 
-def precisions(
+def find_precisions(
     time: Sequence[str], energy: Sequence[str], moments: Samples
 ) -> tuple[Precision, Precision]:
     """Return the precision with which times and energies were printed, from a sample of their fields.
@@ -214,18 +214,18 @@ def precisions(
 
     Examples
     --------
-    >>> precisions(["0.001", "0.0025", "0.0041"], ["1.25000e+01"], np.array([0.001, 0.0025, 0.0041]))
+    >>> find_precisions(["0.001", "0.0025", "0.0041"], ["1.25000e+01"], np.array([0.001, 0.0025, 0.0041]))
     (Precision(digits=6, decimals=None), Precision(digits=6, decimals=None))
     """
     digits = 0
     for field in (*energy, *time):
         if len(field) > digits:  # a field has no more digits than signs
-            digits = max(digits, _significant(field))
+            digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
-    time_decimals = _fixed_decimals(time)
-    energy_decimals = _fixed_decimals(energy)
+    time_decimals = _find_fixed_decimals(time)
+    energy_decimals = _find_fixed_decimals(energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
     time_precision = energy_precision = general
     if time_fixed:
@@ -235,7 +235,7 @@ def precisions(
     return time_precision, energy_precision
 
 
-def is_whole(field: str, above: Sequence[str]) -> bool:
+def is_whole_field(field: str, above: Sequence[str]) -> bool:
     """Return True if the last field of a file that breaks off is certainly complete, judged by the fields above it.
 
     It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
@@ -246,13 +246,17 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
 
     Examples
     --------
-    >>> is_whole("1.25", ["0.50", "0.75"]), is_whole("1.2", ["0.50", "0.75"]), is_whole("1.25", ["0.55"])
-    (True, False, False)
-    >>> is_whole("0.30000000000000004", ["0.1"]), is_whole("3.0000000000000004", ["0.1"])
+    >>> is_whole_field("1.25", ["0.50", "0.75"]), is_whole_field("1.2", ["0.50", "0.75"])
+    (True, False)
+    >>> is_whole_field("1.25", ["0.55"])
+    False
+    >>> is_whole_field("0.30000000000000004", ["0.1"]), is_whole_field("3.0000000000000004", ["0.1"])
     (True, False)
     """
-    longest_above = max(_LONGEST, *map(_significant, above)) if above else 0
-    if _significant(field) == _LONGEST == longest_above:
+    longest_above = (
+        max(_LONGEST, *map(_count_significant_digits, above)) if above else 0
+    )
+    if _count_significant_digits(field) == _LONGEST == longest_above:
         return re.fullmatch(_PLAIN, field, re.ASCII) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
     shapes = {
@@ -272,7 +276,7 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
     return decimals > 1 and padded and not doubtful
 
 
-def _significant(field: str) -> int:
+def _count_significant_digits(field: str) -> int:
     """Return the number of significant digits of a field, 0 if it is not a number."""
     parts = _PARTS.fullmatch(field)
     if not parts:
@@ -283,7 +287,7 @@ def _significant(field: str) -> int:
     return len(digits.lstrip("0"))
 
 
-def _fixed_decimals(fields: Sequence[str]) -> int | None:
+def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
     """Return the number of decimals that all fields have in common without an exponent, None if there is none."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.histories.formats.plain_rows import exact_numbers
+from d2rpick.histories.formats.plain_rows import read_exact_numbers
 from d2rpick.histories.history import Samples
 
 HARD = st.floats(-1e300, 1e300).map(repr) | st.from_regex(
@@ -22,7 +22,7 @@ def rounded(texts: list[list[str]]) -> Samples:
 @given(st.lists(st.tuples(HARD, HARD), min_size=1, max_size=40))
 def test_numbers_are_those_of_python(rows: list[tuple[str, str]]) -> None:
     cells = [[*row] for row in rows]
-    numbers = exact_numbers(
+    numbers = read_exact_numbers(
         "".join(",".join(row) + "\n" for row in rows).encode(), ",", rounded(cells)
     )
     assert numbers is not None
@@ -39,7 +39,7 @@ def test_a_number_that_only_begins_like_one_is_not_trusted(
 ) -> None:
     """Scipy reads 1.5-003, as Fortran writes 0.0015, as 1.5."""
     assert (
-        exact_numbers(
+        read_exact_numbers(
             f"0,1\n1,{cell}\n".encode(), ",", np.array([[0.0, 1.0], [1.0, meant]])
         )
         is None
@@ -48,4 +48,7 @@ def test_a_number_that_only_begins_like_one_is_not_trusted(
 
 @pytest.mark.parametrize("rows", ["1,2\n3\n", "1,2\n3,4\n5,6\n", "1;2\n3;4\n"])
 def test_rows_of_another_shape_are_not_read(rows: str) -> None:
-    assert exact_numbers(rows.encode(), ",", np.array([[1.0, 2.0], [3.0, 4.0]])) is None
+    assert (
+        read_exact_numbers(rows.encode(), ",", np.array([[1.0, 2.0], [3.0, 4.0]]))
+        is None
+    )
