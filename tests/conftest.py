@@ -54,9 +54,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def by_level(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge by the energy level alone on the command line: looking for a vibration takes most of its time."""
+    """Judge by the energy level alone on the command line: looking for a vibration takes most of its time.
+
+    What the level alone shows is poor, and is not to be a problem.
+    """
     for command in ("SUGGEST", "VERIFY", "PLAN", "EXPLORE", "PARTS"):
         monkeypatch.setenv(f"D2RPICK_{command}_NO_VERIFY", "1")
+        monkeypatch.setenv(f"D2RPICK_{command}_MIN_QUALITY", "poor")
 
 
 pytest_plugins = ["tests.alone"]

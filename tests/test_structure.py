@@ -13,8 +13,6 @@ from pathlib import Path
 import pytest
 
 from d2rpick.api import models
-from d2rpick.choice.quality import GRADES
-from d2rpick.cli import output
 from d2rpick.report.history_files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
@@ -364,10 +362,7 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
     assert printed_by(code).splitlines()[-1] == "True"
 
 
-def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are() -> (
-    None
-):
-    assert output.GRADES == GRADES
+def test_the_command_line_offers_the_formats_of_models_there_are() -> None:
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
 

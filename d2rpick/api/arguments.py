@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
+from d2rpick.choice.grades import GRADES
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -40,7 +41,8 @@ class Choosing(TypedDict, total=False):
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
     is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
     energy alone shows when the load is over.  ``keep_vibration``: grade the vibration by itself, however little its
-    error is worth in the next contact.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
+    error is worth in the next contact.  ``min_quality``: "poor", "fair" or "good", the least grade of a pair that
+    `plan` plans and `check` passes ("fair").  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
     step, and of the step while rigid to that while deformable, 1 or more.
     """
 
@@ -56,6 +58,7 @@ class Choosing(TypedDict, total=False):
     replay: bool | None
     strict: bool | None
     keep_vibration: bool | None
+    min_quality: str | None
     cost_share: float | None
     step_ratio: float
 
@@ -149,6 +152,25 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
             )
         found.append(times)
     return found
+
+
+def with_point(value: object) -> str:
+    """Say how a number with a decimal comma is given, or nothing.
+
+    Examples
+    --------
+    >>> with_point("0,064"), with_point("0.064 s")
+    (': write it with a decimal point, 0.064', '')
+    """
+    text = str(value).strip()
+    if text.count(",") != 1:
+        return ""
+    written = text.replace(",", ".")
+    try:
+        float(written)
+    except ValueError:
+        return ""
+    return f": write it with a decimal point, {written}"
 
 
 def without_unit(value: object) -> str:
@@ -324,7 +346,9 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
         )
     if given.get("tolerance", 0.0) is None:
         del given["tolerance"]
-    for name in given.keys() - {"replay", "strict", "keep_vibration", "fit_window"}:
+    check_grade(given.get("min_quality"))
+    of_other_kinds = {"replay", "strict", "keep_vibration", "fit_window", "min_quality"}
+    for name in given.keys() - of_other_kinds:
         limits: Any = OPTIONS[name].kind
         if given[name] is not None:
             given[name] = number(name, given[name], limits)
@@ -338,6 +362,22 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
         for name in of_oscillator
         if oscillator is not None
     }
+
+
+def check_grade(value: object) -> None:
+    """Refuse what is no grade of a pair.
+
+    Examples
+    --------
+    >>> check_grade("best")
+    Traceback (most recent call last):
+    ValueError: min_quality is 'best', one of poor, fair, good was expected
+    """
+    if value is None or value in GRADES:
+        return
+    raise ValueError(
+        f"min_quality is {_shown(value)}, one of {', '.join(GRADES)} was expected"
+    )
 
 
 def _check_oscillator(value: object) -> Oscillator | None:

@@ -316,6 +316,14 @@ class JudgedCard(NamedTuple):
         """Whether all windows are."""
         return all(verdict.verified for verdict in self.verdicts)
 
+    @property
+    def passed(self) -> bool:
+        """Whether all windows are admissible, and as good as ``min_quality`` asks for."""
+        return all(
+            verdict.decision.reaches(verdict.situation.settings.min_quality)
+            for verdict in self.verdicts
+        )
+
 
 def judged(
     asked: Asked,
@@ -363,10 +371,10 @@ def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
 
 def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
-    if not verdict.verified:
-        yield Caution(
-            "not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"
-        )
+    decision = verdict.decision
+    if not decision.reaches(verdict.situation.settings.min_quality):
+        told = f"{decision.verdict}: {decision.reason}"
+        yield Caution("not-verified", f"the times as printed: {told}; {decision.cure}")
 
 
 def card(

@@ -265,9 +265,9 @@ def plan(
     Examples
     --------
     >>> import d2rpick as d2
-    >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="box")
+    >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="flying")
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
-    [(0.097, 0.37)]
+    [(0.124, 0.37)]
     """
     shortest = arguments.optional("min_rigid", min_rigid, NOT_NEGATIVE)
     windows = arguments.pairs("done", done)

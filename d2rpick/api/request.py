@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.grades import GRADES
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ JUDGING: Final = (
     "landing",
     "margin",
     "tolerance",
+    "min_quality",
 )
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 LIMITS: Final = (
@@ -122,7 +124,7 @@ LIMITS: Final = (
     ),
     *("fit_window", "no_verify", "strict", "keep_vibration"),
 )
-CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
+CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
 _IN_MEMORY: Final = "<weights in memory>"
@@ -233,6 +235,11 @@ class Request:
         "flag",
         default=False,
     )
+    min_quality: str | None = option(
+        "Least grade of a pair that is not reported as a problem (exit code 1).  [default: fair; poor where --td alone "
+        "is given]",
+        GRADES,
+    )
     cost_share: float | None = option(
         "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
         *(FRACTION, "C"),
@@ -342,7 +349,11 @@ class Request:
             if one.name in OPTIONS
         }
         return Settings(
-            **{**same, "step_ratio": self.step_ratio or 1.0},
+            **{
+                **same,
+                "step_ratio": self.step_ratio or 1.0,
+                "min_quality": self.min_quality or Settings.min_quality,
+            },
             oscillator=mode,
             replay=not self.no_verify,
         )

@@ -156,7 +156,11 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
     The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
     opposite signs.
     """
-    contact = energy_of_next_contact(situation)
+    known, flight = situation.history.known, situation.flight
+    contact = known.once(
+        ("energy of the next contact", flight),
+        lambda: energy_of_next_contact(situation),
+    )
     if contact is None or situation.at_rest:
         return None
     compared = situation.vibration.compared

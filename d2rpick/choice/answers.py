@@ -13,6 +13,8 @@ from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import Kept, kept_mean_energy
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
+from d2rpick.choice.decision import Decision, decide
+from d2rpick.choice.grades import POOR
 from d2rpick.choice.health import (
     OF_THE_MODEL,
     assess,
@@ -26,11 +28,11 @@ from d2rpick.choice.quality import (
     Quality,
     candidates_at,
     over_limits,
-    quality_of,
 )
 from d2rpick.choice.situation import OfTd, Situation, examine
 from d2rpick.choice.warnings import (
     POOR_KINETIC_SHARE,
+    POOR_RESIDUAL,
     Expectation,
     against_td,
     cautions_of,
@@ -57,38 +59,50 @@ if TYPE_CHECKING:
 class Verdict(OfTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
-    ``tr_ok`` and ``td_ok`` are None where the record does not tell.
+    ``tr_ok`` and ``td_ok`` are None where the record does not tell.  ``computed`` is the energy of the
+    finished switched run, if there is one.
     """
 
     situation: Situation
     candidate: Candidate
     tr_ok: bool | None
     td_ok: bool | None
-    verified: bool
+    admissible: bool
     reasons: tuple[str, ...]
     cautions: tuple[Caution, ...]
     switched: Comparison | None = None
     health: Health | None = None
+    computed: History | None = None
 
     @property
-    def word(self) -> str:
-        """The verdict in a few words."""
-        if self.verified and self.situation.basis == "energy":
-            return "verified by the energy level alone"
-        return (
-            "verified"
-            if self.verified
-            else "unknown"
-            if self.tr_ok is None
-            else "not verified"
+    def verified(self) -> bool:
+        """Whether the pair is admissible and not poor, and its vibration is not wrong by more than a half."""
+        residual = self.candidate.residual
+        kept = residual is None or residual <= POOR_RESIDUAL
+        return kept and self.decision.grade != POOR
+
+    @cached_property
+    def decision(self) -> Decision:
+        """Whether to use the pair, why, and what would be better."""
+        found = self._decide(None)
+        return self._decide(self.better) if found.grade == POOR else found
+
+    def _decide(self, better: Pair | None) -> Decision:
+        unknown = () if self.reasons else ("nothing shows that tr suits this td",)
+        objections = () if self.admissible else self.reasons or unknown
+        return decide(
+            self.situation, self.candidate, objections=objections, better=better
         )
+
+    @cached_property
+    def better(self) -> Pair | None:
+        """A pair that is not poor: another tr for this td, or one at the nearest td that has one; None without."""
+        return way_out(self.situation)
 
     @property
     def quality(self) -> Quality | None:
-        """How good the pair is; None where it does not verify."""
-        if not self.verified:
-            return None
-        return quality_of(self.situation, self.candidate)
+        """How good the pair is; None if it is not admissible."""
+        return self.decision.quality if self.admissible else None
 
     @cached_property
     def kept(self) -> Kept | None:
@@ -135,9 +149,9 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     return Verdict(
         situation=situation,
         candidate=candidate,
-        tr_ok=candidate.acceptable if known else None,
+        tr_ok=candidate.admissible if known else None,
         td_ok=td_ok,
-        verified=bool(judged.kept[0]),
+        admissible=bool(judged.kept[0]),
         reasons=(*candidate.notes, *over_limits(situation, candidate)),
         cautions=(*cautions_of(situation), *out_of_place(situation, tr)),
     )
@@ -227,11 +241,32 @@ class Suggestion(OfTd):
             for low, high in self.acceptable_windows
         )
 
+    @cached_property
+    def decision(self) -> Decision | None:
+        """Whether to use the recommended pair, why, and what would be better; None without a pair."""
+        best = self.chosen
+        if best is None:
+            return None
+        return decide(self.situation, best, better=self._good_pair)
+
+    @property
+    def _good_pair(self) -> Pair | None:
+        """The better pair, if a residual shows that it is not poor."""
+        better = self.clearly_better
+        if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
+            return None
+        return better
+
+    def decision_on(self, candidate: Candidate) -> Decision:
+        """Decide on one of the candidates, by the rules of `verify`."""
+        objections = () if candidate.admissible else candidate.notes
+        limits = over_limits(self.situation, candidate)
+        return decide(self.situation, candidate, objections=(*objections, *limits))
+
     @property
     def quality(self) -> Quality | None:
         """How good the recommended pair is; None without one."""
-        best = self.chosen
-        return quality_of(self.situation, best) if best else None
+        return self.decision.quality if self.decision else None
 
     @cached_property
     def kept(self) -> Kept | None:
@@ -327,6 +362,17 @@ def find_better_pair(situation: Situation) -> Pair | None:
     return None
 
 
+def way_out(situation: Situation) -> Pair | None:
+    """Give a pair that is not poor: the recommended tr of this td, else the pair of the nearest better td."""
+    answer = suggest_at(situation)
+    if answer.decision and answer.decision.grade != POOR:
+        return answer.recommended
+    better = answer.better_pair
+    if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
+        return None
+    return better
+
+
 def _level_refuses(situation: Situation) -> bool:
     """Whether the level at td alone speaks against any tr: noise makes thousands of peaks below zero, or too high."""
     if situation.basis != "energy":
@@ -360,7 +406,7 @@ def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
     try:
         return verify_at(
             _anew(situation, round_as_read(td)), round_as_read(tr)
-        ).verified
+        ).admissible
     except RangeError:  # rounded beyond an end of the record, or onto each other
         return False
 
@@ -452,7 +498,8 @@ def compare_with(
     return replace(
         verdict,
         switched=found,
-        verified=verdict.verified
+        computed=switched.history,
+        admissible=verdict.admissible
         and not found.objections,  # a wrong motion overrules the verdict
         reasons=verdict.reasons + found.objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),

@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.choice.warnings import Objection, objections
+from d2rpick.choice.warnings import POOR_RESIDUAL, Objection, objections
 from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
@@ -45,8 +45,9 @@ class Candidate(Measured, Record):
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several parts
-    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``acceptable``: the
-    tr lies in the flight, with the sign of td and an error within the tolerance; otherwise ``notes`` give the reasons.
+    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is E(tr)/E(td).  ``admissible``: the tr lies in the
+    flight, with the sign of td and an error within the tolerance; otherwise ``notes`` give the reasons.
+    ``acceptable``: admissible, with a residual of at most 0.5.
     ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
     than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
     model does not explain is a further mode.  ``parts`` lists the mismatch of each part, empty if single parts are
@@ -61,13 +62,14 @@ class Candidate(Measured, Record):
     tr: float
     kind: str
     energy: float
-    energy_ratio: float | None
+    level_ratio: float | None
     level_error: float | None
     rising: bool | None
     rigid_time: float
     rigid_fraction: float
     tr_low: float | None
     tr_high: float | None
+    admissible: bool
     acceptable: bool
     recommended: bool
     notes: tuple[str, ...]
@@ -345,24 +347,27 @@ class Candidates(Sequence[Candidate]):
         for objection in judged.objections:
             if objection.holds[i]:
                 notes += objection.told(i)
-        acceptable = not notes
+        admissible = not notes
+        residual = values["residual"]
+        is_kept = residual is None or residual <= POOR_RESIDUAL
         if values["same_swing"]:
             notes.append(_SAME_SWING)
         notes += _remarks(situation, reach, values if is_compared else {}, parts)
-        energy_ratio = None
+        level_ratio = None
         if situation.energy_td > 0 and not situation.at_rest:
-            energy_ratio = values["energy"] / situation.energy_td
+            level_ratio = values["energy"] / situation.energy_td
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy_ratio=energy_ratio,
+            level_ratio=level_ratio,
             rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            acceptable=acceptable,
+            admissible=admissible,
+            acceptable=admissible and is_kept,
             recommended=rank == self.recommended,
             notes=tuple(notes),
             run_time_share=situation.settings.run_time_share(rigid_fraction),

@@ -58,7 +58,7 @@ class Comparison(NamedTuple):
     source: tuple[str, ...]
     energy_frozen: float
     energy_td: float
-    energy_ratio: float | None
+    level_ratio: float | None
     end: float
     mean_after: float
     mean_after_reference: float
@@ -199,7 +199,7 @@ def compare_runs(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=energy_td,
-        energy_ratio=frozen / energy_td if energy_td > 0 else None,
+        level_ratio=frozen / energy_td if energy_td > 0 else None,
         end=end,
         mean_after=mean,
         mean_after_reference=mean_reference,

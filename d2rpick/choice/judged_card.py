@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_of
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
@@ -177,12 +178,14 @@ def _remarks(
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
-    poor = verdict.quality is not None and verdict.quality.grade == "poor"
-    held = f"{verdict.word}{', but of poor quality' * poor}"
-    result = (
-        held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
-    )
-    yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
+    decision = verdict.decision
+    word = decision.verdict
+    said = word.upper() if word == DO_NOT_USE else word
+    judged = f"Judged by {', '.join(history.source)}, {history.channel}"
+    yield f"{judged}:{which} {said}. {_sentence(decision.reason)}"
+    if decision.cure:
+        yield f"To improve: {decision.cure}."
+    yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
     if verdict.situation.at_rest:  # no level to match: the warning says so
         return
     measures = [
@@ -190,10 +193,15 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
         for name, value in (
             ("lock-in error", candidate.lock_in_error),
             ("level error", candidate.level_error),
-            ("kinetic share", verdict.situation.kinetic_share),
+            ("kinetic fraction", verdict.situation.kinetic_share),
             ("residual", candidate.residual),
         )
         if value is not None
     ]
     if measures:
         yield f"{', '.join(measures).capitalize()}."
+
+
+def _sentence(text: str) -> str:
+    """Make a sentence of a reason."""
+    return f"{text[:1].upper()}{text[1:]}."

@@ -16,6 +16,7 @@ from d2rpick.base.errors import (
 )
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.health import (
     Health,
     assess,
@@ -76,8 +77,9 @@ class Overview(NamedTuple):
     single state.  It and the times are None without states; they and ``states`` are None if the time has to be chosen
     among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its source:
     ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
-    is that of the run, with the longest flight as its window; None without energies.  ``should_write`` names the output
-    that would show the flights for certain; None if it is written, or there is no state.
+    is that of the run, with the longest flight as its window; None without energies.  ``unjudged`` states why no times
+    can be chosen from the run; empty if they can.  ``should_write`` names the output that would show the flights for
+    certain; None if it is written, or there is no state.
     """
 
     source: tuple[str, ...]
@@ -97,13 +99,60 @@ class Overview(NamedTuple):
     health: Health | None
     notes: tuple[str, ...]
     alarms: tuple[Caution, ...] = ()
+    unjudged: tuple[Caution, ...] = ()
     contact_forces: tuple[ForceOverview, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Whether switch times can be chosen by this run: "use", "use with care" or "do not use"."""
+        if self.unjudged or not self.flights:
+            return DO_NOT_USE
+        return USE_WITH_CARE if self._doubts else USE
+
+    @property
+    def reason(self) -> str:
+        """Why the verdict is what it is."""
+        if self.unjudged:
+            return "; ".join(caution.message for caution in self.unjudged)
+        if not self.flights:
+            return "no free flight is seen, so nothing can be made rigid"
+        found = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
+        return "; ".join(self._doubts) or found
+
+    @property
+    def _doubts(self) -> list[str]:
+        """What makes a run that flies less than good."""
+        health = cautions_of_health(self.health) if self.health else ()
+        doubts = [caution.message for caution in health]
+        if not self.complete:
+            doubts.append("the files end within a state")
+        if all(source == "energy" for source, _ in self.flights):
+            doubts.append(
+                "only the internal energy shows the flights, which is not certain"
+            )
+        return doubts
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
         """Warnings about the health of the run and its engine, and reasons why it cannot be judged."""
         health = cautions_of_health(self.health) if self.health else ()
         return (*self.alarms, *health, *cautions_of_engine(self.source))
+
+
+def _flights_of(flights: Sequence[tuple[str, FreeFlight]]) -> str:
+    """Say how many flights there are, and how long the longest is."""
+    longest = max(flight.end - flight.start for _, flight in flights)
+    count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
+    return f"{count}, the longest for {longest:.6g}"
+
+
+def _health_of(health: Health | None) -> str:
+    """Say that the energies keep to the limits, as far as they are written."""
+    if health is None or health.energy_ratio_min is None:
+        return (
+            "the files do not hold the energy balance that shows whether a run is sound"
+        )
+    return "energies within the limits of practice"
 
 
 def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
@@ -133,6 +182,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         notes.append(str(error))
     steps = np.diff(time)
     history = _history(run, selection)
+    flaws = tuple(unsound(history)) if history else tuple(_of_energy(run, selection))
     rigid = rigid_times(Reference(run, history)) if history else ()
     flights = _flights(by_the_model(history) if rigid else history) if history else ()
     return Overview(
@@ -162,11 +212,8 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         else _missing(run),
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(
-            *(unsound(history) if history else ()),
-            *_of_rigid_legs(rigid),
-            *deck_warnings,
-        ),
+        alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *deck_warnings),
+        unjudged=flaws,
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
@@ -290,6 +337,14 @@ def _history(run: Run, selection: Selection) -> History | None:
         if wanted:
             select_parts(wanted, run.parts, run.name)
     return give_if_written(lambda: run.history(selection))
+
+
+def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
+    """Say why no internal energy can be read: one has to be chosen first, or there is none."""
+    try:
+        run.history(selection)
+    except FormatError as error:
+        yield Caution("no-energy", str(error))
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.answers import Suggestion
-    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.candidates import Candidate, Pair
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.flight.flight import Flight
@@ -92,8 +93,13 @@ class Planned(NamedTuple):
         return self.answer.chosen if self.answer and self.window else None
 
     @property
+    def decision(self) -> Decision | None:
+        """Whether to use the pair, and why, as ``suggest`` decides; None without a pair, or if it is done."""
+        return self.answer.decision if self.answer else None
+
+    @property
     def quality(self) -> Quality | None:
-        """How good the pair is, as ``suggest`` grades it; None without a window, or where it is done."""
+        """How good the pair is, as ``suggest`` grades it; None without a window, or if it is done."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
@@ -302,7 +308,18 @@ def _asked(
         return row._replace(
             reason=_too_short(answer.recommended.rigid_time, shortest, row.margin)
         )
+    if answer.decision and not answer.decision.reaches(settings.min_quality):
+        return row._replace(
+            reason=_not_good_enough(answer.decision, answer.recommended)
+        )
     return row._replace(status="supported")
+
+
+def _not_good_enough(decision: Decision, pair: Pair) -> str:
+    """Say why a pair is not planned, and how to plan it all the same."""
+    times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
+    way = f"with `min_quality` {decision.grade} it is planned all the same"
+    return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {way}"
 
 
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
@@ -346,8 +363,8 @@ def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Pla
         yield row
         if row.status == "supported" and row.locks_in and row.window:
             tr, td = row.window
-            moved = f"the window {tr:.6g} to {td:.6g} locks in energy and moves the landings after it"
-            why = f"{moved}; plan this one from the run switched so"
+            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which moves the landings after it"
+            why = f"{moved}; plan this one from a run that was switched in that window"
 
 
 def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
+from d2rpick.choice.grades import FAIR, GOOD, GRADES, POOR
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
@@ -121,11 +124,8 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-# From the worst to the best.
-GRADES: Final = ("poor", "fair", "good")
-# Of the vibration [-].  A residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
-# the motion after td.  A good pair keeps what the tolerance on tr asks for by default.
-_MOST_FAIR, MOST_GOOD = 0.5, 0.2
+# Of the vibration [-]: a good pair keeps what the tolerance on tr asks for by default.
+MOST_GOOD = 0.2
 # What a further mode may make of it at most in a good pair: a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
@@ -133,24 +133,57 @@ _BAND: Final = 0.25
 # Of the energy that the next contact puts into the parts: an error of the vibration with less of it does not make a
 # pair worse than good, or than fair (docs/validation.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
-_NOT_CERTAIN: Final = "the flight is not certain"
-_UNKNOWN_LOAD: Final = (
-    "momentum or energy changes in the flight, by gravity or by another load"
+
+
+class Cause(NamedTuple):
+    """Why a grade is none better: the ``reason``, and the ``cure``, which would make it better."""
+
+    reason: str
+    cure: str
+
+
+_NAMED: Final = 5  # parts in a sentence
+_NOT_CERTAIN: Final = Cause(
+    "the flight is not certain",
+    "write the momenta of the parts (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
 )
+_UNKNOWN_LOAD: Final = Cause(
+    "momentum or energy changes in the flight, by gravity or by another load",
+    "give the deck of the run as `deck`, which defines gravity and loads, or write the momenta of the parts",
+)
+_CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
 class Grade(NamedTuple):
-    """A ``grade``, one of `GRADES`, and the ``reasons`` why it is none better; empty for "good"."""
+    """A ``grade``, one of `GRADES`, and the ``causes`` why it is none better; empty for "good"."""
 
     grade: str
-    reasons: tuple[str, ...] = ()
+    causes: tuple[Cause, ...] = ()
 
     @classmethod
-    def of(cls, poor: Sequence[str], fair: Sequence[str]) -> Grade:
-        """Grade by the reasons for "poor", else by those for "fair"."""
+    def of(cls, poor: Sequence[Cause], fair: Sequence[Cause]) -> Grade:
+        """Grade by the causes for "poor", else by those for "fair"."""
         if poor:
             return cls("poor", tuple(poor))
         return cls("fair", tuple(fair)) if fair else cls("good")
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is none better."""
+        return tuple(cause.reason for cause in self.causes)
+
+
+def grade_of_residual(residual: float) -> str:
+    """Give the grade that a residual alone has [-].
+
+    Examples
+    --------
+    >>> grade_of_residual(0.1), grade_of_residual(0.3), grade_of_residual(0.6)
+    ('good', 'fair', 'poor')
+    """
+    if residual > POOR_RESIDUAL:
+        return POOR
+    return FAIR if residual > MOST_GOOD else GOOD
 
 
 class Quality(NamedTuple):
@@ -171,29 +204,31 @@ class Quality(NamedTuple):
         return min((self.motion.grade, self.vibration.grade), key=GRADES.index)
 
     @property
-    def reasons(self) -> tuple[str, ...]:
-        """Why the grade is none better."""
-        both = (self.motion, self.vibration)
+    def causes(self) -> tuple[Cause, ...]:
+        """Why the grade is none better, and what would make it better."""
+        statements = (self.motion, self.vibration)
         return tuple(
-            reason for one in both if one.grade == self.grade for reason in one.reasons
+            cause
+            for statement in statements
+            if statement.grade == self.grade
+            for cause in statement.causes
         )
 
     @property
-    def told(self) -> str:
-        """The grade, and why it is none better."""
-        return f"{self.grade}{': ' * bool(self.reasons)}{'; '.join(self.reasons)}"
+    def reasons(self) -> tuple[str, ...]:
+        """Why the grade is none better."""
+        return tuple(cause.reason for cause in self.causes)
 
 
 def quality_of(situation: Situation, best: Candidate) -> Quality:
     """Grade the recommended tr of a td: its motion, and its vibration, also by what its error is worth."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
-    motion = Grade.of(
-        (*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain
-    )
+    ruined = [Cause(what, _CORRECT_THE_DECK) for what in situation.settings.ruined]
+    motion = Grade.of((*ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain)
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
-    alone = Grade.of(_poor(situation, best), _fair(best))
+    alone = Grade.of(_poor(situation, best), _fair(situation, best))
     worth = worth_of_error(situation, best)
     counted = alone if situation.settings.keep_vibration else _weighed(alone, worth)
     return Quality(motion, counted, alone, worth)
@@ -205,43 +240,89 @@ def _weighed(alone: Grade, worth: Worth | None) -> Grade:
         return alone
     if worth.share <= _HARDLY_GOOD:
         return Grade("good")
-    return Grade("fair", alone.reasons)
+    return Grade("fair", alone.causes)
 
 
-def _poor(situation: Situation, best: Candidate) -> list[str]:
-    found = []
+def _poor(situation: Situation, best: Candidate) -> list[Cause]:
+    causes = []
     if best.residual is None:
-        found.append(
-            f"how the deformations at tr and td lie to each other is unknown{_refusal(situation)}"
-        )
-    elif best.residual > _MOST_FAIR:
-        found.append(f"the vibration after td is off by {best.residual:.0%}")
+        causes.append(_unknown_direction(situation))
+    elif best.residual > POOR_RESIDUAL:
+        causes.append(_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
-        found += _of_record(situation)
-    return found
+        causes += situation.history.known.once(
+            ("flaws of the energy", situation.flight.start, situation.td),
+            lambda: _of_record(situation),
+        )
+    return causes
 
 
-def _refusal(situation: Situation) -> str:
-    """Say why the modes could not be identified."""
+def _unknown_direction(situation: Situation) -> Cause:
+    """Say that the deformations at tr and td cannot be compared, and why the modes could not be identified."""
     refusal = situation.evidence.refusal
-    return f": {refusal}" if refusal else ""
+    why = f": {refusal}" if refusal else ""
+    return Cause(
+        f"how the deformations at tr and td lie to each other is unknown{why}",
+        f"{_way_to_the_modes(situation)}, or compare with a finished switched run",
+    )
 
 
-def _of_record(situation: Situation) -> list[str]:
+def _way_to_the_modes(situation: Situation) -> str:
+    """What would show the modes of the vibration: other parts, or more states."""
+    if situation.history.parts is None:
+        return "name the parts to be switched with `parts`, if the files have parts"
+    beside = situation.together.beside.parts
+    if beside:
+        names = list_names([part.name for part in beside], most=_NAMED)
+        return f"name all parts that vibrate together with `parts`: {names} as well"
+    return "write the energies more often"
+
+
+def _wrong_vibration(situation: Situation, residual: float) -> Cause:
+    """Say how wrong the vibration after td is, and whether td or tr is to blame."""
+    reason = f"the vibration after td is wrong by {residual:.0%}"
+    share = situation.kinetic_share
+    if share is None or share <= POOR_KINETIC_SHARE:
+        return Cause(reason, "choose another tr or td, as d2rpick explore lists them")
+    return Cause(
+        f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
+        "choose another td, as d2rpick explore lists them",
+    )
+
+
+def _of_record(situation: Situation) -> list[Cause]:
     """Why the samples of the flight up to td are none that a level can be read from."""
     start = situation.flight.start
     _, energy = situation.history.between(
         -np.inf if start is None else start, situation.td
     )
-    found = []
+    causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
-        found.append("the record falls below zero, as no internal energy does")
+        causes.append(
+            Cause(
+                "the record falls below zero, as no internal energy does",
+                "name the internal energy with `energy` or `parts`",
+            )
+        )
     states = states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        found.append(
-            f"the record has {states:.2g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level"
+        found = f"the record has {states:.2g} states per period"
+        causes.append(
+            Cause(
+                f"{found}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+                "write the energies more often",
+            )
         )
-    return found
+    return causes
+
+
+def certainty(best: Candidate) -> int:
+    """How well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
+    if best.tr_high is None or best.timing_tolerance is None:
+        return 2
+    if _is_loose(best):
+        return 0
+    return 2 if best.tr_high - best.tr <= best.timing_tolerance else 1
 
 
 def _is_loose(best: Candidate) -> bool:
@@ -253,17 +334,35 @@ def _is_loose(best: Candidate) -> bool:
     )
 
 
-def _fair(best: Candidate) -> list[str]:
-    found: list[str] = []
+def _fair(situation: Situation, best: Candidate) -> list[Cause]:
     if best.residual is None:
-        return found
+        return []
+    high = best.residual_high or best.residual
+    causes = []
     if best.residual > MOST_GOOD:
-        found.append(f"the vibration after td is off by {best.residual:.0%}")
-    elif _is_loose(best):
-        found.append("tr is not known well enough for its timing tolerance")
-    if best.residual_high is not None and best.residual_high > _MOST_HIDDEN:
-        found.append(f"it may be off by up to {best.residual_high:.0%}")
-    return found
+        worst = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
+        causes.append(
+            Cause(
+                f"the vibration after td is wrong by {best.residual:.0%}{worst}",
+                "choose another td, as d2rpick explore lists them",
+            )
+        )
+    elif high > _MOST_HIDDEN:
+        causes.append(
+            Cause(
+                f"the vibration after td may be wrong by up to {high:.0%}, since the record may hide a further mode",
+                _way_to_the_modes(situation),
+            )
+        )
+    if best.residual <= MOST_GOOD and _is_loose(best):
+        reach = (best.tr_high or best.tr) - best.tr
+        causes.append(
+            Cause(
+                f"tr is known to ±{reach:.1g} only, but the error grows by 0.05 within ±{best.timing_tolerance:.1g}",
+                "write the energies more often, and with more digits",
+            )
+        )
+    return causes
 
 
 def states_per_period(energy: Samples) -> float | None:

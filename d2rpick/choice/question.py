@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
@@ -69,6 +70,7 @@ class Settings:
     None [-].  ``oscillator``: given instead of identified.  ``fit_window``: window in which the oscillator is
     identified.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr of a flight that is not
     certain.  ``keep_vibration``: grade the vibration itself, even if its error is small relative to the next contact.
+    ``min_quality``: lowest grade of a pair that is planned, and that a deck passes with.
     ``cost_share``: share of the switched parts in the cost of a step; without it the run time stays unknown.
     ``step_ratio``: time step while rigid over that while deformable.  ``bodies``: rigid bodies that the parts become,
     according to a deck; None without a deck, empty if it does not define them; then one body is assumed.
@@ -88,6 +90,7 @@ class Settings:
     replay: bool = True
     strict: bool = False
     keep_vibration: bool = False
+    min_quality: str = FAIR
     cost_share: float | None = None
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None

@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median, median_high
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.quality import EQUALLY_GOOD
+from d2rpick.choice.grades import GRADES
+from d2rpick.choice.quality import EQUALLY_GOOD, grade_of_residual
 from d2rpick.choice.question import read
 from d2rpick.choice.windows import (
     acceptable_windows,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.answers import Suggestion
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
@@ -98,10 +100,10 @@ class StudyRow:
 
     ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
     or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
-    a status other than "ok"; ``warnings`` are codes.  ``td`` is that of the run.  ``acceptable`` are the windows of
-    acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile``
-    the errors, shape (2, m).  ``files`` were read, up to ``record_end``; ``curve`` is an outline of the energy, shape
-    (2, k), if it was requested.
+    a status other than "ok"; ``warnings`` are codes.  ``quality`` to ``cure`` are those of the suggestion for its pair.
+    ``td`` is that of the run.  ``acceptable`` are the windows of acceptable tr, shape (n, 2), ``alike`` those in which
+    the error is at most 0.05 above that of its tr, ``profile`` the errors, shape (2, m).  ``files`` were read, up to
+    ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was requested.
     """
 
     source: str
@@ -117,6 +119,10 @@ class StudyRow:
     warnings: tuple[str, ...] = ()
     td: float | None = None
     record_end: float | None = None
+    quality: str | None = None
+    verdict: str | None = None
+    verdict_reason: str | None = None
+    cure: str | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -171,6 +177,17 @@ class Study:
     def judged(self) -> int:
         """Number of runs that could be read and judged."""
         return sum(row.judged for row in self.runs)
+
+    @property
+    def grade(self) -> str | None:
+        """Grade of the common tr: that of the worst run, by its own pair and by its error at this tr; None without."""
+        if self.common.tr is None:
+            return None
+        grades = [row.quality for row in self.runs if row.quality]
+        for row, error in zip(self.runs, self.common.errors, strict=True):
+            if error is not None and row.basis != "energy":
+                grades.append(grade_of_residual(error))
+        return min(grades, key=GRADES.index, default=None)
 
     @property
     def objection(self) -> bool:
@@ -245,7 +262,20 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         tr_low=best.tr_low,
         tr_high=best.tr_high,
         residual=best.residual,
+        **_decided(answer.decision),
     )
+
+
+def _decided(decision: Decision | None) -> dict[str, Any]:
+    """Give what is said of the pair of a run."""
+    if decision is None:
+        return {}
+    return {
+        "quality": decision.grade,
+        "verdict": decision.verdict,
+        "verdict_reason": decision.reason,
+        "cure": decision.cure,
+    }
 
 
 def failed(source: str, error: BaseException) -> StudyRow:

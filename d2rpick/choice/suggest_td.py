@@ -15,6 +15,7 @@ from d2rpick.choice.quality import (
     MOST_GOOD,
     ROUNDING,
     candidates_at,
+    certainty,
     like_quality,
 )
 from d2rpick.choice.situation import Situation, looking
@@ -102,6 +103,8 @@ _FEWEST_TD, _MOST_TD = 3, 1000
 STEPS: Final = 200
 # Decimals of an error that are shown to the user.
 _READ: Final = 3
+# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
+_SHORTEST: Final = 0.05
 # A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
 # The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
@@ -139,12 +142,13 @@ def choose_td(
 ) -> Chosen:
     """Choose td in ``window``, or in the longest flight if it is None, for a tr not before ``since``.
 
-    Of the pairs at all energy peaks only those of like quality are considered; the one with the longest rigid window
-    wins.  If deformations are known, a residual within 0.02 of the smallest is of like quality.  On the energy alone, a
-    level within the tolerance of the best one is, and the best one is twice the mean energy. td keeps the margin before
-    the contact, unless the whole window lies in the margin.  Without an acceptable peak the ends of the window are
-    tried.  A td of ``times`` (default: an even grid) replaces the chosen one if its pair is better in both error and
-    rigid time.  If nothing vibrates, all td are equally good and the last one is chosen, since it saves most.
+    Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
+    certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
+    smallest is of like quality.  On the energy alone, a level within the tolerance of the best one is, and the best one
+    is twice the mean energy.  The chosen td keeps the margin before the contact, unless the whole window lies in the
+    margin.  Without an acceptable peak the ends of the window are tried.  A td of ``times`` (default: an even grid)
+    replaces the chosen one if its pair is better in both error and rigid time.  If nothing vibrates, all td are equally
+    good and the last one is chosen, since it saves most.
 
     Raises
     ------
@@ -257,7 +261,10 @@ def _unbeaten(
             as_printed(error_of(*candidate)),
         ),
     ):
-        if _beating(choice, [look(situation.td)]):
+        longer = look(situation.td)
+        if not _beating(choice, [longer]):
+            continue
+        if _certainty_of_tr(longer) >= _certainty_of_tr(choice[0]):
             return situation.td
     return td
 
@@ -378,7 +385,24 @@ def _by_residual(
         situation
     )
     alike = [pair for pair in pairs if pair[1].error <= limit]
-    return _td(_longest(alike)), _td(_longest(pairs))
+    return _td(_longest(_surest(alike))), _td(_longest(pairs))
+
+
+def _surest(pairs: Sequence[Choice]) -> list[Choice]:
+    """Give the pairs whose tr is known best, of those that are long enough to be planned, if there are any."""
+    if not pairs:
+        return []
+    record = pairs[0][0].history.time
+    shortest = _SHORTEST * float(record[-1] - record[0])
+    long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
+    known = [_certainty_of_tr(situation) for situation, _ in long]
+    return [pair for pair, its in zip(long, known, strict=True) if its == max(known)]
+
+
+def _certainty_of_tr(situation: Situation) -> int:
+    """How well the tr is known that is recommended at a td, as `certainty` says; 0 without one."""
+    best = next(candidates_at([situation], in_flight=True)).chosen
+    return 0 if best is None else certainty(best)
 
 
 def _by_modes(

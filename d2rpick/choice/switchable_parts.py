@@ -426,7 +426,11 @@ def _to_switch(
     if row.kind == "rigid":
         yield "rigid in the deck, but it has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
-        yield "still deforms" if row.flight.deforms else "has stopped deforming"
+        yield (
+            "still vibrates in the flight, so tr matters"
+            if row.flight.deforms
+            else "has stopped deforming"
+        )
     if data and data.section.formulations.keys() & {
         "solid",
         "tetrahedron",

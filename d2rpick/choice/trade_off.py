@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.aftermath import Kept
     from d2rpick.choice.candidates import Candidate, Candidates, Pair
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
@@ -101,7 +102,12 @@ class Offer(OfTd):
             candidates = next(candidates_at([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=candidates)
 
-    @cached_property
+    @property
+    def decision(self) -> Decision | None:
+        """Whether to use the recommended pair, and why."""
+        return self.answer.decision
+
+    @property
     def quality(self) -> Quality | None:
         """Grade of the recommended pair."""
         return self.answer.quality

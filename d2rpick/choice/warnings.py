@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 _FEW_STATES = 4
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5
+# Of the vibration [-]: a residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
+# the motion after td.
+POOR_RESIDUAL = 0.5
 # An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
 _NOTABLE_PLASTIC = 0.05
 

@@ -63,7 +63,7 @@ def card(
     output.notes(read, all_cautions(found))
     output.notes(found.card.notes, ())
     output.content(text_bytes(found.card.text))
-    output.finish(objection=not found.verified)
+    output.finish(objection=not found.passed)
 
 
 def _windows(
@@ -164,12 +164,13 @@ def _ids(texts: Sequence[str]) -> tuple[str, ...]:
 @click.argument("id", metavar="[ID]...", nargs=-1, type=click_type("rules"))
 @options.takes(*FILES)
 def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
-    """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules.
+    """Explain a rule of `d2rpick check` or a warning by its code; without ID, list all rules.
 
     Examples
     --------
     d2rpick rule
     d2rpick rule D2R105
+    d2rpick rule poor-td
     """
     from d2rpick.report.findings import as_list, explained_rules
 

@@ -145,6 +145,9 @@ def suggest(
     with opened(request, output) as (run, output):
         asked = ask(run, request, merge=cards.merge)
     answer = suggested(asked, wanted)
+    # a td that was given is answered, however poor it is
+    least = request.min_quality or ("poor" if td is not None else "fair")
+    passed = answer.decision is not None and answer.decision.reaches(least)
     told = [
         one
         for one in answer.cautions
@@ -162,14 +165,10 @@ def suggest(
             else [one for one in all_cautions(found) if one not in answer.cautions]
         )
         return output.finish(
-            objection=not output.card(found, told),
-            grade=answer.quality and answer.quality.grade,
+            objection=not (output.card(found, told) and passed),
         )
     output.answer(answer)
-    return output.finish(
-        objection=answer.recommended is None,
-        grade=answer.quality and answer.quality.grade,
-    )
+    return output.finish(objection=not passed)
 
 
 @options.command
@@ -230,11 +229,9 @@ def explore(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     output.answer(answer)
-    chosen = answer.recommended
-    output.finish(
-        objection=chosen is None,
-        grade=chosen.quality.grade if chosen and chosen.quality else None,
-    )
+    chosen, least = answer.recommended, asked.settings.min_quality
+    passed = chosen and chosen.decision and chosen.decision.reaches(least)
+    output.finish(objection=not passed)
 
 
 @options.command
@@ -295,9 +292,7 @@ def verify(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish(
-        objection=not answer.verified, grade=answer.quality and answer.quality.grade
-    )
+    output.finish(objection=not answer.decision.reaches(asked.settings.min_quality))
 
 
 @options.command
@@ -409,10 +404,10 @@ def plan(
 
     Examples
     --------
-    d2rpick plan --part box sample_data/rollover_box.matsum
-    d2rpick plan --part box -f value sample_data/rollover_box.matsum
-    d2rpick plan --part box -f card sample_data/rollover_box.matsum
-    d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
+    d2rpick plan --part flying sample_data/rollover_box.matsum
+    d2rpick plan --part flying -f value sample_data/rollover_box.matsum
+    d2rpick plan --part flying -f card sample_data/rollover_box.matsum
+    d2rpick plan --part flying --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask, open_run
     from d2rpick.api.plans import planned
@@ -460,7 +455,11 @@ def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     """Cautions of the card that the plan has not: those of windows that do not verify, and those of the card itself."""
     if card is None:
         return []
-    failed = tuple(verdict for verdict in card.verdicts if not verdict.verified)
+    failed = tuple(
+        verdict
+        for verdict in card.verdicts
+        if not verdict.decision.reaches(verdict.situation.settings.min_quality)
+    )
     return [
         caution
         for caution in all_cautions(card._replace(verdicts=failed))

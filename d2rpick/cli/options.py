@@ -40,7 +40,7 @@ RESULT: Final = ("output_format", "exit_zero", *FILES)
 HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
-ANSWER: Final = ("plot", "report", *CARDS, "min_quality", *RESULT)
+ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
     "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
     "and which of them become one rigid body"
@@ -69,6 +69,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
             "min_mean_energy",
             "strict",
             "keep_vibration",
+            "min_quality",
         ),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
@@ -79,7 +80,6 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
         "limit",
         "plot",
         "report",
-        "min_quality",
         *RESULT,
         "verbose",
         "show_settings",

@@ -34,11 +34,6 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-GRADES: Final = (
-    "poor",
-    "fair",
-    "good",
-)  # of d2rpick.choice.quality; a test holds them together
 # A terminal of fewer columns is none that tables are read on.
 _NARROWEST: Final = 40
 # Formats that names of files promise.
@@ -46,7 +41,8 @@ _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "ma
 # What a report is often expected to be, and is not.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
 # Lines of a result that stand out: what is recommended or judged, and what a deck is to be changed for.
-_ANSWER: Final = r"(?m)^(\* |(recommended|best of|make rigid|verdict|common tr) |  .*:\d+:\d+: (error|warning) D2R).*"
+_VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
+_ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 
 
 # Arguments that messages name in backticks, and which options set them where these have other names.
@@ -88,9 +84,6 @@ class Output:
     )
     report: str | None = option(
         "Write everything to one HTML page to read, print and sign.", "output", "FILE"
-    )
-    min_quality: str | None = option(
-        "Exit with 1 where the pair is worse than that.", ("good", "fair")
     )
     output_format: str = option("Format of the result.", default="table", short=("-f",))
     exit_zero: bool = option(
@@ -190,12 +183,9 @@ class Output:
         if self.report:
             self.write(self.report, text_bytes(with_options(page())))
 
-    def finish(self, *, objection: bool, grade: str | None = None) -> None:
-        """Exit with 1 when the answer is an objection, or its pair worse than asked for, unless told otherwise."""
-        poor = bool(grade and self.min_quality) and GRADES.index(grade) < GRADES.index(
-            self.min_quality
-        )
-        if (objection or poor) and not self.exit_zero:
+    def finish(self, *, objection: bool) -> None:
+        """Exit with 1 if the answer is an objection, unless told otherwise."""
+        if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def spare(self, inputs: Iterable[str]) -> None:
@@ -262,7 +252,7 @@ class Output:
             return False
         self.notes(found.card.notes, cautions)
         self.content(found.card.text.encode())
-        return found.verified
+        return found.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Say what a reader left out, and what the user should know."""

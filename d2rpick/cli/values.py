@@ -41,9 +41,10 @@ class NumberType(FloatType):
         try:
             number = float(value)
         except ValueError:
-            from d2rpick.api.arguments import without_unit
+            from d2rpick.api.arguments import with_point, without_unit
 
-            self.fail(f"{value!r} is not a number{without_unit(value)}", param, ctx)
+            hint = with_point(value) or without_unit(value)
+            self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         if limit := self.limits.missed(number):

@@ -47,7 +47,7 @@
     energy: {
       below: (chart) => band(chart, "flight", ...flight.flight),
       above: (chart) => {
-        mark(chart, "good", 1, (context, at, _, box) => {
+        mark(chart, "soft", 1, (context, at, _, box) => {
           const columns = 4 * row.windows.length, left = at(flight.view[0]), width = (at(flight.view[1]) - left) / columns;
           const marked = (i) => i < columns && (parseInt(row.windows[i >> 2], 16) & (8 >> (i & 3))) !== 0;
           for (let from = 0, to = 0; from < columns; from = to + 1) {
@@ -112,7 +112,7 @@
     }),
     trade: () => ({
       height: 320, scales: { x: { time: false, range: (_, low, high) => padded(low, high) }, y: { range: (_, low, high) => [0, 1.08 * (high || 1)] } },
-      series: [{}, points("soft", 4), { ...points("good", 8), stroke: () => colour("good") }],
+      series: [{}, points("soft", 4), { ...points("ink", 8), stroke: () => colour("ink") }],
       axes: [axis(flight.saved, { values: times }), axis(flight.error, { size: 54 })], data: trade(),
     }),
   };

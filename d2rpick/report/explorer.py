@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.choice.decision import span_of
 from d2rpick.histories.samples import draw_outline
+from d2rpick.report.decision import saved
 from d2rpick.report.page import Explorer, Markup, join, resource, tag
-from d2rpick.report.suggestion import acceptable, mean_energy
+from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import filled, measure, shell_line, short, shown
 from d2rpick.report.view import View, locked_in, response, scale_in, view_of
 
@@ -169,16 +171,18 @@ def _brief(values: Samples) -> list[float]:
 
 # What is listed of a pair, by key, in this order.
 _VALUES: Final[Mapping[str, str]] = {
-    "quality": "quality",
+    "verdict": "verdict",
+    "why": "why",
+    "cure": "to improve",
     "compared": "change",
     "residual": "residual",
     "after": "mean energy after td",
     "level_error": "level error",
-    "kinetic": "kinetic share",
+    "kinetic": "kinetic fraction",
     "rigid": "rigid",
-    "run_time": "run time",
+    "run_time": "saves",
     "level": "energy at td",
-    "tolerance": "tr may be off by",
+    "tolerance": "timing tolerance",
     "windows": "acceptable tr",
     "reason": "no tr",
 }
@@ -266,12 +270,14 @@ def _error_name(offers: Sequence[Offer]) -> str:
 def _saved_name(offers: Sequence[Offer]) -> str:
     """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
     known = any(one.saving is not None for one in offers)
-    return "saved, % of the run time" if known else "rigid, % of the record"
+    return (
+        "saved, % of the processor time" if known else "rigid, % of the simulated time"
+    )
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
     """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
-    best, quality = offer.best, offer.quality
+    best, decision = offer.best, offer.decision
     return {
         "td": short(offer.td),
         "tr": short(best.tr) if best else "none",
@@ -279,7 +285,9 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
         "exact_tr": repr(best.tr) if best else "none",
         "level": short(offer.energy_td),
         "kinetic": shown(offer.kinetic_share, ".3f"),
-        "quality": quality and quality.told,
+        "verdict": decision and decision.verdict,
+        "why": decision and decision.reason,
+        "cure": decision and decision.cure,
         "reason": offer.answer.why_none,
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),
@@ -292,19 +300,15 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     kept, windows = offer.answer.kept, offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None
-        if kept is None
-        else f"{mean_energy(kept)} of what the reference has",
+        "after": None if kept is None else f"{span_of(kept)} of the reference's",
         "level_error": shown(
             best.level_error if best.residual is None else None, ".3f"
         ),
-        "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
-        "run_time": None
-        if best.run_time_share is None
-        else f"about {best.run_time_share:.0%} of the reference's",
+        "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
+        "run_time": None if best.run_time_share is None else saved(best.run_time_share),
         "tolerance": None
         if best.timing_tolerance is None
-        else f"{best.timing_tolerance:.1e}{unit}",
+        else f"±{best.timing_tolerance:.1e}{unit}",
         "windows": acceptable(windows, best.tr) if windows else None,
     }
 
@@ -316,7 +320,7 @@ def _said(offer: Offer) -> str:
         return "nothing acceptable"
     if best.residual is not None:
         return f"residual {measure(best.residual)}"
-    return offer.quality.grade if offer.quality else ""
+    return offer.decision.verdict if offer.decision else ""
 
 
 def _compared(offer: Offer, start: Offer, unit: str) -> str:
@@ -331,11 +335,12 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         longer = offer.best.rigid_time - start.best.rigid_time
         share = offer.best.rigid_fraction - start.best.rigid_fraction
         said.append(
-            f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'} ({share:+.1%} of the record)"
+            f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
+            f"{share:+.1%} of the simulated time"
         )
     if offer.saving is not None and start.saving is not None:
         said.append(
-            f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}"
+            f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
         )
     if (
         offer.error is not None

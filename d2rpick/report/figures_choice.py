@@ -57,6 +57,10 @@ _PANELS: Final = (2.6, 2.0)
 _FEW: Final = 20
 # Share of the axes at their foot in which the band lies, clear of the curve.
 _BAND: Final = 0.045
+# Of the flights of a plan: so much is shown before and after them.
+_BEYOND_FLIGHTS: Final = 0.05
+# Of the record: the times of a shorter window have no room beside each other.
+_ROOM_FOR_TIMES: Final = 0.2
 
 
 def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
@@ -75,8 +79,12 @@ def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
 
 
 def draw_verdict(answer: Verdict, *, page: bool = False) -> Figure:
-    """Energy in the flight with its level at td and the pair that was judged; below it the motion after that pair."""
-    return _draw(answer.situation, answer.candidate.tr, (answer.candidate,), page=page)
+    """Energy in the flight with its level at td and the pair that was judged; below it the motion after that pair.
+
+    With a finished switched run its energy is drawn over that of the reference, in place of the motion of a model.
+    """
+    pair = answer.situation, answer.candidate.tr, (answer.candidate,)
+    return _draw(*pair, computed=answer.computed, page=page)
 
 
 def _draw(
@@ -86,16 +94,26 @@ def _draw(
     bands: Sequence[tuple[float, float]] = (),
     better: Pair | None = None,
     *,
+    computed: History | None = None,
     page: bool = False,
 ) -> Figure:
-    motion = None if tr is None else replayed_motion(situation, tr)
-    modal = situation.basis == "modal" and tr is not None
+    modelled = tr is not None and computed is None
+    motion = replayed_motion(situation, tr) if modelled and tr is not None else None
+    modal = situation.basis == "modal" and modelled
     below = modal or motion is not None
     figure, panels = figures.begin(2 if below else 1, _HEIGHTS[below], page=page)
     seen = view_of(
         situation, *(() if tr is None else (tr,)), *(better[:2] if better else ())
     )
     _draw_energy(panels[0], situation, seen, candidates, bands)
+    if computed is not None:
+        panels[0].plot(
+            computed.time,
+            computed.energy,
+            color=BETTER,
+            linewidth=1,
+            label="switched run, as computed",
+        )
     if modal and tr is not None:
         draw_halfway(panels[0], situation, tr)
         draw_residuals(panels[1], situation)
@@ -193,6 +211,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     """Draw the energy over time, the flights behind it and the rigid windows below it."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
+    span = float(history.time[-1] - history.time[0])
     axes.plot(
         history.time,
         history.energy,
@@ -209,15 +228,36 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
             )  # fmt: skip
             figures.note(
                 axes,
-                str(row.number),
+                _window_label(row.number, row.window, span),
                 (sum(row.window) / 2, _STRIP),
                 (0, 2),
                 ha="center",
             )
     low, high = axes.get_ylim()
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
+    # below the energies stand the windows alone
+    axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
+    _zoom_into_flights(axes, plan)
     _finish(figure, axes, with_unit("time", history.time_unit), page=page)
     return figure
+
+
+def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
+    """Show the flights, and a little of what lies before and after them."""
+    if not plan.flights:
+        return
+    start, end = plan.flights[0].start, plan.flights[-1].end
+    beyond = _BEYOND_FLIGHTS * (end - start)
+    first, last = plan.history.time[[0, -1]].tolist()
+    axes.set_xlim(max(first, start - beyond), min(last, end + beyond))
+
+
+def _window_label(number: int, window: Times, span: float) -> str:
+    """Number a window, with its times if there is room for them."""
+    tr, td = window
+    if td - tr < _ROOM_FOR_TIMES * span:
+        return str(number)
+    return f"{number}: tr = {tr:.4g}, td = {td:.4g}"
 
 
 def draw_run(

@@ -345,10 +345,25 @@ def as_list() -> str:
 
 
 def explained_rules(names: Iterable[str], width: int) -> str:
-    """Explain the rules by ids or their beginnings; ConfigurationError where there is none of them."""
-    return "\n\n\n".join(
-        as_text(rule, width) for name in names for rule in find_rules(name)
-    )
+    """Explain rules by their ids or beginnings, and warnings by their codes.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such rule or warning.
+    """
+    return "\n\n\n".join(text for name in names for text in _explained(name, width))
+
+
+def _explained(name: str, width: int) -> Iterator[str]:
+    """Explain the rules that begin so, or the warning of this code."""
+    from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
+
+    if name in EXPLANATIONS:
+        yield tables.wrapped(explain_warning(name), width)
+        return
+    for rule in find_rules(name):
+        yield as_text(rule, width)
 
 
 def as_text(rule: Rule, width: int) -> str:
@@ -356,8 +371,9 @@ def as_text(rule: Rule, width: int) -> str:
     from textwrap import wrap  # not above: findings do without it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
-    lines = [tables.wrapped(title, width), "", *wrap(rule.explanation, width)]
-    lines += ["", *wrap(f"Fix: {rule.fix}", width)]
+    explained = wrap(rule.explanation, width, break_on_hyphens=False)
+    lines = [tables.wrapped(title, width), "", *explained]
+    lines += ["", *wrap(f"Fix: {rule.fix}", width, break_on_hyphens=False)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_example(title, example, width)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report.fields import Field, kind_of, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
@@ -205,7 +206,7 @@ CANDIDATE: Final = row(
     Field("tr", "number"),
     Field("kind", KIND),
     Field("energy", "number"),
-    Field("energy_ratio", "number?"),
+    Field("level_ratio", "number?", "E(tr)/E(td)"),
     Field("level_error", "size?"),
     Field("rising", "flag?", "null at an extremum"),
     Field("sign_match", "flag?"),
@@ -246,7 +247,7 @@ _OF_TR: Final = (
 _FIRST: Final = (
     *(
         "energy",
-        "energy_ratio",
+        "level_ratio",
         "level_error",
         "sign_match",
         "lock_in_error",
@@ -282,8 +283,33 @@ MATCHES: Final = Field("parts", many(row(
     name="part_match",
 )))  # fmt: skip
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
+VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
+
+
+# What is said of a pair, by the decision on it.
+DECIDED: Final = row(
+    Field("verdict", VERDICT, "what to do with the pair, by its grade"),
+    Field("verdict_reason", "text", "why, in words", lambda decision: decision.reason),
+    Field("cure", "text", "what would make it better, in words; empty for a good pair"),
+    Field("expected_after_td", "text", "what is expected after td, in words", lambda decision: decision.expected),
+    Field("worst_case", "text", "the worst that the record allows after td, in words"),
+    Field("worst_residual", kind_of("number", minimum=0),
+          "the largest residual that the record allows; 2 if nothing is known of it"),
+)  # fmt: skip
+# The same of what has a decision, or None.
+DECISION: Final = tuple(
+    field._replace(kind=maybe(field.kind), later=True)
+    for field in DECIDED.of_part(lambda answer: answer.decision)
+)
+GRADE_OF_PAIR: Final = Field(
+    "quality",
+    GRADE,
+    "of the pair, as in verdict; null without one",
+    lambda answer: answer.decision and answer.decision.grade,
+)
 QUALITY: Final = (
-    Field("quality", GRADE, "of the pair; null without one", lambda answer: answer.quality and answer.quality.grade),
+    *DECISION,
+    GRADE_OF_PAIR,
     Field("quality_reasons", "texts?", "why it is none better",
           lambda answer: answer.quality and answer.quality.reasons),
     Field("motion", GRADE, "grade of the motion: will the parts fly and land as without switching",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import head, measures_of, spoken
@@ -72,6 +73,8 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
           "output of the solver that would show the flights for sure, null where the files have it"),
     keys.HEALTH,
     Field("notes", "texts"),
+    Field("verdict", keys.VERDICT, "whether to choose switch times by this run", later=True),
+    Field("verdict_reason", "text", "why, in words", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are written", later=True),
 ))  # fmt: skip
 _MOST_TIMES: Final = 4  # that are named of a contact which acts at many
@@ -90,20 +93,39 @@ _PLAIN = (
 
 
 def as_table(overview: Overview, shown: Shown) -> str:
-    """One line per fact, the channels, and a table of the parts."""
-    lines = tables.in_line(facts(overview))
-    if overview.parts:
-        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
+    """Whether the run can be used, why, and what to type next; then a line per fact, and the parts."""
+    lines = tables.in_line(verdict(overview))
     if overview.health and (health := _health(overview)):
         lines += ["", tables.as_text(head(overview.health), health, shown.width)]
+    known = [(name, value) for name, value in facts(overview) if value is not None]
+    lines += ["", *tables.in_line(known)]
+    if overview.parts:
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
     return "\n".join(
         [*lines, *(f"note: {make_printable(note)}" for note in overview.notes)]
     )
 
 
+def verdict(overview: Overview) -> list[tuple[str, str]]:
+    """Whether the run can be used, why, its flights, and what to type next; a name and a sentence each."""
+    lines = [("this run", overview.verdict), ("why", overview.reason)]
+    lines += [("flight", _flight(*flight)) for flight in overview.flights]
+    if overview.verdict == DO_NOT_USE:
+        cure = None if overview.unjudged else overview.should_write
+        return [*lines, ("to improve", cure)] if cure else lines
+    flying = any(flight.parts for _, flight in overview.flights)
+    which = (
+        ["--part", "flying"] if flying else ["--part", "all"] if overview.parts else []
+    )
+    command = ["d2rpick", "plan", *which, *tables.positional(overview.source)]
+    return [*lines, ("next", tables.shell_line(command))]
+
+
 def as_markdown(overview: Overview, _: Shown) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
-    told = tables.as_markdown(("what", "value"), facts(overview))
+    said = tables.listed(verdict(overview))
+    known = [(name, value) for name, value in facts(overview) if value is not None]
+    told = tables.as_markdown(("what", "value"), known)
     parts = (
         [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
     )
@@ -115,6 +137,7 @@ def as_markdown(overview: Overview, _: Shown) -> str:
     )
     return "\n\n".join(
         [
+            *said,
             told,
             *parts,
             *health,
@@ -141,6 +164,8 @@ def as_csv(overview: Overview, _: Shown) -> str:
         "should_write": overview.should_write,
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
+        "verdict": overview.verdict,
+        "verdict_reason": overview.reason,
         "contact_forces": "; ".join(map(_force, overview.contact_forces)),
     }
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
@@ -165,7 +190,6 @@ def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("channels", ", ".join(overview.channels) or None),
     ]
     rows += [("contact force", _force(force)) for force in overview.contact_forces]
-    rows += [("flight", _flight(*flight)) for flight in overview.flights]
     if overview.should_write:
         rows.append(("should write", overview.should_write))
     return rows
@@ -175,7 +199,7 @@ def _health(overview: Overview) -> list[list[tables.Cell]]:
     """Measures that the files hold, with what practice allows."""
     if overview.health is None:
         return []
-    verdicts = {True: "kept", False: "exceeded", None: None}
+    verdicts = {True: "within limit", False: "exceeded", None: None}
     return [
         [one.what, one.value, one.limit, verdicts[one.good]]
         for one in measures_of(overview.health)

@@ -12,6 +12,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.report.decision import headed
 from d2rpick.report.situation import heading, measures_of
 from d2rpick.report.tables import Cell, shell_line, short
 
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import Caution
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.cost import Weights
+    from d2rpick.choice.decision import Decision
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.question import Settings
@@ -198,8 +201,9 @@ def grid(
     """
     body = [list(row) for row in rows]
     right = [
-        all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
-        for i in range(len(head))
+        name == "±"
+        or all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
+        for i, name in enumerate(head)
     ]
     classes = [{"class_": "number"} if one else {} for one in right]
     top = (
@@ -266,7 +270,10 @@ def front(cards: Sequence[Markup], *below: Markup) -> Markup:
 def refused(reason: str) -> Markup:
     """Give the card of an answer that recommends nothing."""
     return tag(
-        "div", tag("h2", "Nothing recommended"), tag("p", reason), class_="card refused"
+        "div",
+        tag("h2", tag("span", "nothing to use", class_="badge refused")),
+        tag("p", reason),
+        class_="card refused",
     )
 
 
@@ -302,11 +309,24 @@ def pair(
     )
 
 
-def rigid_for(times: tuple[float, float], history: History) -> str:
-    """Say how long a pair is rigid."""
-    unit = f" {history.time_unit}" if history.time_unit else ""
-    (tr, td), span = times, float(history.time[-1] - history.time[0])
-    return f"rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
+# The class of the card of a verdict, and of its badge.
+CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
+
+
+def decided(
+    title: str,
+    decision: Decision,
+    times: tuple[float, float],
+    history: History,
+    facts: Iterable[tuple[str, str]],
+) -> Markup:
+    """Show the verdict on a pair as a badge, its times large, and why; ``title`` stands before the verdict."""
+    kind = CLASSES[decision.verdict]
+    badge = tag("span", decision.verdict, class_=f"badge {kind}")
+    _, *why = headed(decision, *times)
+    return pair(
+        join([title, badge]), times, pairs([*why, *facts]), history, f"card {kind}"
+    )
 
 
 def digests(files: Iterable[Read]) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import give_if_written
+from d2rpick.choice.grades import POOR, VERDICTS
 from d2rpick.choice.study import Study, runs_of
 from d2rpick.report import (
     drive,
@@ -17,6 +18,7 @@ from d2rpick.report import (
     trade_off,
     verdict,
 )
+from d2rpick.report.decision import rigid_for, statements
 from d2rpick.report.explorer import explorer, scripts, styles
 from d2rpick.report.page import (
     Explorer,
@@ -30,7 +32,7 @@ from d2rpick.report.page import (
     tag,
 )
 from d2rpick.report.situation import what_was_read
-from d2rpick.report.tables import Cell, known, measure, short, unstarred
+from d2rpick.report.tables import Cell, known, short, unstarred
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -49,8 +51,6 @@ if TYPE_CHECKING:
 
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20
-# What is said of the pair of ``suggest`` beside its times.
-_TOLD = ("quality", "keeps", "saves")
 
 
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
@@ -124,23 +124,13 @@ def _choice(answer: Suggestion) -> Markup:
 
 
 def _recommended(answer: Suggestion) -> Markup:
-    pair, quality = answer.recommended, answer.quality
-    if pair is None or quality is None:
-        return page.refused("No tr can be recommended for this td.")
-    wrong = [("residual", measure(pair.residual))] if pair.residual is not None else []
-    told = pairs(
-        [
-            *(
-                (name, text)
-                for name, text in suggestion.verdict(answer)
-                if name in _TOLD
-            ),
-            *wrong,
-        ]
+    best, decision = answer.chosen, answer.decision
+    if best is None or decision is None:
+        return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
+    times = best.tr, answer.td
+    return page.decided(
+        "", decision, times, answer.situation.history, suggestion.facts(answer)
     )
-    title = suggestion.headline(answer).capitalize()
-    class_ = "card refused" if quality.grade == "poor" else "card chosen"
-    return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
 
 
 def _candidates(answer: Suggestion) -> Iterator[Markup]:
@@ -160,36 +150,23 @@ def verdict_page(answer: Verdict, record: page.PageContext) -> str:
 def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
-    poor = answer.quality is not None and answer.quality.grade == "poor"
-    off = candidate.residual
-    left_over = (
-        "judged by its energy level alone"
-        if off is None
-        else f"residual {measure(off)}"
+    card = page.decided(
+        "", answer.decision, times, situation.history, verdict.facts(answer)
     )
-    card = page.pair(
-        f"{answer.word.capitalize()}{', but of poor quality' * poor}",
-        times,
-        tag("p", left_over, "; ", page.rigid_for(times, situation.history)),
-        situation.history,
-        "card chosen" if answer.verified and not poor else "card refused",
-    )
-    yield page.front([card], remarks(answer.cautions, answer.reasons))
+    remarked = [one for one in answer.reasons if one not in answer.decision.reason]
+    yield page.front([card], remarks(answer.cautions, remarked))
     yield explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
     yield _figures("pair-", caption, "verdict", answer, page=True)
-    measures = _told(verdict.MEASURES.plain(answer).items())
-    yield section(
-        "Measures",
-        pairs((name.replace("_", " "), short(value)) for name, value in measures),
-    )
+    measures = verdict.measured(answer)
+    yield section("Measures", pairs((name, short(value)) for name, value in measures))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(
             answer.switched, record.switched.files if record.switched else ()
         )
     yield from page.evidence(situation, answer.health, record)
-    if answer.verified:
+    if record.card:
         yield page.solver_input(times, record)
 
 
@@ -266,14 +243,20 @@ def plan_page(
         page.front(
             cards,
             remarks(found.cautions),
-            pairs([("plan", plan.sentence(found)), *plan.outlook(found)]),
+            pairs(
+                [
+                    ("plan", plan.sentence(found)),
+                    *plan.next_steps(found),
+                    *plan.outlook(found),
+                ]
+            ),
         ),
         explorer(explored),
         _figures("plan-", caption, "plan", found, page=True),
         section(
             "Flights",
             table("Flights", *unstarred(*plan.table(found))),
-            pairs(plan.reasons(found)),
+            pairs([*plan.verdicts(found), *plan.reasons(found)]),
         ),
         section("For the solver's input", tag("pre", card, tabindex="0"))
         if card
@@ -288,18 +271,11 @@ def plan_page(
 
 def _window(row: Planned, found: Plan) -> Markup:
     assert row.window is not None
-    assert row.quality is not None
-    saves = page.rigid_for(row.window, found.history)
-    told = pairs(
-        [
-            ("saves", saves),
-            ("quality", row.quality.told),
-            ("error", plan.error(row) or "-"),
-        ]
-    )
-    return page.pair(
-        f"Flight {row.number}", row.window, told, found.history, "card chosen"
-    )
+    assert row.candidate is not None
+    assert row.decision is not None
+    facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
+    title = f"Flight {row.number}: "
+    return page.decided(title, row.decision, row.window, found.history, facts)
 
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
@@ -311,7 +287,9 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
     return document(
         f"Switch times of {runs_of(len(answer.runs))}",
         page.front(
-            [_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer))
+            [_common(answer)],
+            remarks(answer.cautions),
+            pairs([*study.outcome(answer), *study.reasons(answer)]),
         ),
         _figures("runs-", caption, "study", answer, page=True),
         section(
@@ -330,20 +308,24 @@ def _common(answer: Study) -> Markup:
         return tag(
             "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
         )
-    times = (
-        tag("span", tag("i", name), text)
-        for name, text in (("tr", f"{tr:.6g}"), ("td", study.td_of(answer)))
-    )
+    times = [tag("span", tag("i", "tr"), f"{tr:.6g}")]
+    if answer.td is not None:
+        times.append(tag("span", tag("i", "td"), f"{answer.td:.6g}"))
     exact = f"in full: tr = {tr!r}" + (
         "" if answer.td is None else f", td = {answer.td!r}"
     )
-    rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
+    verdict = VERDICTS[answer.grade or POOR]
+    (_, said), *_ = study.outcome(answer)
+    kind = page.CLASSES[verdict]
     lines = (
         tag("div", *times, class_="times"),
-        tag("p", rule),
+        tag("p", said),
         tag("p", exact, class_="soft"),
     )
-    return tag("div", title, *lines, class_="card chosen")
+    badge = tag(
+        "h2", "One tr for all runs: ", tag("span", verdict, class_=f"badge {kind}")
+    )
+    return tag("div", badge, *lines, class_=f"card {kind}")
 
 
 def _files(answer: Study) -> str:
@@ -379,7 +361,7 @@ def parts_page(found: Parts, command: Sequence[str]) -> str:
         page.front([_set(found.recommended)], remarks(found.cautions)),
         *sets,
         *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What it means", pairs(parts.outlook(found))),
+        section("What to know", pairs(parts.outlook(found))),
         section(
             "What was read",
             pairs(
@@ -403,12 +385,12 @@ def _set(best: PartSet | None) -> Markup:
         "span",
         tag("i", "saves about"),
         f"{best.saving:.0%}",
-        tag("i", " of the run time"),
+        tag("i", " of the processor time"),
     )
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
     return tag(
         "div",
-        tag("h2", best.name),
+        tag("h2", parts.set_name(best)),
         tag("div", saved, class_="times"),
         listed,
         class_="card chosen",
@@ -463,16 +445,13 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        lambda seen: [("run", ", ".join(seen.source))],
+        overview.verdict,
         lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
     ),
     "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
     "verdict": (
-        lambda one: [
-            ("", verdict.told(one)),
-            *(("but", reason) for reason in one.reasons),
-        ],
-        lambda one: (("measure", "value"), _told(verdict.MEASURES.plain(one).items())),
+        verdict.verdict,
+        lambda one: (("measure", "value"), verdict.measured(one)),
     ),
     "trade_off": (
         lambda one: [("", trade_off.answer(one))],
@@ -480,10 +459,10 @@ _LOOKS: Final[
     ),
     "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
     "parts": (
-        parts.outlook,
+        parts.verdict_on_set,
         lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
     ),
-    "study": (lambda one: study.outcome(one)[::-1], study.table),
+    "study": (study.outcome, study.table),
 }
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import format_ranges, list_names, make_printable
 from d2rpick.report import keys, tables
+from d2rpick.report.decision import saved
 from d2rpick.report.fields import (
     Document,
     Field,
@@ -29,11 +30,11 @@ if TYPE_CHECKING:
 SETS = (
     "set",
     "parts",
-    "saved of a step",
+    "saves of a step",
     "tr",
     "td",
-    "run time",
-    "saved",
+    "processor time",
+    "saves",
     "out of place",
     "turned [deg]",
 )
@@ -41,7 +42,7 @@ TABLES = {
     "Parts": (
         "part",
         "title",
-        "verdict",
+        "make rigid?",
         "flies",
         "deforms",
         "energy",
@@ -213,27 +214,28 @@ DOCUMENT: Final = Document(
 )
 _MOST_SHOWN = 6
 # Left out, in this order, where a terminal has no room for them.
-_SPARE: Final = ("material", "step", "mass", "saved of a step", "turned [deg]")
+_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
 
 
 def as_table(found: Parts, shown: Shown) -> str:
-    """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
-    lines = tables.in_line(heading(found))
+    """The set to take and what to do next, a row per set, a row per part in two tables, and what was read."""
+    lines = tables.in_line(verdict_on_set(found))
+    if found.sets:
+        lines += ["", tables.as_text(*set_table(found, SETS), shown.width, _SPARE)]
     for names in TABLES.values():
         head, body = tables.known(*table(found, names))
         if body and {*head} - {"", "part", "title"}:
             lines += ["", tables.as_text(head, body, shown.width, _SPARE)]
-    if found.sets:
-        lines += ["", tables.as_text(*set_table(found, SETS), shown.width, _SPARE)]
-    return "\n".join([*lines, "", *tables.in_line(outlook(found), 11)])
+    below = [*outlook(found), *heading(found)]
+    return "\n".join([*lines, "", *tables.in_line(below)])
 
 
 def as_markdown(found: Parts, _: Shown) -> str:
-    """The parts and the sets as Markdown tables, and below them the set to take."""
+    """The set to take, the sets and the parts as Markdown tables, and what was read."""
     sets = [tables.as_markdown(*set_table(found))] if found.sets else []
-    return "\n\n".join(
-        [tables.as_markdown(*table(found)), *sets, *tables.listed(outlook(found))]
-    )
+    above = tables.listed(verdict_on_set(found))
+    below = tables.listed(outlook(found))
+    return "\n\n".join([*above, *sets, tables.as_markdown(*table(found)), *below])
 
 
 def as_csv(found: Parts, _: Shown) -> str:
@@ -315,45 +317,73 @@ def _least(one: PartSet, value: float | None) -> str | None:
 
 
 def verdict(row: PartRow) -> str:
-    """The verdict in a word or two."""
-    return f"merge with {row.merge_with}" if row.merge_with is not None else row.verdict
+    """Whether to make a part rigid, in a word or two."""
+    if row.merge_with is not None:
+        return f"merge with {row.merge_with}"
+    return _VERDICTS.get(row.verdict, row.verdict)
+
+
+# Of parts, for people.
+_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
+
+
+def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
+    """Which parts to make rigid, why, and what to do next; a name and a sentence each."""
+    best = found.recommended
+    if best is None:
+        why = next(
+            (one.reasons[0] for one in found.sets if one.reasons),
+            "no part can be switched",
+        )
+        return [
+            ("make rigid", "nothing: no set of parts can be recommended"),
+            ("why", why),
+        ]
+    bodies = (
+        "one rigid body"
+        if len(best.bodies) == 1
+        else f"{len(best.bodies)} rigid bodies"
+    )
+    flights = len(found.facts.flights)
+    where = (
+        f", if rigid in the longest of {flights} flights only" if flights > 1 else ""
+    )
+    share = best.run_time_share
+    saves = "unknown" if share is None else f"{saved(share)}{where}"
+    return [
+        ("make rigid", f"--part {ranges(best.parts)}, {set_name(best)} ({bodies})"),
+        ("saves", saves),
+        ("next", f"d2rpick plan --part {ranges(best.parts)} with the same files"),
+    ]
+
+
+# What the sets are called for people.
+_SET_NAMES: Final = {
+    "all that may": "all eligible parts",
+    "all but what moves": "all eligible parts but loose ones",
+    "heavy": "heaviest half by mass",
+}
+
+
+def set_name(one: PartSet) -> str:
+    """Give what a set is called for people."""
+    return _SET_NAMES.get(one.name, one.name)
 
 
 def outlook(found: Parts) -> list[tuple[str, str]]:
-    """The set to take and what it does, and why others are not compared; a name and a sentence each."""
+    """What to know of the recommended set, and why others are not compared; a name and a sentence each."""
     lines: list[tuple[str, str]] = []
     best = found.recommended
-    if best is None:
-        lines.append(("recommended", "no set"))
-    else:
-        bodies = (
-            "one rigid body"
-            if len(best.bodies) == 1
-            else f"{len(best.bodies)} rigid bodies"
+    if best and best.step_growth is not None and best.step_growth > 1:
+        much = (
+            "without limit"
+            if isinf(best.step_growth)
+            else f"{best.step_growth:.2g} times"
         )
-        lines.append(
-            ("recommended", f"{best.name}: --part {ranges(best.parts)} ({bodies})")
-        )
-        flights = len(found.facts.flights)
-        where = (
-            f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
-        )
-        lines.append(
-            ("run time", f"about {best.run_time_share:.0%} of the reference's{where}")
-        )
-        if best.step_growth is not None and best.step_growth > 1:
-            much = (
-                "without limit"
-                if isinf(best.step_growth)
-                else f"{best.step_growth:.2g} times"
-            )
-            lines.append(
-                (
-                    "step",
-                    f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)",
-                )
-            )
-    lines += [(one.name, reason) for one in found.sets for reason in one.reasons]
+        grows = f"may grow {much} while these parts are rigid"
+        cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
+        lines.append(("time step", f"{grows}: {cures}"))
+    lines += [(set_name(one), reason) for one in found.sets for reason in one.reasons]
     return lines
 
 
@@ -399,7 +429,7 @@ def _percent(value: float | None) -> str | None:
 COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "part": lambda row: row.id,
     "title": lambda row: row.title,
-    "verdict": verdict,
+    "make rigid?": verdict,
     "elements": _counted,
     "formulation": lambda row: ", ".join(row.formulations) or None,
     "material": lambda row: row.material,
@@ -414,18 +444,18 @@ COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "why": lambda row: "; ".join(row.reasons),
 }
 SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
-    "set": lambda one: one.name,
+    "set": set_name,
     "parts": lambda one: ranges(one.parts),
     "elements": lambda one: one.elements,
     "mass": lambda one: _percent(one.mass_fraction),
-    "saved of a step": lambda one: _percent(one.cost_share),
+    "saves of a step": lambda one: _percent(one.cost_share),
     "step grows": lambda one: (
         "free" if _free(one) else tables.shown(one.step_growth, ".2g")
     ),
     "tr": lambda one: one.window[0] if one.window else None,
     "td": lambda one: one.window[1] if one.window else None,
-    "run time": lambda one: _percent(one.run_time_share),
-    "saved": lambda one: _percent(one.saving),
+    "processor time": lambda one: _percent(one.run_time_share),
+    "saves": lambda one: _percent(one.saving),
     "out of place": _position,
     "turned [deg]": lambda one: _least(one, one.angle_error),
 }

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
+from d2rpick.choice.grades import USE
 from d2rpick.report import keys, tables
+from d2rpick.report.decision import in_full, saved
 from d2rpick.report.fields import (
     Document,
     Field,
@@ -25,6 +27,15 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan, Planned
     from d2rpick.choice.situation import Situation
     from d2rpick.report.formats import Shown
+
+
+# When the window of a flight can be used, by its status.
+_WHEN: Final = {
+    "supported": "now",
+    "re-plan": "after a rerun",
+    "done": "done",
+    "left-out": "not planned",
+}
 
 
 def _times(row: Planned, at: int) -> float | None:
@@ -78,8 +89,9 @@ WINDOW: Final = row(
     Field("landing_planned", "number?", "in the run that it was planned from",
           lambda row: row.done and row.done.planned),
     *(_BEST.field(key) for key in _POSITION),
-    keys.QUALITY[0]._replace(meaning="of the pair; null without one, and for a window that is done"),
+    keys.GRADE_OF_PAIR._replace(meaning="of the pair; null without one, and for a window that is done"),
     _BEST.field("position_error_is_lower_bound"),
+    *keys.DECISION,
     closed=True,
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
@@ -93,48 +105,83 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 
 
 # Columns that are left out first where the table would be too wide.
-_SPARE: Final = ("margin", "of record", "error", "run time", "out of place")
+_SPARE: Final = ("margin", "processor time", "out of place", "error")
 
 
 def as_table(plan: Plan, shown: Shown) -> str:
-    """The plan in a sentence, what was read, a row per flight, what is saved, and why others are not supported."""
+    """The plan in a sentence, what to do next, a row per flight, and why windows are no better, or not planned."""
     rows = (
         tables.as_text(*table(plan), shown.width, _SPARE)
         if plan.flights
         else "no flight"
     )
-    told = [
-        (name, make_printable(text)) for name, text in (*outlook(plan), *reasons(plan))
-    ]
+    below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
+    said = [(name, make_printable(text)) for name, text in below]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
+    steps = tables.in_line(next_steps(plan), 4)
     return "\n".join(
-        [sentence(plan), "", *above, "", rows, "", *tables.in_line(told, 9)]
+        [sentence(plan), *steps, "", rows, "", *tables.in_line(said, 9), *above]
     )
 
 
 def sentence(plan: Plan) -> str:
     """What to do, in a sentence."""
-    new = plan.windows
-    waiting = len(plan.all_windows) - len(new)
-    more = (
-        f"{waiting} more windows"
-        if waiting > 1
-        else "a second window"
-        if len(new) == 1
-        else "another window"
+    supported = [row for row in plan.supported if row.window]
+    waiting = len(plan.all_windows) - len(supported)
+    if not supported:
+        return "do not use any window of this run now" + "; see below" * bool(
+            plan.flights
+        )
+    spans = " and ".join(
+        "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    spans = " and ".join(f"from {tr:.6g} to {td:.6g}" for tr, td in new)
-    found = (
-        f"make rigid {spans}, {plan.rigid_fraction:.0%} of the record"
-        if new
-        else "nothing to make rigid"
-    )
-    return f"{found}; {more} must wait" if waiting else found
+    found = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    if plan.run_time_share is not None:
+        found += f"; saves {saved(plan.run_time_share)}"
+    more = "1 more needs" if waiting == 1 else f"{waiting} more need"
+    return f"{found}; {more} a new run first" if waiting else found
+
+
+def _how_to_use(plan: Plan) -> str:
+    """Say how many windows can be used now, and which of them with care."""
+    decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
+    if len(decisions) == 1:
+        number, decision = decisions[0]
+        which = f"flight {number}: " if len(plan.flights) > 1 else ""
+        return f"{which}{decision.verdict}"
+    careful = [str(number) for number, one in decisions if one.verdict != USE]
+    flights = f"flight{'s' * (len(careful) > 1)} {', '.join(careful)}"
+    which = f" ({flights} with care)" if careful else ""
+    open_ones = sum(row.status != "done" for row in plan.flights)
+    return f"use {len(decisions)} of {open_ones} windows now{which}"
+
+
+def next_steps(plan: Plan) -> list[tuple[str, str]]:
+    """What to do next with the windows that can be used now."""
+    if not plan.windows:
+        return []
+    waiting = any(row.status == "re-plan" for row in plan.flights)
+    cards = "print the cards with -f card, and run the deck with them from the start"
+    if plan.done:
+        cards = "print the cards with -f card; they hold the windows that are done too"
+    again = "; then plan the others from that run (--done)" if waiting else ""
+    return [("next", f"{cards}{again}")]
+
+
+def verdicts(plan: Plan) -> list[tuple[str, str]]:
+    """Why the windows that are planned are no better, and what would make them so; the flight and a sentence each."""
+    return [
+        (f"flight {row.number}", in_full(row.decision))
+        for row in plan.flights
+        if row.window and row.decision and row.decision.cure
+    ]
 
 
 def as_markdown(plan: Plan, _: Shown) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
-    below = tables.listed((*outlook(plan), *reasons(plan)))
+    below = tables.listed(
+        (*next_steps(plan), *verdicts(plan), *outlook(plan), *reasons(plan))
+    )
     return "\n\n".join(
         [tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below]
     )
@@ -160,27 +207,13 @@ def as_value(plan: Plan, shown: Shown) -> str:
 
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
-    """What the supported windows save, and what comes next; a name and a sentence each."""
-    supported, waiting = (
-        plan.supported,
-        [row for row in plan.flights if row.status == "re-plan"],
-    )
-    if not supported:
-        return []
-    lines = []
-    if plan.run_time_share is not None:
-        lines.append(
-            ("run time", f"about {plan.run_time_share:.0%} of the reference's")
-        )
+    """What was given up for quality, and where bodies will be; a name and a sentence each."""
+    supported, lines = plan.supported, []
     found = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
         (f"flight {number}", given_up(one.longer, one.recommended))
         for number, one in found
         if one.longer and one.recommended
-    ]
-    graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
-    lines += [
-        (name, quality.told) for name, quality in graded if quality.grade == "poor"
     ]
     assumed = [
         row
@@ -196,12 +229,6 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
                 f"out of place at td if the parts become one rigid body: {listed}{told}",
             )
         )
-    if waiting or plan.done:
-        what = (
-            "with those that are done and these" if plan.done else "with these windows"
-        )
-        after = ", and plan the others from that run (--done)" if waiting else ""
-        lines.append(("next", f"run from the start {what}{after}"))
     return lines
 
 
@@ -212,7 +239,7 @@ def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
         for row in plan.flights
     )
     unknown = [
-        *["run time"] * (plan.settings.cost_share is None),
+        *["processor time"] * (plan.settings.cost_share is None),
         *["out of place"] * (not placed),
     ]
     return tables.filled(
@@ -253,13 +280,12 @@ _COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {
     "margin": lambda row: "-" if row.done else f"{row.margin.time:.3g}",
     "tr": lambda row: _times(row, 0),
     "td": lambda row: _times(row, 1),
-    "rigid": lambda row: row.rigid_time,
-    "of record": lambda row: tables.shown(row.rigid_fraction, ".0%"),
-    "run time": lambda row: tables.shown(
+    "rigid for": lambda row: row.rigid_time,
+    "processor time": lambda row: tables.shown(
         row.candidate.run_time_share if row.candidate else None, ".0%"
     ),
     "error": error,
     "out of place": _place,
-    "quality": lambda row: row.quality.grade if row.quality else None,
-    "status": lambda row: row.status,
+    "verdict": lambda row: row.decision.verdict if row.decision else None,
+    "when": lambda row: _WHEN[row.status],
 }

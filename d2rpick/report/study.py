@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.study import Study, StudyRow, cut_runs, runs_of
+from d2rpick.choice.grades import VERDICTS
+from d2rpick.choice.study import OK, Study, StudyRow, cut_runs, runs_of
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
@@ -52,6 +54,10 @@ PLAIN: Final = row(
     Field("time_unit", "text"),
     Field("td", "number?", "when this run is switched back"),
     Field("record_end", "number?", "last time of its record"),
+    Field("quality", keys.GRADE, "of its pair; null without one", later=True),
+    Field("verdict", maybe(keys.VERDICT), "what to do with its pair", later=True),
+    Field("verdict_reason", "text?", "why, in words", later=True),
+    Field("cure", "text?", "what would make it better; empty for a good pair", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -74,6 +80,9 @@ _SHARED: Final = row(
     Field("common_tr", "number?",
           "The tr of all runs where they agree, else the earliest that is acceptable in every run of status ok or none "
           "and within the timing tolerance of each, where there is one.", lambda answer: answer.common.tr),
+    Field("common_verdict", maybe(keys.VERDICT),
+          "What to do with common_tr, by the worst run: its own pair, and its error at this tr.",
+          lambda answer: VERDICTS.get(answer.grade), later=True),
     Field("common_window", "span?", "First and last tr around it that are.", lambda answer: answer.common.window),
     Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
     Field("common_keeps_timing_tolerance", "flag?",
@@ -99,8 +108,9 @@ _LINE: Final = row(
     Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
+_MOST_REASONS: Final = 3
 # Left out, in this order, where a terminal has no room for them.
-_SPARE: Final = ("E(td)", "+-", "basis", "error")
+_SPARE: Final = ("E(td)", "+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
     LAST.name,
@@ -111,7 +121,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: Study, shown: Shown) -> str:
-    """One line per run, by what tells its name from the others, and below what they have in common."""
+    """What the runs have in common, and below it one line per run, by what tells its name from the others."""
     head, rows = tables.known(*table(answer))
     rows = [
         [name, *row[1:]]
@@ -119,19 +129,15 @@ def as_table(answer: Study, shown: Shown) -> str:
             short_names([row.source for row in answer.runs]), rows, strict=True
         )
     ]
-    return "\n".join(
-        [
-            tables.as_text(head, rows, shown.width, _SPARE),
-            "",
-            *tables.in_line(outcome(answer)),
-        ]
-    )
+    said = tables.in_line([*outcome(answer), *reasons(answer)])
+    return "\n".join([*said, "", tables.as_text(head, rows, shown.width, _SPARE)])
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
-    """The runs as a Markdown table, and below what they have in common."""
-    below = "\n".join(f"* {line}" for line in tables.listed(outcome(answer)))
-    return f"{tables.as_markdown(*table(answer))}\n\n{below}"
+    """What the runs have in common, and below it the runs as a Markdown table."""
+    said = tables.listed([*outcome(answer), *reasons(answer)])
+    listed = "\n".join(f"* {line}" for line in said)
+    return f"{listed}\n\n{tables.as_markdown(*table(answer))}"
 
 
 def as_csv(answer: Study, _: Shown) -> str:
@@ -160,11 +166,12 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
         "+-": lambda one: tables.half(one[0].tr_low, one[0].tr_high),
         "td": lambda one: one[0].td,
         "E(td)": lambda one: one[0].energy_td,
-        "R": lambda one: tables.measure(one[0].residual),
-        "error": lambda one: tables.measure(one[1]),
+        "residual": lambda one: tables.measure(one[0].residual),
+        "error at common tr": lambda one: tables.measure(one[1]),
+        "verdict": lambda one: one[0].verdict,
         "basis": lambda one: one[0].basis,
-        "status": lambda one: one[0].status,
-        "message": lambda one: (
+        "status": lambda one: None if one[0].status == OK else one[0].status,
+        "why": lambda one: (
             cut.get(one[0].source, "")
             + (one[0].message or ", ".join(one[0].warnings)).removeprefix(
                 f"{one[0].source.rstrip('/')}: "
@@ -183,21 +190,49 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         found += (
             "the intervals overlap" if answer.agree else "the intervals do not overlap"
         )
-    shared = f"none: {common.reason}"
+    heading, shared = "common tr", f"none: {common.reason}"
     if common.tr is not None and common.window:
-        known = [error for error in common.errors if error is not None]
-        shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
-        shared += f"so is every tr from {format_window(*common.window)}; "
-        shared += (
-            f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
-        )
+        errors = [error for error in common.errors if error is not None]
+        heading = VERDICTS[answer.grade] if answer.grade else heading
+        runs = f"{answer.judged} of {runs_of(len(answer.runs))}"
+        shared = f"common tr = {common.tr:g}, for {runs}, error {_span(errors)}"
+        shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
-        (
-            "td",
-            f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.runs))} judged",
-        ),
-        ("tr", found),
-        ("common tr", shared),
+        (heading, shared),
+        ("each run", _verdicts(answer)),
+        ("td", td_of(answer)),
+        ("own tr", found),
+    ]
+
+
+def _span(errors: Sequence[float]) -> str:
+    """Write the least and the largest of some errors, one number if they read alike."""
+    low, high = tables.measure(min(errors)), tables.measure(max(errors))
+    return low if low == high else f"{low} to {high}"
+
+
+def _verdicts(answer: Study) -> str:
+    """Count the runs by what is said of their own pairs."""
+    counts = Counter(row.verdict for row in answer.runs if row.verdict)
+    counted = [
+        f"{word} in {runs_of(counts[word])}"
+        for word in VERDICTS.values()
+        if counts[word]
+    ]
+    left = sum(row.verdict is None for row in answer.runs)
+    return ", ".join([*counted, *[f"no pair in {runs_of(left)}"] * (left > 0)])
+
+
+def reasons(answer: Study) -> list[tuple[str, str]]:
+    """Why the pairs of runs are no better, each reason once, and what would make them so."""
+    causes = Counter(
+        (row.verdict, row.verdict_reason, row.cure)
+        for row in answer.runs
+        if row.cure and row.verdict
+    )
+    return [
+        ("why", f"{verdict} in {runs_of(count)}: {reason}. To improve: {cure}")
+        for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
     ]
 
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.choice.candidates import MUCH_HIGHER, Candidate
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
+from d2rpick.report.decision import (
+    accuracy,
+    headed,
+    in_short,
+    rigid_for,
+    saving,
+    statements,
+)
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.aftermath import Kept
     from d2rpick.choice.answers import AcceptableWindow, Suggestion
-    from d2rpick.choice.candidates import Pair
-    from d2rpick.choice.quality import Grade, Quality
+    from d2rpick.choice.candidates import Candidate, Pair
+    from d2rpick.choice.decision import Decision
     from d2rpick.report.formats import Shown
 
 # Windows of acceptable tr that a line names.
@@ -25,9 +32,19 @@ _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
 )
+# A candidate, and the decision on it.
 CANDIDATE: Final = row(
-    *keys.CANDIDATE.fields, keys.MATCHES, name="candidate", later=(*keys.LATER, "parts")
+    *keys.CANDIDATE.of_part(lambda one: one[0]),
+    keys.MATCHES._replace(get=lambda one: one[0].parts),
+    *keys.DECIDED.of_part(lambda one: one[1], ("verdict", "verdict_reason", "cure")),
+    name="candidate",
+    later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
+
+
+def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
+    """Give the candidates, each with the decision on it."""
+    return [(one, answer.decision_on(one)) for one in answer.candidates]
 
 
 def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
@@ -50,7 +67,7 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
           "the longest acceptable pair in td_window, where much rigid time was given up for quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
-    Field("candidates", many(CANDIDATE)),
+    Field("candidates", many(CANDIDATE), get=_decided),
     Field("acceptable_windows", maybe(many(_WINDOW)),
           "on basis energy: windows in which every tr is acceptable, null on another basis", _windows),
     Field("recommended", maybe(keys.TIMES)),
@@ -65,8 +82,8 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 
 
 # Columns that are left out first where a table would be too wide, and those that only a close look asks for.
-_SPARE: Final = ("tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("kind", "L", "R")
+_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
+_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
 
 def as_table(answer: Suggestion, shown: Shown) -> str:
@@ -74,10 +91,11 @@ def as_table(answer: Suggestion, shown: Shown) -> str:
 
     Where nothing is recommended the candidates stand there only if all is asked for.
     """
+    above = heading(answer.situation, verbose=shown.verbose)
     lines = [
-        *tables.in_line((*verdict(answer), *outlook(answer))),
+        *tables.in_line((*verdict(answer), *next_step(answer))),
         "",
-        *tables.in_line(heading(answer.situation, verbose=shown.verbose)),
+        *tables.in_line((*facts(answer), *outlook(answer), *above)),
     ]
     if answer.candidates and (answer.recommended or shown.verbose):
         lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]
@@ -87,9 +105,11 @@ def as_table(answer: Suggestion, shown: Shown) -> str:
 
 
 def as_markdown(answer: Suggestion, shown: Shown) -> str:
-    """The candidates as a Markdown table, and the verdict below it."""
-    said = tables.listed((*verdict(answer), *outlook(answer)))
-    return "\n\n".join([tables.as_markdown(*_some(answer, shown)), *said])
+    """The verdict, the candidates as a Markdown table, and below it what the verdict rests on."""
+    above = tables.listed((*verdict(answer), *next_step(answer)))
+    below = tables.listed((*facts(answer), *outlook(answer)))
+    table = tables.as_markdown(*_some(answer, shown))
+    return "\n\n".join([*above, table, *below])
 
 
 def _some(
@@ -103,113 +123,53 @@ def _some(
 
 def as_csv(answer: Suggestion, _: Shown) -> str:
     """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
-    columns = [*(key for key in keys.CANDIDATE.keys if key != "notes"), "td", "notes"]
+    left_out = ("notes", "parts")
+    columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
     return csv_of(
-        columns, ({**keys.CANDIDATE.plain(one), "td": td} for one in answer.candidates)
+        columns, ({**CANDIDATE.plain(one), "td": td} for one in _decided(answer))
     )
-
-
-def headline(answer: Suggestion) -> str:
-    """What the pair is called: a poor one of a td that was asked for is not recommended, it is the best it has."""
-    bad = answer.td_window is None and answer.quality and answer.quality.grade == "poor"
-    return "best of a bad td" if bad else "recommended"
 
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to paste, what it saves, what it costs, and how sure that is; a name and a sentence each."""
-    best, quality, better = answer.chosen, answer.quality, answer.clearly_better
-    if best is None or quality is None:
-        found = [("recommended", f"none: {answer.why_none}")]
-    else:
-        found = [
-            (headline(answer), _pair(answer.recommended)),
-            ("saves", _saved(best)),
-            ("keeps", _kept(answer, best)),
-            ("quality", _sure(best, quality)),
-            *statements(quality),
-        ]
-    return (
-        [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")]
-        if better
-        else found
-    )
+    """What to do with the recommended pair, why, and what comes after td; a name and a sentence each."""
+    best, decision, better = answer.chosen, answer.decision, answer.clearly_better
+    lines = [("no pair to use", answer.why_none)]
+    if best and decision:
+        lines = headed(decision, best.tr, answer.td)
+    if better and not (decision and decision.better):
+        lines.append(
+            ("better pair", f"{_times(better)}: {better_about(answer, better)}")
+        )
+    return lines
 
 
-def _saved(best: Candidate) -> str:
-    return f"rigid for {best.rigid_fraction:.0%} of the record, {best.rigid_time:.6g}"
-
-
-def _sure(best: Candidate, quality: Quality) -> str:
-    """How good the pair is, why it is none better, and how exactly tr is known."""
-    known = (
-        ""
-        if best.tr_high is None
-        else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
-    )
-    room = (
-        ""
-        if best.timing_tolerance is None
-        else f" and may be off by {best.timing_tolerance:.1g}"
-    )
-    return f"{quality.told}{known}{room}"
-
-
-def statements(quality: Quality) -> list[tuple[str, str]]:
-    """What is said of motion and vibration, each by itself; nothing where both are good by themselves."""
-    if quality.motion.grade == quality.alone.grade == "good":
+def facts(answer: Suggestion) -> list[tuple[str, str]]:
+    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+    best, decision = answer.chosen, answer.decision
+    if best is None or decision is None:
         return []
-    alone = quality.alone
-    said = (
-        alone.grade
-        if alone.grade == quality.vibration.grade
-        else f"{quality.vibration.grade}, by itself {alone.grade}"
-    )
-    worth = ""
-    if quality.worth is not None:
-        worth = f"; its error holds at most {quality.worth.share:.2g} of the energy of the next contact"
-    return [
-        ("motion", graded(quality.motion)),
-        ("vibration", f"{graded(alone._replace(grade=said))}{worth}"),
-    ]
-
-
-def graded(grade: Grade) -> str:
-    """Give a grade with the reasons why it is none better."""
-    return f"{grade.grade}{': ' * bool(grade.reasons)}{'; '.join(grade.reasons)}"
-
-
-def _kept(answer: Suggestion, best: Candidate) -> str:
-    """What is left after td: of the mean energy, and of the vibration."""
-    if answer.situation.at_rest:
-        return "everything: nothing vibrates in the flight up to td"
-    kept, found = answer.kept, []
-    if kept is not None:
-        found.append(f"{mean_energy(kept)} of the mean energy after td")
-    if best.residual is not None:
-        found.append(f"the vibration is off by {_off(best)}")
+    lines = [*statements(decision), ("rigid for", rigid_for(best))]
+    if saves := saving(best):
+        lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
-        found.append("no switch keeps this vibration")
-    return "; ".join(found) or "unknown"
+        lines.append(("keeps", "no switch keeps this vibration"))
+    if exact := accuracy(best):
+        lines.append(("tr", exact))
+    return lines
 
 
-def mean_energy(kept: Kept) -> str:
-    """Give the bounds of the mean energy after td, one number if they read alike."""
-    low, high = f"{kept.low:.0%}", f"{kept.high:.0%}"
-    return low if low == high else f"{low} to {high}"
-
-
-def _off(best: Candidate) -> str:
-    """Give the residual, with its band where that is wide."""
-    low, high = best.residual_low, best.residual_high
-    if (
-        best.residual is None
-        or low is None
-        or high is None
-        or high <= best.residual + MUCH_HIGHER
-    ):
-        return f"{best.residual:.1%}"
-    return f"{best.residual:.0%}, between {low:.0%} and {high:.0%}"
+def next_step(answer: Suggestion) -> list[tuple[str, str]]:
+    """What to type next: for a pair that can be used."""
+    decision = answer.decision
+    if decision is None or decision.verdict == DO_NOT_USE:
+        return []
+    return [
+        (
+            "next",
+            "print the cards with -f card, or a page of the evidence with --report FILE",
+        )
+    ]
 
 
 def better_about(answer: Suggestion, better: Pair) -> str:
@@ -233,10 +193,6 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
         [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
     )
     best = answer.chosen
-    if best and best.run_time_share is not None:
-        lines.append(
-            ("run time", f"about {best.run_time_share:.0%} of the reference's")
-        )
     if best and best.position_error is not None:
         lines.append(
             (
@@ -315,30 +271,17 @@ def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.C
         "tr": lambda c: c.tr,
         "+-": lambda c: tables.half(c.tr_low, c.tr_high),
         "kind": lambda c: c.kind,
-        "E(tr)/E(td)": lambda c: c.energy_ratio,
-        "sign": lambda c: {True: "same", False: "opposite", None: None}[c.sign_match],
-        "L": lambda c: tables.measure(c.lock_in_error),
-        "R": lambda c: tables.measure(c.residual),
-        "tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
-        "rigid": lambda c: c.rigid_time,
-        "verdict": lambda c: (
-            headline(answer)
-            if c.recommended
-            else "acceptable"
-            if c.acceptable
-            else c.notes[0]
-        ),
+        "E(tr)/E(td)": lambda c: c.level_ratio,
+        "direction": lambda c: {True: "same", False: "opposite", None: None}[
+            c.sign_match
+        ],
+        "lock-in error": lambda c: tables.measure(c.lock_in_error),
+        "residual": lambda c: tables.measure(c.residual),
+        "timing tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
+        "rigid for": lambda c: c.rigid_time,
+        "verdict": lambda c: in_short(answer.decision_on(c)),
     }
     return tables.filled(columns, answer.candidates[:limit])
-
-
-def _pair(pair: Pair | None) -> str:
-    if pair is None:
-        return "none"
-    residual = (
-        "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
-    )
-    return f"{_times(pair)}{residual}"
 
 
 def _times(pair: Pair) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import make_printable
 from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
+from d2rpick.report.decision import headed, in_short
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import what_was_read
 
@@ -39,9 +40,7 @@ OFFER: Final = row(
 )  # fmt: skip
 # Columns of the csv and of a frame.
 COLUMNS: Final = [
-    key
-    for key in OFFER.keys
-    if key not in ("quality_reasons", "acceptable_windows", "expected")
+    key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
 
 
@@ -52,11 +51,17 @@ _HALF: Final = (0.45, 0.5)
 
 
 # Columns that are left out first where the table would be too wide.
-_SPARE: Final = ("tolerance", "level error", "of record", "peak", "K")
+_SPARE: Final = (
+    "timing tolerance",
+    "level error",
+    "of simulated time",
+    "peak",
+    "kinetic fraction",
+)
 
 
 def as_table(found: TradeOff, shown: Shown) -> str:
-    """What was read, some of the offers that nothing beats, and the answer in a sentence."""
+    """The answer in a sentence, the verdict on the best pair, some of the offers that nothing beats, what was read."""
     some = some_of(found, shown.limit)
     offered = (
         tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
@@ -65,20 +70,32 @@ def as_table(found: TradeOff, shown: Shown) -> str:
     )
     low, high = found.td_window
     window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
-    lines = tables.in_line(
-        [("history", what_was_read(found.situation.history)), ("td", window)]
-    )
-    lines += ["", offered]
+    lines = [
+        make_printable(answer(found)),
+        *tables.in_line(verdict(found)),
+        "",
+        offered,
+    ]
     left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
-    return "\n".join([*lines, "", make_printable(answer(found))])
+    read = [("history", what_was_read(found.situation.history)), ("td", window)]
+    return "\n".join([*lines, "", *tables.in_line(read)])
+
+
+def verdict(found: TradeOff) -> list[tuple[str, str]]:
+    """What to do with the recommended pair, why, and what would be better."""
+    best = found.recommended
+    if best is None or best.best is None or best.decision is None:
+        return [("no pair to use", "no td in the window has an acceptable tr")]
+    return headed(best.decision, best.best.tr, best.td)
 
 
 def as_markdown(found: TradeOff, shown: Shown) -> str:
     """The same offers as a Markdown table, and the answer below it."""
     some = tables.known(*table(some_of(found, shown.limit)))
-    return "\n\n".join([tables.as_markdown(*some), tables.in_markdown(answer(found))])
+    said = [tables.in_markdown(answer(found)), *tables.listed(verdict(found))]
+    return "\n\n".join([*said, tables.as_markdown(*some)])
 
 
 def as_csv(found: TradeOff, _: Shown) -> str:
@@ -153,8 +170,8 @@ def _cost(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no run time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's run time"
+            return "costs no processor time"
+        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's processor time"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -210,10 +227,12 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "level error": lambda one: tables.measure(
         one.best.level_error if one.best else None
     ),
-    "K": lambda one: tables.measure(one.kinetic_share),
-    "rigid": lambda one: one.rigid_time,
-    "of record": _of_best("rigid_fraction", ".1%"),
-    "run time": _of_best("run_time_share", ".0%"),
-    "tolerance": _of_best("timing_tolerance", ".1e"),
-    "quality": lambda one: one.quality.grade if one.quality else one.answer.why_none,
+    "kinetic fraction": lambda one: tables.measure(one.kinetic_share),
+    "rigid for": lambda one: one.rigid_time,
+    "of simulated time": _of_best("rigid_fraction", ".1%"),
+    "processor time": _of_best("run_time_share", ".0%"),
+    "timing tolerance": _of_best("timing_tolerance", ".1e"),
+    "verdict": lambda one: (
+        in_short(one.decision) if one.decision else one.answer.why_none
+    ),
 }

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
 from d2rpick.report import keys, tables
+from d2rpick.report.decision import accuracy, headed, rigid_for, saved, statements
 from d2rpick.report.fields import Document, Field, kind_of, maybe, row
 from d2rpick.report.situation import heading
-from d2rpick.report.suggestion import statements
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
@@ -22,13 +22,17 @@ MEASURES: Final = row(
     *keys.CANDIDATE.of_part(lambda answer: answer.candidate, keys.MEASURES),
     Field("tr_ok", "flag?"),
     Field("td_ok", "flag?"),
-    Field("verified", "flag"),
+    Field(
+        "verified",
+        "flag",
+        "admissible, not poor, and with a residual of at most 0.5; verdict says what to do",
+    ),
 )
 SWITCHED: Final = row(
     Field("source", kind_of("texts", minItems=1)),
     Field("energy_frozen", "number", "came back at td"),
     Field("energy_td", "number", "of the reference at td"),
-    Field("energy_ratio", "number?"),
+    Field("level_ratio", "number?", "energy_frozen over energy_td"),
     Field("end", "number", "compared from td to here"),
     Field("mean_after", "number"), Field("mean_after_reference", "number"),
     Field("spread_after", kind_of("number", minimum=0), "standard deviation"),
@@ -56,65 +60,97 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: Verdict, shown: Shown) -> str:
-    """The verdict and its reasons, what it rests on, and the measures of the pair."""
-    lines = tables.in_line(
-        (name, value)
-        for name, value in MEASURES.plain(answer).items()
-        if value is not None
-    )
-    reasons = [f"  {make_printable(reason)}" for reason in answer.reasons]
+    """The verdict, why, and what would be better; then what it rests on, and the measures of the pair."""
+    decided = answer.decision.reason
+    remarks = [("note", what) for what in answer.reasons if what not in decided]
+    above = heading(answer.situation, verbose=shown.verbose)
+    lines = tables.in_line(verdict(answer))
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    graded = (
-        [("quality", answer.quality.told), *statements(answer.quality)]
-        if answer.quality
-        else []
+    listed = [*facts(answer), *above, *remarks]
+    said = [(name, make_printable(text)) for name, text in listed]
+    return "\n".join(
+        [*lines, "", *tables.in_line(said), "", *tables.in_line(measured(answer))]
     )
-    head = [("verdict", told(answer)), *graded]
-    above = tables.in_line(heading(answer.situation, verbose=shown.verbose))
-    return "\n".join([*tables.in_line(head), *reasons, "", *above, "", *lines])
+
+
+def verdict(answer: Verdict) -> list[tuple[str, str]]:
+    """What to do with the pair, why, and what would be better; a name and a sentence each."""
+    return headed(answer.decision, answer.candidate.tr, answer.td)
+
+
+def facts(answer: Verdict) -> list[tuple[str, str]]:
+    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+    best = answer.candidate
+    lines = [*statements(answer.decision), ("rigid for", rigid_for(best))]
+    if best.run_time_share is not None:
+        lines.append(("saves", saved(best.run_time_share)))
+    if exact := accuracy(best):
+        lines.append(("tr", exact))
+    return lines
+
+
+def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
+    """The measures of the pair by names for people, without those that are not known."""
+    best = answer.candidate
+    direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
+    found: list[tuple[str, tables.Cell]] = [
+        ("energy at tr", best.energy),
+        ("energy at td", answer.energy_td),
+        ("energy at tr / at td", best.level_ratio),
+        ("level error", tables.shown(best.level_error, ".3f")),
+        ("direction of the deformation at tr", direction),
+        ("kinetic fraction at td", tables.shown(answer.kinetic_share, ".3f")),
+        ("lock-in error", tables.shown(best.lock_in_error, ".3f")),
+        ("residual, expected", tables.shown(best.residual, ".3f")),
+        ("residual, lowest", tables.shown(best.residual_low, ".3f")),
+        ("residual, highest", tables.shown(best.residual_high, ".3f")),
+        ("mismatch of the parts", tables.shown(best.part_mismatch, ".3f")),
+        ("timing tolerance", best.timing_tolerance),
+        ("position error", best.position_error),
+    ]
+    return [one for one in found if one[1] is not None]
 
 
 def as_markdown(answer: Verdict, _: Shown) -> str:
-    """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(
-        ("measure", "value"),
-        list({**MEASURES.plain(answer), **_of_switched(answer)}.items()),
+    """The verdict, and the measures as a Markdown table of two columns."""
+    said = tables.listed((*verdict(answer), *facts(answer)))
+    table = tables.as_markdown(("measure", "value"), measured(answer))
+    switched = answer.switched
+    compared = (
+        [
+            tables.as_markdown(COMPARED, comparison(switched)),
+            *tables.listed(deviations(switched)),
+        ]
+        if switched
+        else []
     )
-    return "\n".join(
-        [table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)]
-    )
+    reasons = [f"* {tables.in_markdown(reason)}" for reason in answer.reasons]
+    return "\n\n".join([*said, table, *compared, *reasons])
 
 
 def measures(answer: Verdict) -> dict[str, Any]:
     """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
     situation = answer.situation
-    measured = {
+    measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
         "kinetic_share": situation.kinetic_share,
         **MEASURES.plain(answer),
     }
-    return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
+    decided = {field.key: field.of(answer) for field in keys.DECISION}
+    return {
+        **measured,
+        **_of_switched(answer),
+        **decided,
+        "quality": answer.decision.grade,
+        "reasons": "; ".join(answer.reasons),
+    }
 
 
 def as_csv(answer: Verdict, _: Shown) -> str:
     """One row, a column for each key of `measures`."""
     found = measures(answer)
     return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
-
-
-def told(answer: Verdict) -> str:
-    """The verdict, and what a pair that verifies keeps."""
-    if not answer.verified:
-        return answer.word
-    if answer.situation.at_rest:
-        return f"{answer.word}: tr lies in the flight, and nothing vibrates there"
-    held = (
-        "its level is"
-        if answer.situation.basis == "energy"
-        else "its sign matches and its error is"
-    )
-    return f"{answer.word}: tr lies in the flight, {held} within the tolerance"
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:

@@ -271,15 +271,18 @@ class HistoryJudge:
 
 
 def find_faults(verdict: Verdict) -> Iterator[Fault]:
-    """Yield the objections that follow from a verdict; a pair that is not verified has at least one of severity
+    """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
     faults = [*_judge_flight(verdict), *_judge_error(verdict)]
-    if not verdict.verified and not faults:
+    if not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
-    situation = verdict.situation
-    if (
+    situation, decision = verdict.situation, verdict.decision
+    if verdict.admissible and not decision.reaches(situation.settings.min_quality):
+        what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
+        yield Fault("D2R209", False, what)
+    elif (
         situation.kinetic_share is not None
         and situation.kinetic_share > POOR_KINETIC_SHARE
     ):

@@ -460,7 +460,7 @@ def _check_sign(case: Case) -> Iterator[Objection]:
 
 
 @set_passing(*_PASSING)
-@set_failing(_make_pair_deck(".0128853", "0.064"))
+@set_failing(_make_pair_deck(".0128853", "0.064", "--min-quality poor"))
 @make_rule_decorator(
     "D2R203",
     WARNING,
@@ -469,11 +469,26 @@ def _check_sign(case: Case) -> Iterator[Objection]:
 )
 def _check_kinetic_share(case: Case) -> Iterator[Objection]:
     """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
-    Near a maximum of the internal energy hardly any vibration energy is kinetic.
+    Near a maximum of the internal energy hardly any vibration energy is kinetic. Not reported if D2R209 is.
 
     Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """
     return _report_faults(case, "D2R203")
+
+
+@set_passing(*_PASSING, _make_pair_deck(".0128853", "0.064", "--min-quality poor"))
+@set_failing(_make_pair_deck(".0128853", "0.064"))
+@make_rule_decorator(
+    "D2R209", ERROR, "a pair of poor quality (below --min-quality)", BOTH
+)
+def _check_quality(case: Case) -> Iterator[Objection]:
+    """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
+    not show that they will be right. Judged as d2rpick verify does. --min-quality good also reports pairs that are
+    only fair, --min-quality poor reports none.
+
+    Fix: Use the pair that the finding names. If it names none, do what it says would improve the pair.
+    """
+    return _report_faults(case, "D2R209")
 
 
 @set_passing(*_PASSING)

@@ -227,7 +227,7 @@ def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
     """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
     run = d2.read(BOX)
     plan, parts = (
-        d2.plan(run, parts="box", replay=False),
+        d2.plan(run, parts="box", replay=False, min_quality="poor"),
         d2.parts(run, deck=SAMPLE_DECK, replay=False),
     )
     holds(plan.to_frame(), plan.to_dict()["windows"])
@@ -350,9 +350,9 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     assert "d2rpick suggest --td 0.0687534" in page
     verdict = d2.verify(d2.read(ENERGY), tr=sure(found.recommended).tr, td=float(TD))
     assert verdict.plot().axes
-    assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text(
-        "utf-8"
-    )
+    assert '<span class="badge use">use</span>' in verdict.report(
+        str(tmp_path / "verdict.html")
+    ).read_text("utf-8")
 
 
 def test_the_command_of_a_study_runs_whatever_was_asked() -> None:
@@ -490,7 +490,7 @@ def test_cards_are_those_of_the_command_line() -> None:
     run = d2.read(MATSUM)
     chosen, plan = (
         d2.suggest(run, 0.37, parts=1, replay=False),
-        d2.plan(run, parts=1, replay=False),
+        d2.plan(run, parts=1, replay=False, min_quality="poor"),
     )
     options = (
         "--merge",
@@ -572,7 +572,9 @@ def test_a_wrong_option_of_a_card_is_named(
 
 
 def test_a_figure_shows_itself() -> None:
-    figure: Any = d2.plan(d2.read(MATSUM), parts=1, replay=False).plot()
+    figure: Any = d2.plan(
+        d2.read(MATSUM), parts=1, replay=False, min_quality="poor"
+    ).plot()
     assert figure._repr_png_().startswith(b"\x89PNG")
 
 

@@ -113,7 +113,7 @@ def test_numbers_of_numpy_are_taken_wherever_numbers_go() -> None:
         (np.float64(0.06), np.float64(0.07)),
     ):
         assert loose.suggest(run, td_window=pair, replay=False) == window
-    chosen = d2.plan(box, parts=[1], replay=False)
+    chosen = d2.plan(box, parts=[1], replay=False, min_quality="poor")
     for parts in (
         np.array([1]),
         np.int64(1),
@@ -126,9 +126,12 @@ def test_numbers_of_numpy_are_taken_wherever_numbers_go() -> None:
         expected = (
             chosen
             if "box" not in str(parts)
-            else d2.plan(box, parts="box", replay=False)
+            else d2.plan(box, parts="box", replay=False, min_quality="poor")
         )
-        assert loose.plan(box, parts=parts, replay=False).windows == expected.windows
+        assert (
+            loose.plan(box, parts=parts, replay=False, min_quality="poor").windows
+            == expected.windows
+        )
     explored = d2.explore(run, td_window=(0.06, 0.07), steps=4, replay=False)
     assert (
         loose.explore(run, td_window=(0.06, 0.07), steps=np.int32(4), replay=False)
@@ -179,7 +182,7 @@ def test_none_is_the_default_everywhere() -> None:
         after=None,
         replay=False,
     )
-    assert planned == d2.plan(run, replay=False)
+    assert planned == d2.plan(run, replay=False, min_quality="poor")
     explored = loose.explore(
         run, td=None, td_window=(0.069, 0.07), steps=None, replay=False
     )

@@ -130,7 +130,7 @@ def test_verify_measures_what_suggest_measures() -> None:
     judged = verify(paper.history(), best.tr, paper.TD, PLAIN)
     for name in [
         "energy",
-        "energy_ratio",
+        "level_ratio",
         "lock_in_error",
         "residual",
         "sign_match",
@@ -140,7 +140,10 @@ def test_verify_measures_what_suggest_measures() -> None:
         assert getattr(judged.candidate, name) == pytest.approx(
             getattr(best, name), rel=1e-9, abs=1e-9
         )
-    assert judged.verified
+    assert judged.tr_ok
+    assert judged.admissible
+    assert not judged.verified
+    assert judged.decision.verdict == "do not use"
     assert judged.td_ok is False  # a kinetic share of 0.92
 
 
@@ -214,7 +217,7 @@ def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
     """Whether a pair is verified; none is."""
     if pair is None:
         return True
-    return verify(history, pair.tr, pair.td, asked).verified
+    return verify(history, pair.tr, pair.td, asked).admissible
 
 
 @settings(max_examples=8)

@@ -67,7 +67,7 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
     assert switched["energy_frozen"] == pytest.approx(expected["IEfrozen_J"], rel=1e-5)
     # between two of every tenth state; of all of them 1.7492
     assert switched["energy_td"] == pytest.approx(1.7515, abs=1e-4)
-    assert switched["energy_ratio"] == switched["energy_frozen"] / switched["energy_td"]
+    assert switched["level_ratio"] == switched["energy_frozen"] / switched["energy_td"]
     # that table's means reach to 380 ms and were taken of every tenth state; contact is at 381.9 ms
     assert switched["mean_after"] == pytest.approx(
         expected["IEmean_td_to_380ms_J"], rel=0.01
@@ -299,7 +299,7 @@ def test_a_right_switched_run_verifies_and_shows_what_was_locked_in(
     )
     switched = found["switched"]
     assert found["flight"]["source"] == "momentum"
-    assert switched["energy_ratio"] == pytest.approx(1, abs=1e-3)
+    assert switched["level_ratio"] == pytest.approx(1, abs=1e-3)
     assert switched["mean_after"] == pytest.approx(
         switched["mean_after_reference"], rel=1e-3
     )
@@ -514,7 +514,7 @@ def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
     assert (
         compare_runs(
             history(0 * TIME), history(1 + TIME), (0.1, 0.5), 1.0, 0.2, NONE, NONE
-        ).energy_ratio
+        ).level_ratio
         is None
     )
 

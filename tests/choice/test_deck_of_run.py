@@ -125,7 +125,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
         written = tmp_path / rule
         result = run(
             "plan",
-            "-q",
+            *("-q", "--min-quality", "poor"),
             "--node",
             "1808",
             "--deck",

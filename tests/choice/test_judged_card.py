@@ -57,5 +57,6 @@ def test_each_window_has_its_verdict_in_the_comments() -> None:
     assert card.windows == tuple(windows)
     assert [verdict.verified for verdict in verdicts] == [True, False]
     lines = " ".join(line.removeprefix("$ ").strip() for line in card.text.splitlines())
-    assert "0.0135867 to 0.0687534 verified." in lines
-    assert "0.0939 to 0.119 NOT verified" in lines
+    assert "0.0135867 to 0.0687534 use. The flight is certain" in lines
+    assert "0.0939 to 0.119 DO NOT USE. " in lines
+    assert "To improve: use tr = " in lines

@@ -293,7 +293,7 @@ def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
     )
     assert judged["run_time_share"] == pytest.approx(best["run_time_share"])
     assert (
-        "rigid for 34% of the record"
+        "rigid for  0.0511147, 34% of the simulated time"
         in run("suggest", "--td", "0.064", *saving, ENERGY).stdout
     )
     assert (

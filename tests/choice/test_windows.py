@@ -321,7 +321,7 @@ def check(answer: Suggestion, seed: int) -> None:
     ends = windows[rng.permutation(len(windows))[:3]]
     inside = rng.uniform(ends[:, :1], ends[:, 1:], (len(ends), 2))
     assert all(
-        verify_at(situation, t).verified for t in [*ends.ravel(), *inside.ravel()]
+        verify_at(situation, t).admissible for t in [*ends.ravel(), *inside.ravel()]
     )
     # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
@@ -332,7 +332,7 @@ def check(answer: Suggestion, seed: int) -> None:
         np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1)
         > 1e-5 * history.step
     ]
-    assert [verify_at(situation, t).verified for t in clear] == holds(
+    assert [verify_at(situation, t).admissible for t in clear] == holds(
         windows, clear
     ).tolist()
     # the errors in the windows are those of ``verify``; where nothing vibrates there are none
@@ -432,7 +432,7 @@ def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_s
 ):
     answer = suggest(PAPER, TD, Settings())
     windows = windows_of(answer)
-    acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
+    acceptable = np.array(sorted(c.tr for c in answer.candidates if c.admissible))
     assert len(windows) == len(acceptable)
     assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
 
@@ -516,7 +516,7 @@ def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     times = np.linspace(0.01, 0.06, 400)
     seen = [examine(history, 0.0687534, Settings()) for history in histories]
     expected = [
-        all(verify_at(situation, t).verified for situation in seen) for t in times
+        all(verify_at(situation, t).admissible for situation in seen) for t in times
     ]
     assert holds(both, times).tolist() == expected
     assert any(expected)

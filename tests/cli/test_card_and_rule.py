@@ -59,7 +59,9 @@ def test_options_of_the_card() -> None:
 def test_the_times_are_judged_as_they_are_printed() -> None:
     good = run("card", *GOOD, "--part", "1", "--history", ENERGY)
     assert good.exit_code == 0
-    assert f"Judged by {ENERGY}, internal_energy: verified." in comments(good.stdout)
+    assert f"Judged by {ENERGY}, internal_energy: use. The flight is" in comments(
+        good.stdout
+    )
     alone = run(
         "card",
         "--tr",
@@ -73,12 +75,17 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
         "--history",
         BOX,
     )
-    assert ": verified by the energy level alone" in comments(alone.stdout)
+    assert ": use with care. How the deformations at tr and td lie" in comments(
+        alone.stdout
+    )
     bad = run("card", *OPPOSITE, "--part", "1", "--history", ENERGY)
     assert bad.exit_code == 1
-    assert "NOT verified (opposite sign of the deformation)" in comments(bad.stdout)
+    assert ": DO NOT USE. Opposite sign of the deformation." in comments(bad.stdout)
     assert "poor-td: 92%" in comments(bad.stdout)
-    assert "warning: not-verified: the times as printed: opposite sign" in bad.stderr
+    assert (
+        "warning: not-verified: the times as printed: do not use: opposite sign"
+        in bad.stderr
+    )
     assert pasted(bad) == [(1, 0.0122659, 0.064)]
     assert (
         run(
@@ -101,7 +108,10 @@ def test_a_rounded_time_is_told_and_judged() -> None:
     )
     assert "note: tr is printed as .01288528, " in result.stderr
     assert pasted(result) == [(1, 0.01288528, 0.064)]
-    assert result.exit_code == 0
+    assert ": DO NOT USE. The vibration after td is wrong by 96%" in comments(
+        result.stdout
+    )
+    assert result.exit_code == 1
 
 
 def test_parts_are_those_of_the_history() -> None:
@@ -195,7 +205,7 @@ def test_engine_files_of_radioss() -> None:
     judged = run("card", *args, "--history", ENERGY)
     assert judged.exit_code == 0
     assert "                0.15\n" in judged.stdout
-    assert "verified" in comments(judged.stdout)
+    assert ": use. The flight" in comments(judged.stdout)
 
 
 @pytest.mark.parametrize("solver", ["ls-dyna --part 1", "radioss --node 1 --end 0.2"])
@@ -238,7 +248,7 @@ def test_suggest_prints_the_card_of_its_pair() -> None:
     assert "    1.0e-5         1         0" in result.stdout
     assert td == 0.37
     assert f"--part {part} " not in result.stdout
-    assert "verified" in comments(result.stdout)
+    assert ": use with care. " in comments(result.stdout)
 
 
 def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:

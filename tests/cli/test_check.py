@@ -466,7 +466,10 @@ def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -
             judged["reasons"],
             told,
         )
-        assert ("D2R203" in told) == (judged["kinetic_share"] > 0.5)
+        assert (judged["kinetic_share"] > 0.5) == (
+            {"D2R203", "D2R209"} & {*told} != set()
+        )
+        assert ("D2R209" in told) <= (judged["verdict"] == "do not use")
         assert ("D2R202" in told) == any(
             "opposite sign" in reason for reason in judged["reasons"]
         )

@@ -228,10 +228,12 @@ def test_ndjson_is_the_json_in_one_line() -> None:
 def test_a_pair_may_be_asked_to_be_good(
     args: tuple[str, ...], wanted: str, code: int
 ) -> None:
-    plain = run(*args, "-q", "-f", "csv", ENERGY)
+    plain = run(*args, "-q", "-f", "csv", "--min-quality", "poor", ENERGY)
     asked = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
     assert (plain.exit_code, asked.exit_code) == (0, code)
     assert asked.stdout == plain.stdout
+    if args[0] == "verify" and wanted == "fair":  # by default
+        assert run(*args, "-q", ENERGY).exit_code == code
     assert (
         args[0] != "verify"
         or run(*args, "-q", "--exit-zero", "--min-quality", wanted, ENERGY).exit_code

@@ -67,9 +67,15 @@ def rows_of(text: str) -> list[dict[str, Any]]:
 
 
 def _typed(key: str, cell: str) -> Any:
-    if key in ("kind", "notes", "reasons"):
+    if key in TEXTS:
         return cell
     return json.loads(cell) if cell else None
+
+
+TEXTS = (
+    *("kind", "notes", "reasons", "quality"),
+    *("verdict", "verdict_reason", "cure", "expected_after_td", "worst_case"),
+)
 
 
 # Formats.
@@ -122,8 +128,12 @@ def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(
 
 
 @pytest.mark.parametrize("args", ANSWERS)
-def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
-    table, *_ = run(*args, "-f", "markdown").stdout.split("\n\n")
+def test_markdown_begins_with_the_verdict_and_has_a_table(
+    args: tuple[str, ...],
+) -> None:
+    verdict, *paragraphs = run(*args, "-f", "markdown").stdout.split("\n\n")
+    assert re.match("(use|use with care|do not use|no pair to use): ", verdict)
+    table = next(one for one in paragraphs if one.startswith("|"))
     head, rule, *rows = [
         line.strip("|\n").split("|") for line in table.rstrip("\n").split("\n")
     ]
@@ -134,21 +144,20 @@ def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
 
 def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> None:
     lines = run(*SUGGEST, ENERGY).stdout.splitlines()
-    assert lines[:8] == [
-        "best of a bad td  tr = 0.0128853, td = 0.064, residual 0.957",
-        "saves             rigid for 34% of the record, 0.0511147",
-        "keeps             8% of the mean energy after td; the vibration is off by 95.7%",
-        "quality           poor: the vibration after td is off by 96%; tr is known to ±1e-07 and may be off",
-        "                  by 5e-05",
-        "motion            good",
-        "vibration         poor: the vibration after td is off by 96%",
-        "better pair       tr = 0.0135867, td = 0.0687534: residual 0.000 instead of 0.957",
+    assert lines[:4] == [
+        "do not use  tr = 0.0128853, td = 0.064",
+        "why         the vibration after td is wrong by 96%, since 92% of its energy is kinetic at td, which",
+        "            no tr can keep",
+        "to improve  use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%",
     ]
-    assert lines[9].startswith(f"history  {ENERGY}: csv, internal_energy, 1501 states")
-    assert [line.split()[2] for line in lines if line.startswith("*")] == ["0.0128853"]
-    assert next(line for line in lines if line.startswith("*")).endswith(
-        "best of a bad td"
+    assert lines[4].startswith(
+        "expect      8% of the reference's mean energy after td; vibration wrong by 95.7%"
     )
+    assert "motion     good" in lines
+    assert "rigid for  0.0511147, 34% of the simulated time" in lines
+    assert any(line.startswith(f"history    {ENERGY}: csv, internal") for line in lines)
+    assert [line.split()[1] for line in lines if line.startswith("*")] == ["0.0128853"]
+    assert "do not use" in next(line for line in lines if line.startswith("*"))
 
 
 @pytest.mark.slow
@@ -235,7 +244,7 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
     ("args", "line"),
     [
         ((*SUGGEST, ENERGY), r"\*"),
-        ((*VERIFY, "--no-verify", ENERGY), "verdict  "),
+        ((*VERIFY, "--no-verify", ENERGY), "do not use  "),
         (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error"),
     ],
 )
@@ -671,7 +680,7 @@ def test_columns_without_a_value_are_left_out_and_three_rows_are_shown() -> None
     assert not re.search(r"  -( |$)", brief)
     assert "crossing" not in brief
     assert "crossing" in full
-    assert "basis    energy level alone (the sign is unknown)\n" in brief
+    assert "basis       energy level alone (the sign is unknown)\n" in brief
     assert "(the sign is unknown): identification was switched off" in full
 
 
@@ -679,11 +688,9 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     result = run("suggest", "--td", "0.38", "--part", "box", MATSUM)
     assert result.exit_code == 1
     first, second, *_ = result.stdout.split("\n")
-    assert (
-        first == "recommended  none: td = 0.38: td after the end of the flight at 0.379"
-    )
-    assert second.startswith("better pair  tr = 0.0970304, td = 0.37")
-    assert "verdict" not in result.stdout
+    assert first == "no pair to use  td = 0.38: td after the end of the flight at 0.379"
+    assert second.startswith("better pair     tr = 0.0970304, td = 0.37")
+    assert " verdict" not in result.stdout
     assert "no-candidate" not in result.stderr
     assert (
         "no-candidate"
@@ -691,9 +698,10 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     )
 
 
-def test_the_best_of_a_bad_td_is_said_of_a_td_that_was_asked_for() -> None:
+def test_a_td_that_was_given_is_answered_however_poor_and_none_is_chosen_so() -> None:
     poor = ("--max-residual", "2", ENERGY)
-    assert run(*SUGGEST, *poor).stdout.startswith("best of a bad td")
-    chosen = run("suggest", "--td-window", "0.063", "0.065", *poor).stdout
-    assert chosen.startswith("recommended  tr")
-    assert "quality      poor" in chosen
+    given = run(*SUGGEST, *poor)
+    chosen = run("suggest", "--td-window", "0.063", "0.065", *poor)
+    for answered in (given, chosen):
+        assert answered.stdout.startswith("do not use  tr = ")
+    assert (given.exit_code, chosen.exit_code) == (0, 1)

@@ -143,5 +143,5 @@ def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
     result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
     assert result.exit_code == 1
     reason = "before td = 0.064 the energy neither passes its level 0 nor peaks near it"
-    assert result.stdout.startswith(f"recommended  none: {reason}\n")
+    assert result.stdout.startswith(f"no pair to use  {reason}\n")
     assert "rank" not in result.stdout

@@ -8,6 +8,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.base.errors import ArgumentError
 from tests.command import MATSUM, ROOT, answer, put, refused, run
+from tests.energies import sure
 from tests.sample_deck import DECK
 
 pytestmark = pytest.mark.usefixtures("by_level")
@@ -74,15 +75,21 @@ def test_the_only_main_deck_is_used_and_named(command: str, box: Path) -> None:
 
 
 def test_python_uses_the_same_deck(box: Path) -> None:
-    found = d2.plan(d2.read(box), parts="flying", replay=False)
+    found = d2.plan(d2.read(box), parts="flying", replay=False, min_quality="poor")
     assert (
         found.windows
         == d2.plan(
-            d2.read(box), parts="flying", replay=False, deck=box / "main.k"
+            d2.read(box),
+            parts="flying",
+            replay=False,
+            min_quality="poor",
+            deck=box / "main.k",
         ).windows
     )
     assert "deck-in-folder" in [one.code for one in found.warnings]
-    without = d2.plan(d2.read(box), parts="flying", replay=False, deck=False)
+    without = d2.plan(
+        d2.read(box), parts="flying", replay=False, min_quality="poor", deck=False
+    )
     assert "deck-in-folder" not in [one.code for one in without.warnings]
     assert "--no-deck" in without.command
     assert "--deck" in found.command  # since the command names the files of the run
@@ -128,7 +135,8 @@ def test_what_check_would_say_is_said_when_the_card_is_printed(tmp_path: Path) -
     assert "card-objection: check of the deck with this card, switches.k:" in told
     assert "D2R111 (warning)" in told
     assert "warning D2R111" in checked_in(box, card)
-    (by_python,) = d2.plan(d2.read(box), parts="flying", replay=False).card().cautions  # type: ignore[union-attr]
+    plan = d2.plan(d2.read(box), parts="flying", replay=False, min_quality="poor")
+    (by_python,) = sure(plan.card()).cautions
     assert by_python.code == "card-objection"
     assert (
         str(tmp_path) not in by_python.message

@@ -373,7 +373,7 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
 ) -> None:
     found = suggest(totals(internal, kinetic), 0.8, PLAIN)
     assert sure(found.quality).grade == "poor"
-    assert "by gravity or by another load" in sure(found.quality).told
+    assert "by gravity or by another load" in sure(found.decision).reason
     assert found.situation.flight.unknown_load
 
 

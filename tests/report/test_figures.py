@@ -73,7 +73,7 @@ def test_the_band_is_known_on_every_basis(replay: bool) -> None:
 
 
 def test_few_candidates_are_marks_acceptable_or_not() -> None:
-    answer = d2.suggest(d2.read(ENERGY), td=0.064)
+    answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
     energy, motion = answer.plot().axes
     acceptable = sum(one.acceptable for one in answer.candidates)
     assert marks(energy) == [acceptable, len(answer.candidates) - acceptable]
@@ -137,7 +137,7 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
         assert axes.get_yscale() == "linear"
         assert axes.get_ylim() == pytest.approx((-3.2, 43.2))
     best = sure(answer.chosen)
-    assert (best.level_error, best.energy_ratio) == (0.0, None)
+    assert (best.level_error, best.level_ratio) == (0.0, None)
     resting = replace(
         row("run", 0.01),
         curve=np.stack([time, energy]),
@@ -207,3 +207,23 @@ def test_short_names_tell_runs_apart() -> None:
     assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
     assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
     assert short_names([]) == ()
+
+
+def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:
+    reference = d2.read(ENERGY)
+    found = d2.verify(reference, tr=0.0135867, td=0.0687534, switched=reference)
+    (energy,) = found.plot().axes
+    (line,) = (one for one in energy.lines if one.get_label() == SWITCHED_RUN)
+    assert np.array_equal(line.get_ydata(), sure(found.computed).energy)
+
+
+SWITCHED_RUN = "switched run, as computed"
+
+
+def test_a_plan_names_no_negative_energies_and_the_times_of_its_windows() -> None:
+    plan = d2.plan(d2.read(ENERGY))
+    (axes,) = plan.plot().axes
+    assert min(axes.get_yticks()) >= 0
+    (label,) = (one.get_text() for one in axes.texts if one.get_text()[:1] == "1")
+    ((tr, td),) = plan.windows
+    assert label == f"1: tr = {tr:.4g}, td = {td:.4g}"
