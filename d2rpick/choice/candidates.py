@@ -45,9 +45,9 @@ class Candidate(Measured, Record):
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several parts
-    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is E(tr)/E(td).  ``admissible``: the tr lies in the
-    flight, with the sign of td and an error within the tolerance; otherwise ``notes`` give the reasons.
-    ``acceptable``: admissible, with a residual of at most 0.5.
+    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is
+    E(tr)/E(td).  ``admissible``: the tr lies in the flight, with the sign of td and an error within the tolerance;
+    otherwise ``notes`` give the reasons.  ``acceptable``: admissible, with a residual of at most 0.5.
     ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
     than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
     model does not explain is a further mode.  ``parts`` lists the mismatch of each part, empty if single parts are

@@ -1,4 +1,4 @@
-"""Cards whose times were judged by an energy history, as they are printed."""
+"""Print cards whose times were judged by an energy history."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ if TYPE_CHECKING:
 
 
 class CardRequest(NamedTuple):
-    """What is known of a card before its times: ``solver`` None is the one that wrote the history.
+    """Options of a card before its times are known; without a ``solver`` it is the one that wrote the history.
 
-    What ``printing`` leaves open the history fills in: its chosen parts, and its end for that of the run.
+    The history completes ``printing``: its chosen parts, and its end as the end of the run.
     """
 
     solver: str | None = None
     printing: Printing = Printing()
 
     def of(self, history: History) -> tuple[str, Printing]:
-        """Name the solver, and say what its card needs."""
+        """Return the solver, and the complete options of its card."""
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
-        end = (
-            float(history.time[-1]) if self.printing.end is None else self.printing.end
-        )
+        if self.printing.end is None:
+            end = float(history.time[-1])
+        else:
+            end = self.printing.end
         solver = self.solver or find_solver(history.format)
         printing = self.printing._replace(part=ids, end=end)
         if "contact" in SOLVERS[solver].takes:
@@ -42,13 +43,13 @@ class CardRequest(NamedTuple):
         return solver, printing
 
     def whom(self, history: History) -> tuple[int, ...]:
-        """Give the parts or main nodes that the card switches; none where nobody says it."""
+        """Return the parts or main nodes that the card switches; empty if none are given."""
         solver, printing = self.of(history)
         switched: tuple[int, ...] = getattr(printing, SOLVERS[solver].switches)
         return switched
 
     def by(self, settings: Settings) -> CardRequest:
-        """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
+        """Return the request with the rigid bodies of a deck as merged parts, and its inactive bodies kept inactive."""
         bodies = tuple(body.parts for body in settings.bodies or ())
         off = tuple(
             node
@@ -59,24 +60,23 @@ class CardRequest(NamedTuple):
 
 
 def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Say when the named contact or rigid wall pushes, and how fast the parts come to it.
+    """Add the times at which the named contact or rigid wall pushes, and the closing speed of the parts.
 
-    The force that the solver wrote of it shows the times, else the momenta of the parts do; only these show the speed.
+    The contact force of the solver shows the times, or else the momenta of the parts; only momenta show the speed.
     """
     from d2rpick.flight.contact_times import (
         find_contact_times,
         find_force_times,
-    )  # not above: other cards do without
+    )  # imported here: other cards do not need it
     from d2rpick.histories.contact_forces import find_force
 
     momenta = next((one for one in history.momenta if one.parts), None)
     by_momenta = find_contact_times(momenta) if momenta else None
     contact = "interface" if solver == "Radioss" else "contact"
-    named = (
-        ("rigid wall", printing.wall)
-        if printing.contact is None
-        else (contact, printing.contact)
-    )
+    if printing.contact is None:
+        named = ("rigid wall", printing.wall)
+    else:
+        named = (contact, printing.contact)
     kind, number = named
     force = find_force(history.evidence.forces, kind, number or 0)
     found = (find_force_times(force) if force else None) or by_momenta
@@ -85,10 +85,10 @@ def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
 
 
 class SolverInput(NamedTuple):
-    """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
+    """Solver input for a pair of times: its ``text``, or ``refusal``, the reason why it cannot be printed.
 
-    Both are None where nobody says whom it switches.  ``solver`` is empty where it is the default, ``switches`` names
-    the option that says whom.
+    Both are None if no parts to switch are given.  ``solver`` is empty for the default solver, ``switches`` names the
+    option for the parts.
     """
 
     solver: str
@@ -100,7 +100,7 @@ class SolverInput(NamedTuple):
 def input_for(
     reference: Reference, situation: Situation, tr: float, request: CardRequest
 ) -> SolverInput:
-    """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
+    """Print the card of ``tr`` and the td of a situation, judged by the printed times."""
     solver, _ = request.of(situation.history)
     named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
     judge = partial(verify_of, reference, settings=situation.settings, known=situation)
@@ -123,10 +123,10 @@ def judged_card(
     request: CardRequest,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Print the card of windows, let ``judge`` judge each tr and td as printed, and print it with what it found.
+    """Print the card of windows with the verdicts that ``judge`` gives for the printed tr and td.
 
-    ``done`` are windows in which the run was switched already: they are printed too, and cannot be judged by it.
-    None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
+    ``done`` are windows in which the run was switched already: they are printed too, but cannot be judged by it.  The
+    result is None if the parts, or the main nodes for some solvers, are not given.
     """
     if not request.whom(history):
         return None
@@ -146,7 +146,7 @@ def judged_card(
 
 
 def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Give windows of switches by force as they are judged: between states."""
+    """Return the windows of switches by force as they are judged: between states."""
     from d2rpick.flight.contact_times import narrow_to_states  # as above
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)
@@ -156,18 +156,17 @@ def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
 def _remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[Verdict]
 ) -> Iterator[str]:
-    """Say which windows were not judged, whose level is not that of the parts, and what was found of the others."""
+    """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
         yield "The level is that of the whole model, whatever parts are switched."
     for verdict in verdicts:
-        which = (
-            f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
-            if len(verdicts) > 1
-            else ""
-        )
+        if len(verdicts) > 1:
+            which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
+        else:
+            which = ""
         yield from _judgement(verdict, which)
     yield from dict.fromkeys(
         f"{caution.code}: {caution.message}."
@@ -177,7 +176,9 @@ def _remarks(
 
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
-    candidate, history = verdict.candidate, verdict.situation.history
+    """Yield comments with the verdict on a pair."""
+    candidate = verdict.candidate
+    history = verdict.situation.history
     decision = verdict.decision
     word = decision.verdict
     said = word.upper() if word == DO_NOT_USE else word
@@ -186,7 +187,7 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # no level to match: the warning says so
+    if verdict.situation.at_rest:  # no level to match, as the warning states
         return
     measures = [
         f"{name} {value:.3f}"
@@ -203,5 +204,5 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
 
 
 def _sentence(text: str) -> str:
-    """Make a sentence of a reason."""
+    """Return a reason as a sentence."""
     return f"{text[:1].upper()}{text[1:]}."

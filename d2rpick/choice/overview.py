@@ -104,14 +104,14 @@ class Overview(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Whether switch times can be chosen by this run: "use", "use with care" or "do not use"."""
+        """Verdict on choosing switch times by this run: "use", "use with care" or "do not use"."""
         if self.unjudged or not self.flights:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
     @property
     def reason(self) -> str:
-        """Why the verdict is what it is."""
+        """Reason for the verdict."""
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
@@ -121,7 +121,7 @@ class Overview(NamedTuple):
 
     @property
     def _doubts(self) -> list[str]:
-        """What makes a run that flies less than good."""
+        """Reasons why a run with flights is not good."""
         health = cautions_of_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
@@ -140,14 +140,14 @@ class Overview(NamedTuple):
 
 
 def _flights_of(flights: Sequence[tuple[str, FreeFlight]]) -> str:
-    """Say how many flights there are, and how long the longest is."""
+    """Describe the number of flights and the duration of the longest."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
     return f"{count}, the longest for {longest:.6g}"
 
 
 def _health_of(health: Health | None) -> str:
-    """Say that the energies keep to the limits, as far as they are written."""
+    """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
         return (
             "the files do not hold the energy balance that shows whether a run is sound"
@@ -340,7 +340,7 @@ def _history(run: Run, selection: Selection) -> History | None:
 
 
 def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
-    """Say why no internal energy can be read: one has to be chosen first, or there is none."""
+    """Yield a warning if no internal energy can be read: one has to be chosen first, or there is none."""
     try:
         run.history(selection)
     except FormatError as error:

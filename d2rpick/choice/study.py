@@ -180,7 +180,8 @@ class Study:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: that of the worst run, by its own pair and by its error at this tr; None without."""
+        """Grade of the common tr: that of the worst run, by its pair and by its error at this tr; None without a tr.
+        """
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
@@ -267,7 +268,7 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
 
 
 def _decided(decision: Decision | None) -> dict[str, Any]:
-    """Give what is said of the pair of a run."""
+    """Return the verdict on the pair of a run as fields of its row."""
     if decision is None:
         return {}
     return {

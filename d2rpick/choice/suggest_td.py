@@ -389,7 +389,7 @@ def _by_residual(
 
 
 def _surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Give the pairs whose tr is known best, of those that are long enough to be planned, if there are any."""
+    """Return the pairs with the most certain tr, of those that are long enough to be planned, if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -400,7 +400,7 @@ def _surest(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _certainty_of_tr(situation: Situation) -> int:
-    """How well the tr is known that is recommended at a td, as `certainty` says; 0 without one."""
+    """Return the `certainty` of the tr recommended at a td; 0 without one."""
     best = next(candidates_at([situation], in_flight=True)).chosen
     return 0 if best is None else certainty(best)
 

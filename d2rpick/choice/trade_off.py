@@ -104,7 +104,7 @@ class Offer(OfTd):
 
     @property
     def decision(self) -> Decision | None:
-        """Whether to use the recommended pair, and why."""
+        """Verdict on the recommended pair, with its reason."""
         return self.answer.decision
 
     @property
