@@ -128,7 +128,12 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     model, beside = model_of(request), [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
     found = sets_of_parts.parts_of(
-        run.files, request.settings, model, given=ids, times=times, beside=beside
+        run.files,
+        request.settings,
+        model,
+        given_ids=ids,
+        times=times,
+        deck_files=beside,
     )
     window = [
         text

@@ -72,7 +72,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
             answers.verify_of,
             asked.reference,
             settings=self.situation.settings,
-            known=self.situation,
+            earlier=self.situation,
         )
         return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
 

@@ -79,14 +79,14 @@ class Verdict(OfTd):
     def verified(self) -> bool:
         """True if the pair is admissible and not poor, and its residual is at most 0.5."""
         residual = self.candidate.residual
-        kept = residual is None or residual <= POOR_RESIDUAL
-        return kept and self.decision.grade != POOR
+        is_kept = residual is None or residual <= POOR_RESIDUAL
+        return is_kept and self.decision.grade != POOR
 
     @cached_property
     def decision(self) -> Decision:
         """Verdict on the pair, with reason and cure."""
-        found = self._decide(None)
-        return self._decide(self.better) if found.grade == POOR else found
+        decision = self._decide(None)
+        return self._decide(self.better) if decision.grade == POOR else decision
 
     def _decide(self, better: Pair | None) -> Decision:
         """Decide on the pair; ``better`` is a better one, if known."""
@@ -117,9 +117,9 @@ def verify(
     tr: float,
     td: float,
     settings: Settings,
-    known: Situation | None = None,
+    earlier: Situation | None = None,
 ) -> Verdict:
-    """Judge one pair; ``known`` is an earlier situation, which is used if its td is ``td``, and whose fits are used.
+    """Judge one pair; the situation ``earlier`` is used if its td is ``td``, else its fits.
 
     Raises
     ------
@@ -127,10 +127,10 @@ def verify(
         If a time lies outside the record, or tr is not before td.
     """
     _in_order(tr, td)
-    fits = known.fits if known else None
-    return verify_at(
-        known if known and td == known.td else examine(history, td, settings, fits), tr
-    )
+    if earlier and td == earlier.td:
+        return verify_at(earlier, tr)
+    fits = earlier.fits if earlier else None
+    return verify_at(examine(history, td, settings, fits), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> Verdict:
@@ -147,7 +147,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     situation.history.energy_at(tr, "tr")
     judged = judge(situation, [tr])
     candidate = judged[0]
-    known = situation.flight.start is not None
+    is_known = situation.flight.start is not None
     share = situation.kinetic_share
     if settings.max_kinetic_share is None:
         limit = POOR_KINETIC_SHARE
@@ -156,11 +156,13 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    td_ok = False if outside else None if share is None else share <= limit
+    td_ok = None if share is None else share <= limit
+    if outside:
+        td_ok = False
     return Verdict(
         situation=situation,
         candidate=candidate,
-        tr_ok=candidate.admissible if known else None,
+        tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
         admissible=bool(judged.kept[0]),
         reasons=(*candidate.notes, *over_limits(situation, candidate)),
@@ -213,7 +215,9 @@ class Suggestion(OfTd):
     def why_none(self) -> str:
         """Reason why nothing is recommended; empty if a pair is."""
         return "; ".join(
-            one.message for one in self.cautions if one.code == "no-candidate"
+            caution.message
+            for caution in self.cautions
+            if caution.code == "no-candidate"
         )
 
     @property
@@ -233,14 +237,15 @@ class Suggestion(OfTd):
         """First and last acceptable tr of each window, on any basis [time]."""
         if not self.situation.in_flight:
             return ()
+        # imported here: an oscillator does not need it
         from d2rpick.choice.windows import (
             acceptable_windows,
-        )  # imported here: an oscillator does not need it
+        )
 
-        found = acceptable_windows(
+        windows = acceptable_windows(
             self.situation, self.candidates, self.chosen.tr if self.chosen else None
         )
-        return tuple((start, end) for start, end in found.tolist())
+        return tuple((start, end) for start, end in windows.tolist())
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
@@ -292,18 +297,18 @@ class Suggestion(OfTd):
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
         better = self.better_pair
-        own = self.recommended
-        if better is None or own is None:
+        recommended = self.recommended
+        if better is None or recommended is None:
             return better
-        if better.residual is not None and own.residual is not None:
+        if better.residual is not None and recommended.residual is not None:
             bound = self.chosen.residual_high if self.chosen else None
-            uncertain = 0.0 if bound is None else bound - own.residual
-            if own.residual - better.residual > max(EQUALLY_GOOD, uncertain):
+            uncertain = 0.0 if bound is None else bound - recommended.residual
+            if recommended.residual - better.residual > max(EQUALLY_GOOD, uncertain):
                 return better
             return None
         levels = [
             max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5
-            for td in (better.td, own.td)
+            for td in (better.td, recommended.td)
         ]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
@@ -355,15 +360,14 @@ def find_better_pair(situation: Situation) -> Pair | None:
     for td in sorted(
         situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)
     ):
-        there = situation.at(td)
-        if (
-            there.vibration.doubts
-            or _level_refuses(there)
-            or not (best := _saving(there))
-        ):
+        peak_situation = situation.at(td)
+        if peak_situation.vibration.doubts or _level_refuses(peak_situation):
             continue
-        anew = _anew(situation, td)
-        best = best if anew.sees_as(there) else _saving(anew)
+        best = _saving(peak_situation)
+        if best is None:
+            continue
+        examined = _anew(situation, td)
+        best = best if examined.sees_as(peak_situation) else _saving(examined)
         if best and _holds_as_printed(situation, best.tr, td):
             return best
         refused += 1
@@ -391,10 +395,10 @@ def _level_refuses(situation: Situation) -> bool:
     if situation.basis != "energy":
         return False
     level = situation.energy_td
-    least = max(0.0, 1 - situation.settings.tolerance - ROUNDING)
-    return level < -round_off(situation.history) or level * least**2 > most_energy(
-        situation
-    )
+    smallest_share = max(0.0, 1 - situation.settings.tolerance - ROUNDING)
+    return level < -round_off(
+        situation.history
+    ) or level * smallest_share**2 > most_energy(situation)
 
 
 def _saving(situation: Situation) -> Pair | None:
@@ -404,9 +408,8 @@ def _saving(situation: Situation) -> Pair | None:
 
 def _anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, as if that td had been given."""
-    quick = (
-        situation.evidence.span is None
-    )  # an oscillator is searched again, the reason why there is none is not
+    # an oscillator is searched again, the reason why there is none is not
+    quick = situation.evidence.span is None
     return examine(
         situation.history, td, situation.settings, situation.fits, quick=quick
     )
@@ -414,13 +417,12 @@ def _anew(situation: Situation, td: float) -> Situation:
 
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` admits a pair as rounded to the six printed digits."""
+    # rounding moved a time beyond the record, or both onto each other
     try:
         return verify_at(
             _anew(situation, round_as_read(td)), round_as_read(tr)
         ).admissible
-    except (
-        RangeError
-    ):  # rounding moved a time beyond the record, or both onto each other
+    except RangeError:
         return False
 
 
@@ -462,9 +464,10 @@ def suggest_of(
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
+        # imported here: a given td needs no search
         from d2rpick.choice.suggest_td import (
             choose_td,
-        )  # imported here: a given td needs no search
+        )
 
         chosen = choose_td(reference.history, td, settings, fits, since, times)
         answer = suggest_at(chosen.situation)
@@ -483,12 +486,12 @@ def verify_of(
     tr: float,
     td: float,
     settings: Settings,
-    known: Situation | None = None,
+    earlier: Situation | None = None,
 ) -> Verdict:
-    """Judge one pair of a reference run; errors and ``known`` as for `verify`."""
+    """Judge one pair of a reference run; errors and ``earlier`` as for `verify`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     return _with_health(
-        verify(reference.history, tr, td, settings, known), reference.run
+        verify(reference.history, tr, td, settings, earlier), reference.run
     )
 
 
@@ -507,16 +510,16 @@ def compare_with(
     """
     from d2rpick.choice.comparison import compare
 
-    found = compare(
+    comparison = compare(
         verdict.situation, verdict.candidate.tr, reference, switched, min_mean
     )
     return replace(
         verdict,
-        switched=found,
+        switched=comparison,
         computed=switched.history,
         admissible=verdict.admissible
-        and not found.objections,  # a wrong motion overrules the verdict
-        reasons=verdict.reasons + found.objections,
+        and not comparison.objections,  # a wrong motion overrules the verdict
+        reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
     )
 
@@ -550,10 +553,10 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         and flight.within(history.time)[0] <= window[0]
         and answer.situation.in_flight
     )
-    found = cautions_of_health(health, at_rest=answer.situation.at_rest)
-    told: list[Caution] = [
-        one
-        for one in found
-        if not (flies and flight.by_parts and one.code in OF_THE_MODEL)
+    health_cautions = cautions_of_health(health, at_rest=answer.situation.at_rest)
+    relevant: list[Caution] = [
+        caution
+        for caution in health_cautions
+        if not (flies and flight.by_parts and caution.code in OF_THE_MODEL)
     ]
-    return replace(answer, health=health, cautions=(*answer.cautions, *told))
+    return replace(answer, health=health, cautions=(*answer.cautions, *relevant))

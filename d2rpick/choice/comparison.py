@@ -109,7 +109,7 @@ def compare(
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(switched.run, together)),
         centres=centres,
-        known=judged.known,
+        is_reported=judged.is_reported,
         min_mean=min_mean,
     )
     return comparison._replace(
@@ -133,7 +133,7 @@ def compare_runs(
     momenta: tuple[Track | None, Track | None],
     centres: tuple[Track | None, Track | None],
     *,
-    known: bool = True,
+    is_reported: bool = True,
     min_mean: float = 0.0,
 ) -> Comparison:
     """Compare a switched run with its reference run: whether it was rigid from tr to td, and its energy after td.
@@ -150,7 +150,7 @@ def compare_runs(
         Largest error of the locked-in amplitude [-].
     momenta, centres : pair of Track or None
         Of the reference run and of the switched run, None for a run without them.
-    known : bool
+    is_reported : bool
         True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
         Smallest mean energy after td as a share of that of the reference run [-]; 2 - ``min_mean`` is the largest.
@@ -188,7 +188,7 @@ def compare_runs(
     rigid = _rigid_window(switched, tr, td, still)
     mean, mean_reference = float(energies_after.mean()), float(reference_after.mean())
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
-    if known:
+    if is_reported:
         objections += _not_locked_in(reference, tr, frozen, energy_td, tolerance)
         if mean_reference > round_off(reference):
             objections += _another_mean(mean / mean_reference, min_mean)

@@ -99,8 +99,8 @@ class Decision(NamedTuple):
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            wrong = f"vibration wrong by {self.worst_residual:.0%}"
-            return f"{wrong}, if the deformation at tr is opposite to that at td"
+            text = f"vibration wrong by {self.worst_residual:.0%}"
+            return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
         return f"vibration wrong by {self.worst_residual:.0%}"
@@ -154,11 +154,13 @@ def _worst_residual(situation: Situation, candidate: Candidate) -> float:
 def _why_good(quality: Quality, residual: float | None) -> str:
     """Explain why a pair is good: its vibration is kept, or hardly matters."""
     if quality.alone.grade == GOOD:
-        off = "" if residual is None else f": it is wrong by {residual:.1%}"
-        return f"the flight is certain, and the vibration after td is kept{off}"
+        error = "" if residual is None else f": it is wrong by {residual:.1%}"
+        return f"the flight is certain, and the vibration after td is kept{error}"
     share = quality.worth.share if quality.worth else 0.0
-    wrong = "; ".join(quality.alone.reasons)
-    return f"{wrong}, but that is at most {share:.2%} of the energy of the next contact"
+    reasons = "; ".join(quality.alone.reasons)
+    return (
+        f"{reasons}, but that is at most {share:.2%} of the energy of the next contact"
+    )
 
 
 def span_of(kept: Kept) -> str:

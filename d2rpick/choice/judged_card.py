@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
@@ -51,12 +52,14 @@ class CardRequest(NamedTuple):
     def by(self, settings: Settings) -> CardRequest:
         """Return the request with the rigid bodies of a deck as merged parts, and its inactive bodies kept inactive."""
         bodies = tuple(body.parts for body in settings.bodies or ())
-        off = tuple(
+        inactive = tuple(
             node
             for node in settings.kept_off
             if node not in (*self.printing.node, *self.printing.replaced)
         )
-        return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
+        return self._replace(
+            printing=self.printing._replace(bodies=bodies, off=inactive)
+        )
 
 
 def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
@@ -64,24 +67,25 @@ def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
 
     The contact force of the solver shows the times, or else the momenta of the parts; only momenta show the speed.
     """
+    # imported here: other cards do not need it
     from d2rpick.flight.contact_times import (
         find_contact_times,
         find_force_times,
-    )  # imported here: other cards do not need it
+    )
     from d2rpick.histories.contact_forces import find_force
 
-    momenta = next((one for one in history.momenta if one.parts), None)
+    momenta = next((momenta for momenta in history.momenta if momenta.parts), None)
     by_momenta = find_contact_times(momenta) if momenta else None
     contact = "interface" if solver == "Radioss" else "contact"
     if printing.contact is None:
-        named = ("rigid wall", printing.wall)
+        push = ("rigid wall", printing.wall)
     else:
-        named = (contact, printing.contact)
-    kind, number = named
+        push = (contact, printing.contact)
+    kind, number = push
     force = find_force(history.evidence.forces, kind, number or 0)
-    found = (find_force_times(force) if force else None) or by_momenta
+    times = (find_force_times(force) if force else None) or by_momenta
     speed = by_momenta.speed if by_momenta else None
-    return printing._replace(pushed=found.spans, speed=speed) if found else printing
+    return printing._replace(pushed=times.spans, speed=speed) if times else printing
 
 
 class SolverInput(NamedTuple):
@@ -102,18 +106,20 @@ def input_for(
 ) -> SolverInput:
     """Print the card of ``tr`` and the td of a situation, judged by the printed times."""
     solver, _ = request.of(situation.history)
-    named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
-    judge = partial(verify_of, reference, settings=situation.settings, known=situation)
+    solver_and_option = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
+    judge = partial(
+        verify_of, reference, settings=situation.settings, earlier=situation
+    )
     try:
-        found = judged_card(
+        card = judged_card(
             [(tr, situation.td)],
             situation.history,
             judge,
             request.by(situation.settings),
         )
     except D2RPickError as error:
-        return SolverInput(*named, refusal=str(error))
-    return SolverInput(*named, found[0].text if found else None)
+        return SolverInput(*solver_and_option, refusal=str(error))
+    return SolverInput(*solver_and_option, card[0].text if card else None)
 
 
 def judged_card(
@@ -131,18 +137,18 @@ def judged_card(
     if not request.whom(history):
         return None
     solver, printing = request.of(history)
-    every = sorted((*done, *windows))
-    plain = print_cards(every, printing, solver)
+    all_windows = sorted((*done, *windows))
+    plain = print_cards(all_windows, printing, solver)
     printed = plain.windows
     if "contact" in SOLVERS[solver].takes:
         printed = _narrowed(printed, history)
     verdicts = tuple(
         judge(*times)
-        for asked, times in zip(every, printed, strict=True)
-        if asked not in done
+        for requested, times in zip(all_windows, printed, strict=True)
+        if requested not in done
     )
     remarks = tuple(_remarks(done, history, verdicts))
-    return print_cards(every, printing, solver, remarks), verdicts
+    return print_cards(all_windows, printing, solver, remarks), verdicts
 
 
 def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
@@ -168,10 +174,9 @@ def _remarks(
         else:
             which = ""
         yield from _judgement(verdict, which)
+    cautions = chain.from_iterable(verdict.cautions for verdict in verdicts)
     yield from dict.fromkeys(
-        f"{caution.code}: {caution.message}."
-        for one in verdicts
-        for caution in one.cautions
+        f"{caution.code}: {caution.message}." for caution in cautions
     )
 
 
@@ -181,9 +186,9 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     history = verdict.situation.history
     decision = verdict.decision
     word = decision.verdict
-    said = word.upper() if word == DO_NOT_USE else word
+    verdict_text = word.upper() if word == DO_NOT_USE else word
     judged = f"Judged by {', '.join(history.source)}, {history.channel}"
-    yield f"{judged}:{which} {said}. {_sentence(decision.reason)}"
+    yield f"{judged}:{which} {verdict_text}. {_sentence(decision.reason)}"
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."

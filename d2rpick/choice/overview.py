@@ -116,8 +116,8 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
             return "no free flight is seen, so nothing can be made rigid"
-        found = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
-        return "; ".join(self._doubts) or found
+        summary = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
+        return "; ".join(self._doubts) or summary
 
     @property
     def _doubts(self) -> list[str]:
@@ -180,11 +180,16 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         ):
             raise  # one energy shows which column is the time, so the table itself cannot be read
         notes.append(str(error))
-    steps = np.diff(time)
     history = _history(run, selection)
     flaws = tuple(unsound(history)) if history else tuple(_of_energy(run, selection))
     rigid = rigid_times(Reference(run, history)) if history else ()
     flights = _flights(by_the_model(history) if rigid else history) if history else ()
+    channels: dict[str, None] = {}
+    for database in run.databases:
+        channels |= dict.fromkeys(database.channels)
+    should_write = None
+    if states != 0 and not any(momenta.parts for momenta in run.momenta(None, None)):
+        should_write = _missing(run)
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -194,22 +199,12 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(
-            float(steps.min()), float(compute_median(steps)), float(steps.max())
-        )
-        if steps.size
-        else None,
+        sampling=_sampling(time),
         complete=all(database.complete for database in run.databases),
-        channels=tuple(
-            dict.fromkeys(
-                name for database in run.databases for name in database.channels
-            )
-        ),
+        channels=tuple(channels),
         parts=tuple(_overviews(run)),
         flights=flights,
-        should_write=None
-        if states == 0 or any(momenta.parts for momenta in run.momenta(None, None))
-        else _missing(run),
+        should_write=should_write,
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
         alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *deck_warnings),
@@ -217,6 +212,16 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
+    )
+
+
+def _sampling(time: Samples) -> Sampling | None:
+    """Return the output intervals between the states; None for fewer than two states."""
+    steps = np.diff(time)
+    if not steps.size:
+        return None
+    return Sampling(
+        float(steps.min()), float(compute_median(steps)), float(steps.max())
     )
 
 

@@ -187,8 +187,8 @@ def plan_of(
     settings : Settings
         As for ``suggest``.  ``after`` applies to the flight that contains it; earlier flights are left out.
     min_rigid : float, optional
-        Shorter windows are left out [time].  Default: 5 % of the record; then a window that locks in energy is also left
-        out for one after it that is rigid for more than twice as long.
+        Shorter windows are left out [time].  Default: 5 % of the record; then a window that locks in energy is also
+        left out for one after it that is rigid for more than twice as long.
     done : sequence of (float, float)
         Windows in which the run was switched, in order [time].
     before : Reference, optional
@@ -207,26 +207,25 @@ def plan_of(
     refuse_unsound(history, settings)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
-    history, found, cautions = switched_history(reference, done)
+    history, done_times, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()
     flights = flights_of(history, settings, fits)
-    earlier = before and flights_of(
-        switched_history(before, ())[0], settings
-    )  # it may have been switched itself
-    known = done_windows(history, flights, found, earlier)
+    # it may have been switched itself
+    earlier = before and flights_of(switched_history(before, ())[0], settings)
+    done_rows = done_windows(history, flights, done_times, earlier)
     judged: Iterable[Planned] = _rows(
-        reference, flights, settings, shortest, known, fits
+        reference, flights, settings, shortest, done_rows, fits
     )
     if min_rigid is None:
         judged = _without_short(list(judged))
-    rows = tuple(_with_status(list(judged), known))
+    rows = tuple(_with_status(list(judged), done_rows))
     cautions = (
         *cautions,
         *cautions_of_engine(reference.run.sources),
-        *_cautions(rows, known),
+        *_cautions(rows, done_rows),
     )
-    return Plan(history, settings, shortest, rows, cautions, found)
+    return Plan(history, settings, shortest, rows, cautions, done_times)
 
 
 def _rows(
@@ -234,22 +233,22 @@ def _rows(
     flights: Sequence[Flight],
     settings: Settings,
     shortest: float,
-    known: Sequence[Done],
+    done_rows: Sequence[Done],
     fits: Fits,
 ) -> Iterator[Planned]:
     """Yield every flight with its window, as if each were the first."""
-    last = max((one.td for one in known), default=None)
+    last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # end of the previous flight
-    for number, seen in enumerate(flights, start=1):
-        flight = _given(reference.history, seen, settings.after)
+    for number, found_flight in enumerate(flights, start=1):
+        flight = _given(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
         margin = margin_of(reference.history, flight, settings, fits)
         row = Planned(number, flight, start, end, margin, record, "left-out")
-        within = [one for one in known if one.flight == seen]
-        if within:
-            for one in within:
-                yield row._replace(status="done", reason=one.told, done=one)
+        done_in_flight = [done for done in done_rows if done.flight == found_flight]
+        if done_in_flight:
+            for done in done_in_flight:
+                yield row._replace(status="done", reason=done.told, done=done)
         elif last is not None and start < last:
             yield row._replace(reason="before the last window that is done")
         elif settings.after is not None and end <= settings.after:
@@ -265,12 +264,12 @@ def _rows(
         landed = flight.end
 
 
-def _given(history: History, flight: Flight, after: float | None) -> Flight:
+def _given(history: History, flight: Flight, load_end: float | None) -> Flight:
     """Let a flight that contains the given end of the load begin there, as ``suggest`` does."""
     start, end = flight.within(history.time)
-    if after is None or not start <= after < end:
+    if load_end is None or not start <= load_end < end:
         return flight
-    return flight._replace(start=after, source="given")
+    return flight._replace(start=load_end, source="given")
 
 
 def _asked(
@@ -286,18 +285,24 @@ def _asked(
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
     """
-    own = settings.after is not None and row.start <= settings.after <= row.end
-    asked = settings if own else replace(settings, after=None)
+    is_after_here = (
+        settings.after is not None and row.start <= settings.after <= row.end
+    )
+    flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
-        asked = replace(asked, landing=None)
+        flight_settings = replace(flight_settings, landing=None)
     # the energy alone may show no end of the flight to a td in it: keep the margin before the listed end
     window = row.start, last_td(row.end, row.margin.time)
-    answer = suggest_of(reference, window, asked, since=landed, fits=fits)
-    known = answer.situation.flight
+    answer = suggest_of(reference, window, flight_settings, since=landed, fits=fits)
+    known_flight = answer.situation.flight
     row = row._replace(answer=answer)
-    if known.start is not None and (known.start < row.start or answer.recommended):
-        flight = row.flight._replace(start=known.start, source=known.source)
-        row = row._replace(flight=flight, start=known.start)
+    if known_flight.start is not None and (
+        known_flight.start < row.start or answer.recommended
+    ):
+        flight = row.flight._replace(
+            start=known_flight.start, source=known_flight.source
+        )
+        row = row._replace(flight=flight, start=known_flight.start)
     if answer.recommended is None:
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
@@ -314,45 +319,51 @@ def _asked(
 def _not_good_enough(decision: Decision, pair: Pair) -> str:
     """Explain why a pair is not planned, and how to plan it nevertheless."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
-    way = f"with `min_quality` {decision.grade} it is planned all the same"
-    return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {way}"
+    advice = f"with `min_quality` {decision.grade} it is planned all the same"
+    return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
 
 
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
     """Explain that a window is too short."""
     if margin.time:
-        kept = f", with the margin {margin.time:.3g} before the contact"
+        margin_text = f", with the margin {margin.time:.3g} before the contact"
     else:
-        kept = ""
-    return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
+        margin_text = ""
+    return f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}, at least {shortest:.3g} was asked for"
 
 
 def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
     """Leave out each window that locks in energy before a much longer one, even if that has to wait for a run."""
-    for at, row in enumerate(rows):
+    for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
-        behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
+        longest_after = max(
+            rows[index + 1 :],
+            key=lambda row_after: row_after.rigid_time or 0.0,
+            default=row,
+        )
         if (
             row.status != "supported"
             or not row.locks_in
-            or not (behind.rigid_time or 0.0) > _LONGER * rigid
+            or not (longest_after.rigid_time or 0.0) > _LONGER * rigid
         ):
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
-        longer = f"flight {behind.number} behind it for {behind.rigid_time:.3g}"
-        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
+        longer = f"flight {longest_after.number} behind it for {longest_after.rigid_time:.3g}"
+        window_text = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
         why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
         cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
-        yield row._replace(status="left-out", reason=f"{own}: {why}; {cure}")
+        yield row._replace(status="left-out", reason=f"{window_text}: {why}; {cure}")
 
 
-def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
+def _with_status(
+    rows: Sequence[Planned], done_rows: Sequence[Done]
+) -> Iterator[Planned]:
     """Mark windows to be planned again after the first that locks in energy, and after a contact while rigid."""
-    wrong = next((one for one in known if one.rigid_in_contact), None)
+    in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
-    if wrong:
-        window = f"the window {wrong.tr:.6g} to {wrong.td:.6g}"
+    if in_contact:
+        window = f"the window {in_contact.tr:.6g} to {in_contact.td:.6g}"
         why = f"the run was rigid in a contact in {window}; plan the windows from there again"
     for row in rows:
         if row.status == "supported" and why:
@@ -382,18 +393,18 @@ def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
         and longest.rigid_time
         and longest.rigid_time > first.rigid_time
     ):
-        found = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
+        text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
         cure = "with a minimal rigid time between the two it would be supported instead"
-        yield Caution("longer-window-later", f"{found} {first.rigid_time:.3g}: {cure}")
+        yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
-def _cautions(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Caution]:
+def _cautions(rows: Sequence[Planned], done_rows: Sequence[Done]) -> Iterator[Caution]:
     """Yield the warnings about all windows, each once."""
-    for one in known:
-        window = f"the window {one.tr:.6g} to {one.td:.6g}: {one.told}"
-        if one.rigid_in_contact:
+    for done in done_rows:
+        window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.told}"
+        if done.rigid_in_contact:
             yield Caution("landed-rigid", window)
-        elif one.flight is None:
+        elif done.flight is None:
             yield Caution("done-without-flight", window)
     windows = [row for row in rows if row.status == "supported" and row.answer]
     for row in windows:

@@ -59,17 +59,17 @@ def ranked(judged: Judged) -> Iterator[Candidates]:
     rigid = judged.td - judged.moments.tr
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
-    room = np.repeat([like_quality(one) for one in judged.situations], 3)
-    places = order(group, judged.error, rigid, judged.out_of_place, room)
-    kept = judged.kept[places]
-    for one, (first, last) in zip(
+    room = np.repeat([like_quality(situation) for situation in judged.situations], 3)
+    rows = order(group, judged.error, rigid, judged.out_of_place, room)
+    is_kept = judged.kept[rows]
+    for situation, (first, last) in zip(
         judged.situations, pairwise(judged.ends), strict=True
     ):
-        best = np.flatnonzero(kept[first:last])
+        best = np.flatnonzero(is_kept[first:last])
         yield Candidates(
-            one,
+            situation,
             judged,
-            places[first:last],
+            rows[first:last],
             ranked=True,
             recommended=int(best[0]) if best.size else None,
         )
@@ -84,31 +84,38 @@ def order(
     group: NDArray[np.int32],
     error: Samples,
     rigid: Samples,
-    off: NDArray[np.bool_],
+    is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
     """Return the order of candidates by group, in each group first those with an error within ``room`` of the smallest.
 
     ``room`` has shape (groups,), the other arguments shape (n,).  The errors within ``room`` are ordered by descending
-    rigid time; but among rigid times within 10 % of the longest, those that are ``off`` come last.  The others follow
+    rigid time; but among rigid times within 10 % of the longest, those with ``is_off`` come last.  The others follow
     by error.
     """
     error = np.round(error, _DECIMALS)
-    good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
-    longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
-    near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])
+    is_like = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
+    longest = _extreme(np.maximum, group, np.where(is_like, rigid, -np.inf), room.size)
+    is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
     return np.lexsort(
-        (-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group)
+        (
+            -rigid,
+            np.where(is_like, -rigid, error),
+            is_long & is_off,
+            is_like & ~is_long,
+            ~is_like,
+            group,
+        )
     )
 
 
 def _extreme(
-    which: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
+    extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Return the smallest or largest value of each group, by the function ``which``."""
-    found = np.full(groups, np.inf if which is np.minimum else -np.inf)
-    which.at(found, group, values)
-    return found
+    """Return the smallest or largest value of each group, by the function ``extreme``."""
+    extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
+    extreme.at(extremes, group, values)
+    return extremes
 
 
 def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
@@ -118,12 +125,16 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
         ("kinetic share", situation.kinetic_share, settings.max_kinetic_share),
         ("residual", candidate.residual, settings.max_residual),
     )
-    return tuple(
-        f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {format_above_limit(value, limit)} above the limit {limit:g}"
-        for name, value, limit in limits
-        if limit is not None and (value is None or value > limit)
-    )  # fmt: skip
+    messages = []
+    for name, value, limit in limits:
+        if limit is None:
+            continue
+        if value is None:
+            messages.append(f"{name} unknown, at most {limit:g} was asked for")
+        elif value > limit:
+            exceeding = format_above_limit(value, limit)
+            messages.append(f"{name} {exceeding} above the limit {limit:g}")
+    return tuple(messages)
 
 
 # Largest residual of a good pair [-]: the default tolerance for tr.
@@ -209,12 +220,8 @@ class Quality(NamedTuple):
     def causes(self) -> tuple[Cause, ...]:
         """Causes why the grade is not better, with their cures."""
         statements = (self.motion, self.vibration)
-        return tuple(
-            cause
-            for statement in statements
-            if statement.grade == self.grade
-            for cause in statement.causes
-        )
+        worst = [part.causes for part in statements if part.grade == self.grade]
+        return tuple(chain.from_iterable(worst))
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -226,8 +233,10 @@ def quality_of(situation: Situation, best: Candidate) -> Quality:
     """Grade the recommended tr of a td: its motion, and its vibration, also relative to the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
-    ruined = [Cause(what, _CORRECT_THE_DECK) for what in situation.settings.ruined]
-    motion = Grade.of((*ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain)
+    ruined = [Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined]
+    if flight.unknown_load:
+        ruined.append(_UNKNOWN_LOAD)
+    motion = Grade.of(ruined, uncertain)
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(_poor(situation, best), _fair(situation, best))
@@ -274,9 +283,9 @@ def _way_to_the_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
         return "name the parts to be switched with `parts`, if the files have parts"
-    beside = situation.together.beside.parts
-    if beside:
-        names = list_names([part.name for part in beside], most=_NAMED)
+    other_parts = situation.together.beside.parts
+    if other_parts:
+        names = list_names([part.name for part in other_parts], most=_NAMED)
         return f"name all parts that vibrate together with `parts`: {names} as well"
     return "write the energies more often"
 
@@ -309,10 +318,10 @@ def _of_record(situation: Situation) -> list[Cause]:
         )
     states = states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        found = f"the record has {states:.2g} states per period"
+        states_text = f"the record has {states:.2g} states per period"
         causes.append(
             Cause(
-                f"{found}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+                f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
                 "write the energies more often",
             )
         )
@@ -344,10 +353,10 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
     high = best.residual_high or best.residual
     causes = []
     if best.residual > MOST_GOOD:
-        worst = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
+        worst_text = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
         causes.append(
             Cause(
-                f"the vibration after td is wrong by {best.residual:.0%}{worst}",
+                f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
                 "choose another td, as d2rpick explore lists them",
             )
         )
@@ -379,7 +388,7 @@ def states_per_period(energy: Samples) -> float | None:
     """
     if energy.size < 2:
         return None
-    off = energy - energy.mean()
-    side = np.sign(off[np.abs(off) > _BAND * off.std()])
+    deviation = energy - energy.mean()
+    side = np.sign(deviation[np.abs(deviation) > _BAND * deviation.std()])
     passes = np.flatnonzero(np.diff(side)).size
     return 2 * energy.size / passes if passes > 1 else None

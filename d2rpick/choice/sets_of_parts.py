@@ -134,9 +134,9 @@ def parts_of(
     settings: Settings,
     model: CostModel | None,
     *,
-    given: Sequence[int] = (),
+    given_ids: Sequence[int] = (),
     times: Times | float | None = None,
-    beside: Sequence[str] = (),
+    deck_files: Sequence[str] = (),
 ) -> Parts:
     """Judge every part of a run, and compare sets of parts.
 
@@ -148,12 +148,12 @@ def parts_of(
         As for ``suggest``; its cost share is not used.
     model : CostModel or None
         The deck with its costs; without it the costs and most verdicts stay unknown.
-    given : sequence of int
+    given_ids : sequence of int
         Part ids of a further set to compare.
     times : (float, float) or float, optional
         tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, and for each set
         the tr of ``suggest``.
-    beside : sequence of str
+    deck_files : sequence of str
         The deck, in whose folder a d3hsp with the smallest time steps of parts is looked for too.
 
     Returns
@@ -164,10 +164,12 @@ def parts_of(
     model = None if foreign else model
     run = in_deck(run, model.inventory if model else None)
     facts = facts_of(run, settings)
-    rows = rows_of(facts, model, find_printed_steps(run, *(beside if model else ())))
+    rows = rows_of(
+        facts, model, find_printed_steps(run, *(deck_files if model else ()))
+    )
     comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
-    for part_set in _sets(rows, given):
+    for part_set in _sets(rows, given_ids):
         # the same td for all sets, so that they can be compared
         td = next((earlier.window[1] for earlier in sets if earlier.window), None)
         sets.append(comparison.of(part_set, times or td))

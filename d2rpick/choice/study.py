@@ -180,8 +180,7 @@ class Study:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: that of the worst run, by its pair and by its error at this tr; None without a tr.
-        """
+        """Grade of the common tr: that of the worst run, by its pair and by its error at this tr; None without a tr."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]

@@ -395,8 +395,12 @@ def _surest(pairs: Sequence[Choice]) -> list[Choice]:
     record = pairs[0][0].history.time
     shortest = _SHORTEST * float(record[-1] - record[0])
     long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
-    known = [_certainty_of_tr(situation) for situation, _ in long]
-    return [pair for pair, its in zip(long, known, strict=True) if its == max(known)]
+    certainties = [_certainty_of_tr(situation) for situation, _ in long]
+    return [
+        pair
+        for pair, pair_certainty in zip(long, certainties, strict=True)
+        if pair_certainty == max(certainties)
+    ]
 
 
 def _certainty_of_tr(situation: Situation) -> int:

@@ -377,14 +377,14 @@ def rigid_parts(
 class SameParts(NamedTuple):
     """Energies of the same parts in both runs, with objections and notes about other parts.
 
-    ``known`` is False if the energies of all parts are reported wrongly.
+    ``is_reported`` is False if the energies of all parts are reported wrongly.
     """
 
     reference: History
     switched: History
     objections: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    known: bool = True
+    is_reported: bool = True
 
 
 def same_parts(without: Reference, switched: Reference, pair: Times) -> SameParts:
@@ -451,7 +451,9 @@ def _judged(
         springs=tuple(str(part.id) for part in history.springs),
     )
     energies = without.run.history(selection), switched.run.history(selection)
-    return SameParts(*energies, tuple(objections), tuple(notes), known=bool(comparable))
+    return SameParts(
+        *energies, tuple(objections), tuple(notes), is_reported=bool(comparable)
+    )
 
 
 def _reported_wrong(

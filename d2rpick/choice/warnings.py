@@ -65,14 +65,14 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
     mode = situation.vibration.whole.mode
     share = situation.kinetic_share
     if situation.at_rest:
-        found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
-        right = "" if situation.flight.unknown_load else "any tr there is right, and "
-        yield Caution("at-rest", f"{found}: {right}the first one saves the most")
+        text = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
+        advice = "" if situation.flight.unknown_load else "any tr there is right, and "
+        yield Caution("at-rest", f"{text}: {advice}the first one saves the most")
         return
     if situation.energy_td <= 0:
-        found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
+        text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution(
-            "no-energy", f"{found}; a level to lock in needs a positive energy"
+            "no-energy", f"{text}; a level to lock in needs a positive energy"
         )
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
@@ -82,10 +82,10 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
         or abs(mode.energy_plastic)
         > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))
     ):
-        found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
+        text = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
         yield Caution(
             "plastic-or-preload",
-            f"{found}; the energy alone cannot tell one from the other",
+            f"{text}; the energy alone cannot tell one from the other",
         )
 
 
@@ -94,12 +94,10 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        found = (
-            f"the fastest vibration in the energy has {states:.2g} states per period"
-        )
+        text = f"the fastest vibration in the energy has {states:.2g} states per period"
         yield Caution(
             "coarse-record",
-            f"{found}, and a still faster one is not seen; let the run write more states",
+            f"{text}, and a still faster one is not seen; let the run write more states",
         )
     if vibration.estimated:
         yield Caution(
@@ -121,21 +119,21 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("flight-sources-disagree", doubt)
     yield from _of_evidence(situation)
     if flight.source == "energy":
-        found = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
+        text = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
         if (
             flight.settled is not None
             and flight.start is not None
             and flight.settled < flight.start
         ):
-            found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
+            text += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
         yield Caution(
-            "flight-from-energy", f"{found}; give it as `after` where it is known"
+            "flight-from-energy", f"{text}; give it as `after` where it is known"
         )
     if earliest is None:
-        found = "nothing in the record shows when the load is over"
-        given = situation.settings.after is not None or flight.refusal
+        text = "nothing in the record shows when the load is over"
+        is_given = situation.settings.after is not None or flight.refusal
         yield Caution(
-            "no-flight", found if given else f"{found}; give that time as `after`"
+            "no-flight", text if is_given else f"{text}; give that time as `after`"
         )
     elif td <= earliest:
         yield Caution(
@@ -166,10 +164,10 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
     if early < flight.end - flight.start:
-        kept = f"keep td before {round_down_as_read(flight.end - early):.6g}"
+        advice = f"keep td before {round_down_as_read(flight.end - early):.6g}"
     else:
-        kept = "no td is safe"
-    yield Caution("grazing-contact", f"{grazed}: {moved}; {kept}")
+        advice = "no td is safe"
+    yield Caution("grazing-contact", f"{grazed}: {moved}; {advice}")
 
 
 def _of_evidence(situation: Situation) -> Iterator[Caution]:
@@ -178,24 +176,24 @@ def _of_evidence(situation: Situation) -> Iterator[Caution]:
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
     if flight.source == "momentum":
-        found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
+        text = "the momentum changes at a constant rate in the flight, which was taken for gravity"
         yield Caution(
             "gravity-assumed",
-            f"{found}; the mass, or kinetic and internal energy, would show whether it is",
+            f"{text}; the mass, or kinetic and internal energy, would show whether it is",
         )
         return
     if flight.source == "contact-force":
-        found = "contacts whose forces are not written, and other loads, do not show in those that are"
+        text = "contacts whose forces are not written, and other loads, do not show in those that are"
         yield Caution(
             "flight-uncertain",
-            f"{found}; momenta of the parts would make the flight sure",
+            f"{text}; momenta of the parts would make the flight sure",
         )
         return
-    found = "nothing but energies shows the flight, and a fixed wall does no work"
+    text = "nothing but energies shows the flight, and a fixed wall does no work"
     if flight.unknown_load:
-        found = "nothing but energies shows the flight, in which gravity or another load works"
+        text = "nothing but energies shows the flight, in which gravity or another load works"
     yield Caution(
-        "flight-uncertain", f"{found}; momenta of the parts would make it sure"
+        "flight-uncertain", f"{text}; momenta of the parts would make it sure"
     )
 
 
@@ -215,24 +213,23 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     which = f" of {name_units(worst.body.parts)}" if worst.body else ""
     share = worst.error / float(drift.path[-1])
     last = float(drift.time[-1] - drift.time[0])
-    found = (
+    frozen = (
         f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
     )
-    least = "at least " * worst.at_least
-    off = f"there the body{which} is off by {least}{worst.error:.3g}, {share:.1%} of its path in the flight"
-    taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
-    taken += (
-        ", which `deck` tells"
-        if worst.assumed and situation.settings.bodies is None
-        else ""
+    bound = "at least " * worst.at_least
+    distance = f"there the body{which} is off by {bound}{worst.error:.3g}, {share:.1%} of its path in the flight"
+    assumption = (
+        "; this holds if the parts become one rigid body" if worst.assumed else ""
     )
+    if worst.assumed and situation.settings.bodies is None:
+        assumption += ", which `deck` tells"
     contact = compute_margin(
         situation.history, situation.flight, place=worst.error
     ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
     yield Caution(
         "out-of-place",
-        f"{found}: {off}{moved if situation.flight.end is not None else ''}{taken}",
+        f"{frozen}: {distance}{moved if situation.flight.end is not None else ''}{assumption}",
     )
 
 
@@ -245,13 +242,13 @@ def _moves_apart(parts: Sequence[Part]) -> str:
     return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
 
 
-def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
+def _not_predicted(bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
     """Describe the first body whose position error is unknown, and the reason."""
     first = unknown[0]
-    more = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
+    others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
     why = "" if first.whole else "; its pieces do not hang together"
-    which = f"that of {name_units(first.parts)}{more}"
-    return f"{len(told)} rigid bodies: how far {which} is out of place is not predicted{why}"
+    which = f"that of {name_units(first.parts)}{others_text}"
+    return f"{len(bodies)} rigid bodies: how far {which} is out of place is not predicted{why}"
 
 
 def end_of_load(situation: Situation) -> str:
@@ -264,9 +261,9 @@ def end_of_flight(situation: Situation) -> str:
     return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation.margin)}"
 
 
-def _margin(kept: float | None) -> str:
+def _margin(margin: float | None) -> str:
     """Describe a margin; empty without one."""
-    return f" with the margin {kept:.6g}" if kept else ""
+    return f" with the margin {margin:.6g}" if margin else ""
 
 
 def _nearest_flight(situation: Situation) -> str:
@@ -368,9 +365,9 @@ def means_of(situation: Situation) -> Means | None:
     decay = np.exp(
         np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
     )
-    after = resting + (mean - resting) / float(decay.mean())
-    if after > round_off(situation.history):
-        return Means(mean, lowest, resting, after)
+    energy_after = resting + (mean - resting) / float(decay.mean())
+    if energy_after > round_off(situation.history):
+        return Means(mean, lowest, resting, energy_after)
     return None
 
 
@@ -442,7 +439,7 @@ class Objection(NamedTuple):
 
 def objections(
     situations: Sequence[Situation],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     tr: Samples,
     columns: Columns,
 ) -> Iterator[Objection]:
@@ -459,25 +456,28 @@ def objections(
     columns : mapping of arrays of shape (n,)
         Measures by name, with ``energy`` and ``level_error``.
     """
-    begun = np.array(
-        [
-            np.nan
-            if one.earliest_tr is None
-            else round_to_first_as_read(one.earliest_tr)
-            for one in situations
-        ]
+    starts = np.array([_first_tr_as_read(situation) for situation in situations])
+    is_early = ~(tr >= starts[situation_of])
+    yield Objection(is_early, partial(_tell_in_load, situations, situation_of))
+    refused = np.array([bool([*against_td(situation)]) for situation in situations])
+    yield Objection(
+        refused[situation_of], partial(_tell_against_td, situations, situation_of)
     )
-    yield Objection(~(tr >= begun[place]), partial(_tell_in_load, situations, place))
-    refused = np.array([any(True for _ in against_td(one)) for one in situations])
-    yield Objection(refused[place], partial(_tell_against_td, situations, place))
-    moves = np.array([not one.at_rest for one in situations])[place]
+    moves = np.array([not situation.at_rest for situation in situations])[situation_of]
     compared = measures.compared(columns)
     described = (
-        compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
+        compared
+        | np.array([bool(situation.vibration.unknown) for situation in situations])[
+            situation_of
+        ]
     )
-    modal = np.array([one.basis == "modal" for one in situations])[place]
+    modal = np.array([situation.basis == "modal" for situation in situations])[
+        situation_of
+    ]
     same_sign = (columns["sign_match"] != 0) | modal
-    yield Objection(moves & ~described, partial(_tell_undescribed, situations, place))
+    yield Objection(
+        moves & ~described, partial(_tell_undescribed, situations, situation_of)
+    )
     yield Objection(
         moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation")
     )
@@ -485,40 +485,57 @@ def objections(
     judged = moves & described & same_sign
     nothing = "the energy is not positive here, so there is nothing to compare"
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
-    most = np.array([one.most_error for one in situations])[place]
-    too_much = judged & (error > most)
-    yield Objection(too_much & ~modal, partial(_tell_error, error, most))
+    limits = np.array([situation.most_error for situation in situations])[situation_of]
+    too_much = judged & (error > limits)
+    yield Objection(too_much & ~modal, partial(_tell_error, error, limits))
     yield Objection(
         too_much & modal,
-        partial(_tell_keeps_nothing, situations, place, columns["residual"]),
+        partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
     # beyond its end the flight shows nothing about the time after td
-    means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
+    means = [
+        means_of(situation) if situation.td <= situation.latest_td else None
+        for situation in situations
+    ]
     if any(means):
         energy = columns["energy"]
-        more = energy > np.array([one.most if one else np.inf for one in means])[place]
-        yield Objection(more, partial(_tell_above_the_reference, means, place, energy))
+        is_above = (
+            energy
+            > np.array(
+                [situation.most if situation else np.inf for situation in means]
+            )[situation_of]
+        )
+        yield Objection(
+            is_above, partial(_tell_above_the_reference, means, situation_of, energy)
+        )
+
+
+def _first_tr_as_read(situation: Situation) -> float:
+    """Return the earliest tr, rounded to printed digits [time]; NaN if it is unknown."""
+    if situation.earliest_tr is None:
+        return np.nan
+    return round_to_first_as_read(situation.earliest_tr)
 
 
 def _tell_in_load(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
     """Return the objection that a candidate lies before the flight."""
-    return [_in_load(situations[place[candidate]])]
+    return [_in_load(situations[situation_of[candidate]])]
 
 
 def _tell_against_td(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> Iterator[str]:
     """Return the objections to the td of a candidate."""
-    return against_td(situations[place[candidate]])
+    return against_td(situations[situation_of[candidate]])
 
 
 def _tell_undescribed(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
     """Return the objection that the vibration of a candidate is not described."""
-    return [situations[place[candidate]].vibration.undescribed]
+    return [situations[situation_of[candidate]].vibration.undescribed]
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
@@ -526,9 +543,9 @@ def _tell_always(reason: str, _: int) -> list[str]:
     return [reason]
 
 
-def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
+def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
     """Return the objection that the error of a candidate exceeds the tolerance."""
-    limit = most[candidate]
+    limit = limits[candidate]
     return [
         f"error {format_above_limit(error[candidate], limit)} above the tolerance {limit:g}"
     ]
@@ -536,22 +553,22 @@ def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
 
 def _tell_keeps_nothing(
     situations: Sequence[Situation],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     residual: Samples,
     candidate: int,
 ) -> list[str]:
     """Return the objection that a candidate keeps less of the vibration than a release without any."""
-    return [_keeps_nothing(situations[place[candidate]], residual[candidate])]
+    return [_keeps_nothing(situations[situation_of[candidate]], residual[candidate])]
 
 
 def _tell_above_the_reference(
     means: Sequence[Means | None],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     energy: Samples,
     candidate: int,
 ) -> Iterator[str]:
     """Return the objection that a candidate locks in too much energy."""
-    return _above_the_reference(means[place[candidate]], energy[candidate])
+    return _above_the_reference(means[situation_of[candidate]], energy[candidate])
 
 
 def _in_load(situation: Situation) -> str:
@@ -565,10 +582,10 @@ def _in_load(situation: Situation) -> str:
 
 def _keeps_nothing(situation: Situation, residual: float) -> str:
     """Describe that a switch is worse than a release without any vibration, or than the best one at this td."""
-    least = situation.vibration.least_residual or 0.0
+    smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, which a release without any vibration has"
     if situation.vibration.keeps_nothing:
-        better = f"{least:.2g}, which is the least at this td"
+        better = f"{smallest:.2g}, which is the least at this td"
     return f"residual {residual:.2g} above {better}"
 
 
@@ -576,8 +593,8 @@ def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_above_limit(means.ratio(energy), MOST_KEPT)
-        found = f"the mean energy after td is expected to be {times} times that of the reference"
-        yield f"{found}, more than {MOST_KEPT:g} times"
+        text = f"the mean energy after td is expected to be {times} times that of the reference"
+        yield f"{text}, more than {MOST_KEPT:g} times"
 
 
 def against_td(situation: Situation) -> Iterator[str]:

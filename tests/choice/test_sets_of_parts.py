@@ -193,7 +193,7 @@ def test_the_step_grows_by_what_stays_deformable() -> None:
 def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     deck = put(tmp_path_factory.mktemp("car") / "CAR_0000.rad", starter("CAR"))
     return asked(
-        stored("carT01.gz"), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464)
+        stored("carT01.gz"), str(deck), given_ids=[12, 13, 14], times=(0.0496, 0.1464)
     )
 
 
