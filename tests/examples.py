@@ -18,7 +18,7 @@ from tests.command import ROOT, run
 README = ROOT / "README.md"
 PAGES = {
     str(path.relative_to(ROOT)): path
-    for path in (README, *sorted((ROOT / "docs").glob("*.md")))
+    for path in (README, *sorted((ROOT / "docs").rglob("*.md")))
 }
 
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)

@@ -1,4 +1,4 @@
-"""The figures of docs/validation.md, from the results: ``python -m validation.figures``."""
+"""The figures of docs/explanation/validation.md, from the results: ``python -m validation.figures``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RESULTS: Final = Path(__file__).parent / "results"
-PLACE: Final = Path(__file__).resolve().parents[1] / "docs" / "validation"
+PLACE: Final = Path(__file__).resolve().parents[1] / "docs/explanation/validation"
 # Deviations after td of the oscillator's four runs: (tr, td) [ms], computed.
 _PAIRS: Final = (
     ("6, 80", 5.64),

@@ -144,7 +144,7 @@ _MOST_HIDDEN: Final = 0.3
 # An energy has passed its mean if it is this multiple of the standard deviation beyond it; smaller noise is ignored.
 _BAND: Final = 0.25
 # Limits for the energy of the vibration error as a share of that of the next contact [-]: up to the first a pair is
-# good, up to the second not poor (docs/validation.md).
+# good, up to the second not poor (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 
 

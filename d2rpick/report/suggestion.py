@@ -279,9 +279,18 @@ def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.C
         "residual": lambda c: tables.measure(c.residual),
         "timing tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,
-        "verdict": lambda c: in_short(answer.decision_on(c)),
+        "verdict": lambda c: _shorten_verdict(answer, c),
     }
     return tables.filled(columns, answer.candidates[:limit])
+
+
+def _shorten_verdict(answer: Suggestion, candidate: Candidate) -> str:
+    """Return the verdict on a candidate with its reason, unless the lines above the table give the same reason."""
+    decision = answer.decision_on(candidate)
+    answered = answer.decision
+    if answered is not None and decision.reason == answered.reason:
+        return decision.verdict
+    return in_short(decision)
 
 
 def _times(pair: Pair) -> str:

@@ -2,7 +2,7 @@
 
 From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
 momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
-since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/first-run.md, "The wait").
+since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
 The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
 past the middle of the flight.

@@ -35,7 +35,7 @@ VECTORS = arrays(float, 3, elements=st.floats(-5, 5, allow_nan=False))
 SWITCHED = table("vibration")[~np.isnan(table("vibration")["tr_s"])]
 TOTALS = SWITCHED[SWITCHED["energy"] == "total"]
 PARTS_OF_LANDING = absorbing_parts(SWITCHED)
-DOCS = (ROOT / "docs" / "validation.md").read_text("utf-8")
+DOCS = (ROOT / "docs/explanation/validation-vibration.md").read_text("utf-8")
 
 
 def moving(velocities: np.ndarray) -> Motion:
