@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 # Cost per element and cycle [us] of shells with one integration point through the thickness, and of each further point.
 # Fitted to runs of a car of 1516 elements after its first impact, with and without rigid parts, and with its shells in
-# one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md). Beams and springs are not well separated.
+# one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).  Beams and springs are not well
+# separated.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
