@@ -351,7 +351,7 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
         > max(rounding, 2 * limit[first : last + 1].max())
     ]
     if not moving:
-        reason = "its energy stands still nowhere, or that of the reference does so too"
+        reason = _explain_why_no_times(switched, reference, spans)
         cure = switched.left_beside or "; give `tr` and `td`"
         raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
     first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
@@ -360,6 +360,21 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
         np.abs(reference.energies_at(times_before) - energy[first]).argmin()
     ]
     return float(tr), float(time[last])
+
+
+def _explain_why_no_times(
+    switched: History, reference: History, spans: Sequence[tuple[int, int]]
+) -> str:
+    """Explain why no rigid window is found; ``spans`` are the first and last states of constant energy."""
+    if np.array_equal(switched.time, reference.time) and np.array_equal(
+        switched.energy, reference.energy
+    ):
+        return "the energies of the switched run and of the reference run are the same"
+    if not spans:
+        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
+    first, last = spans[0]
+    start, end = switched.time[first], switched.time[last]
+    return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"
 
 
 def _reported_wrong(rigid: float, energies_after: Samples) -> bool:

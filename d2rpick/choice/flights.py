@@ -199,7 +199,7 @@ def _flights_of(
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # it ends with the vibration, also if its start is given
+                # this flight ends with the vibration, even if its start is given
                 return (flight,)
         look = looking(history, replace(settings, replay=False))
     flights: list[Flight] = []

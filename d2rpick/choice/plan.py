@@ -211,7 +211,7 @@ def plan_of(
     reference = reference._replace(history=history)
     fits = Fits()
     flights = flights_of(history, settings, fits)
-    # it may have been switched itself
+    # the earlier run may have been switched itself
     earlier = before and flights_of(switched_history(before, ())[0], settings)
     done_rows = done_windows(history, flights, done_times, earlier)
     judged: Iterable[Planned] = _rows(
@@ -409,7 +409,9 @@ def _cautions(rows: Sequence[Planned], done_rows: Sequence[Done]) -> Iterator[Ca
     windows = [row for row in rows if row.status == "supported" and row.answer]
     for row in windows:
         for caution in row.answer.cautions if row.answer else ():
-            if caution.code == WRONG_ENERGY:  # it concerns the whole run
+            if (
+                caution.code == WRONG_ENERGY
+            ):  # this warning concerns the whole run, not a flight
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)

@@ -457,7 +457,7 @@ def fewest_digits(low: float, high: float) -> float:
 
 
 def runs_of(number: int) -> str:
-    """Write a number of runs."""
+    """Return a number of runs in words: "1 run", "2 runs"."""
     return "1 run" if number == 1 else f"{number} runs"
 
 

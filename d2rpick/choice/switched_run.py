@@ -459,7 +459,7 @@ def _judged(
 def _reported_wrong(
     without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Return the parts whose energy after td differs from that at tr by more than it can, beyond round-off."""
+    """Return the parts whose energy after td differs from that at tr by more than their largest energy without D2R."""
     time = switched.part_time
     energies = switched.part_energies(parts)
     # the first state from td on may still be rigid
