@@ -98,15 +98,9 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     time, energy = _energies_in_flight(situation)
     mean = float(np.mean(energy))
     # share of the mean vibration energy of the flight that damping leaves at td
-    damping_left = 1 / float(
-        np.mean(
-            np.exp(
-                np.minimum(
-                    -situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT
-                )
-            )
-        )
-    )
+    exponents = -situation.flight.damping * (time - situation.td)
+    decay = np.exp(np.minimum(exponents, _LARGEST_EXPONENT))
+    damping_left = 1 / float(np.mean(decay))
     # half of the vibration energy is the mean above the static energy
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)

@@ -517,8 +517,8 @@ def compare_with(
         verdict,
         switched=comparison,
         computed=switched.history,
-        admissible=verdict.admissible
-        and not comparison.objections,  # a wrong motion overrules the verdict
+        # a wrong motion overrules the verdict
+        admissible=verdict.admissible and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
     )

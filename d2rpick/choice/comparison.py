@@ -344,12 +344,11 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     )
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
     rounding = round_off(reference)
-    moving = [
-        (first, last)
-        for first, last in spans
-        if _range(reference, float(time[first]), float(time[last]))
-        > max(rounding, 2 * limit[first : last + 1].max())
-    ]
+    moving = []
+    for first, last in spans:
+        largest = max(rounding, 2 * limit[first : last + 1].max())
+        if _range(reference, float(time[first]), float(time[last])) > largest:
+            moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
         cure = switched.left_beside or "; give `tr` and `td`"

@@ -313,10 +313,9 @@ def _health(
     if balance is None or not balance.time.size:
         return None
     if rigid:
-        states = ~np.any(
-            [(balance.time >= start) & (balance.time <= end) for start, end in rigid],
-            axis=0,
-        )
+        states = np.ones(balance.time.shape, dtype=bool)
+        for start, end in rigid:
+            states &= (balance.time < start) | (balance.time > end)
         if not states.any():
             return Health(
                 reason="its legs are rigid: energies mean nothing there",

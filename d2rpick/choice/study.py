@@ -371,10 +371,8 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:
-            yield Caution(
-                code,
-                f"{sentence}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}",
-            )
+            counts = [f"{kind} in {runs_of(n)}" for kind, n in counted.most_common()]
+            yield Caution(code, f"{sentence}: {', '.join(counts)}")
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
@@ -424,13 +422,9 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
     )
-    times = times[
-        (
-            np.searchsorted(shared[:, 0], times, "right")
-            - np.searchsorted(shared[:, 1], times)
-        )
-        > 0
-    ]
+    begun = np.searchsorted(shared[:, 0], times, "right")
+    ended = np.searchsorted(shared[:, 1], times)
+    times = times[begun > ended]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
         own_error = 0.0 if row.tr is None else error_at(profile, row.tr)

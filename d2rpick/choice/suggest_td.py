@@ -85,10 +85,9 @@ def _reached(
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
     """
-    low, high = (
-        np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2
-        for sign in (-1, 1)
-    )
+    positive = np.maximum(level, 0.0)
+    low = positive * np.maximum(1 - near, 0.0) ** 2
+    high = positive * np.maximum(1 + near, 0.0) ** 2
     fallen = lowest.size - np.searchsorted(lowest[::-1], high, side="right")
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
 
@@ -281,11 +280,11 @@ def _may_beat(situation: Situation, choice: Choice, error: float) -> bool:
     smallest_shortfall = (
         0.0 if mean is None else float(shortfall(np.array(situation.energy_td), mean))
     )
-    return bool(
-        as_printed(smallest_shortfall if share is None else sqrt(share)) <= error
-        and longest_rigid_times(situation, np.array([situation.td]))[0]
-        >= choice[1].rigid_time
-    )
+    smallest_error = smallest_shortfall if share is None else sqrt(share)
+    if as_printed(smallest_error) > error:
+        return False
+    (longest,) = longest_rigid_times(situation, np.array([situation.td]))
+    return bool(longest >= choice[1].rigid_time)
 
 
 def _beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
@@ -464,16 +463,13 @@ def _offered_by_modes(
     errors, tr = np.array(rows).T
     # The smallest of many estimates is too optimistic: add half of the half width.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
-    inner = (
-        np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:]))
-        + 1
-    )
+    middle = squares[1:-1]
+    is_lowest = (middle <= squares[:-2]) & (middle < squares[2:])
+    inner = np.flatnonzero(is_lowest) + 1
     best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
-    offered = (
-        *vertices(times, squares, best)[0].tolist(),
-        *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
-        float(times[np.argmin(squares)]),
-    )
+    offered: list[float] = vertices(times, squares, best)[0].tolist()
+    offered += vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist()
+    offered.append(float(times[np.argmin(squares)]))
     return [*dict.fromkeys(offered)]
 
 

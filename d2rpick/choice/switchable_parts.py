@@ -117,21 +117,19 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
     )
     moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
-    facts = {
-        part.id: PartFacts(
+    facts = {}
+    for part, energy in zip(run.parts, energies.T, strict=True):
+        in_flights = [
+            _in_flight(history.time, energy, span, _flies(part, flight, members))
+            for span, flight in zip(spans, flights, strict=True)
+        ]
+        facts[part.id] = PartFacts(
             part,
             masses.get(part.id),
-            bool(energies[:, at].any()),
-            tuple(
-                _in_flight(
-                    history.time, energies[:, at], span, _flies(part, flight, members)
-                )
-                for span, flight in zip(spans, flights, strict=True)
-            ),
+            bool(energy.any()),
+            tuple(in_flights),
             run.surroundings.held([part], moment),
         )
-        for at, part in enumerate(run.parts)
-    }
     return RunFacts(
         facts, spans, longest, None if flights else "no flight is seen in the history"
     )

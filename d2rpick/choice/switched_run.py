@@ -144,13 +144,11 @@ def switched_history(
             history.energy_at(time)
         cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
-    new = [
-        absent_window
-        for absent_window in absent
-        if not any(
-            tr < absent_window.end and absent_window.start < td for tr, td in done
-        )
-    ]
+    new = []
+    for absent_window in absent:
+        start, end = absent_window.start, absent_window.end
+        if not any(tr < end and start < td for tr, td in done):
+            new.append(absent_window)
     cautions += [absent_window.caution for absent_window in new]
     whole_windows = tuple(
         (absent_window.start, absent_window.end)

@@ -298,11 +298,9 @@ def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
         if offer.unbeaten and (offer.error or 0.0) <= _MUCH_LESS * error
     ]
     long_enough = [offer for offer in halved if (offer.rigid_time or 0.0) >= least_time]
-    return min(
-        long_enough,
-        key=lambda offer: abs(offer.td - start.td),
-        default=next((o for o in better if o.recommended), None),
-    )
+    if long_enough:
+        return min(long_enough, key=lambda offer: abs(offer.td - start.td))
+    return next((offer for offer in better if offer.recommended), None)
 
 
 def _cautions(
@@ -346,12 +344,12 @@ def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     trade_offs = (
         explored_around(
             reference,
-            trade_off.situation,
-            trade_off.td_window,
+            answer.situation,
+            answer.td_window,
             steps=steps,
             since=landings.get(number - 1),
         )
-        for number, trade_off in answers.items()
+        for number, answer in answers.items()
     )
     return tuple(trade_off for trade_off in trade_offs if trade_off)
 

@@ -141,9 +141,9 @@ def coverage(
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
     # the gap between two windows that start, or end, at the same time is empty
-    lasting = (stretches[:, 0] < stretches[:, 1]) | (
-        (steps[order][:-1] > 0) & (steps[order][1:] < 0)
-    )
+    ordered = steps[order]
+    touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
+    lasting = (stretches[:, 0] < stretches[:, 1]) | touching
     is_counted = lasting & (counts > 0)
     return stretches[is_counted], counts[is_counted]
 
