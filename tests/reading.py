@@ -60,7 +60,7 @@ def history_of(
 def read(
     names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
 ) -> Reference:
-    """Read as `d2rpick.choice.question.read` does; what is found in files of the clone, which stay, is found once."""
+    """Read as `d2rpick.choice.question.read` does, each file of the repository once."""
     selection = selection or Selection()
     asked = (
         tuple(names),

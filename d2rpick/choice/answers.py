@@ -1,4 +1,4 @@
-"""Answer `suggest` and `verify`: recommend a pair, with its rivals and a better td, or judge a given pair.
+"""Answer ``suggest`` and ``verify``: recommend a pair, with its rivals and a better td, or judge a given pair.
 
 The command line, ``study``, ``check --history``, ``card`` and Python all call these functions, so that they give the
 same numbers.
@@ -275,7 +275,7 @@ class Suggestion(OfTd):
         return better
 
     def decision_on(self, candidate: Candidate) -> Decision:
-        """Decide on one of the candidates by the rules of `verify`."""
+        """Decide on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
         limits = over_limits(self.situation, candidate)
         return decide(self.situation, candidate, objections=(*objections, *limits))
@@ -488,7 +488,7 @@ def verify_of(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> Verdict:
-    """Judge one pair of a reference run; errors and ``earlier`` as for `verify`."""
+    """Judge one pair of a reference run; errors and ``earlier`` as for one pair of a history."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     return _with_health(
         verify(reference.history, tr, td, settings, earlier), reference.run

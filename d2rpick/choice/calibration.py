@@ -206,7 +206,7 @@ def observations_of_runs(
     Raises
     ------
     DeckError, FormatError
-        As `observations_of`.
+        As ``observations_of``.
     """
     legs_by_content: dict[str, tuple[Observation, ...]] = {}
     cautions = []

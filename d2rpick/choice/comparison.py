@@ -82,7 +82,7 @@ def compare(
     """Compare a finished switched run with its reference run, by the parts that show how right it is.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
-    `compare_runs`.
+    ``compare_runs``.
 
     Raises
     ------

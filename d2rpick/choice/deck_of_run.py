@@ -180,7 +180,8 @@ def _named(differing: Sequence[Part], inventory: Inventory) -> str:
     """Describe the first of the parts whose titles differ."""
     first = differing[0]
     more_parts = f", and {len(differing) - 1} more" if len(differing) > 1 else ""
-    return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more_parts}"
+    title_in_deck = _title(first, inventory)
+    return f"part {first.id} is {first.title!r} in the history and {title_in_deck!r} in the deck{more_parts}"
 
 
 def _title(part: Part, inventory: Inventory) -> str:

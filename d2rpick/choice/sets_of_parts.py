@@ -64,7 +64,7 @@ class PartSet(NamedTuple):
     """A set of parts with its saving and its errors; unknown values are None, with the cause in ``reasons``.
 
     ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the share of a step that they save [-].
-    ``step_growth`` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
+    `step_growth` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
     it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
     ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
     and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to

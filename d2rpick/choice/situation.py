@@ -357,7 +357,7 @@ def looking(
     """Return a function that examines a record at a td, and remembers its answer for each td.
 
     ``fits`` are those of an earlier call with the same settings.  No flight is assumed to begin before ``since``
-    [time].  ``quick`` is passed to `examine`.
+    [time].  ``quick`` has the same meaning as in the examination of one td.
     """
     look = partial(
         examine, history, settings=settings, fits=fits or Fits(), quick=quick

@@ -466,8 +466,9 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
         return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
     unsuited = [row.source for row in judged if not _holds(row.acceptable, tr)]
+    suited = len(judged) - len(unsuited)
     return (
-        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(unsuited)}, "
+        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {suited}, "
         f"not in {list_names(unsuited, most=NAMED)}"
     )
 

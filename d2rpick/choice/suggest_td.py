@@ -403,7 +403,7 @@ def _surest(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _certainty_of_tr(situation: Situation) -> int:
-    """Return the `certainty` of the tr recommended at a td; 0 without one."""
+    """Return how certain the tr recommended at a td is, from 0 to 2; 0 without one."""
     best = next(candidates_at([situation], in_flight=True)).chosen
     return 0 if best is None else certainty(best)
 

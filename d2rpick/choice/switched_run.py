@@ -442,8 +442,10 @@ def _judged(
             f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
         )
     elif misreported:
-        left_out = f"left out of the comparison: {_names(misreported)}, whose energy is reported wrongly after td"
-        notes.append(f"{left_out}; some solvers do so with solids that were rigid")
+        left_out = f"left out of the comparison: {_names(misreported)}"
+        notes.append(
+            f"{left_out}, whose energy is reported wrongly after td; some solvers do so with solids that were rigid"
+        )
     selection = Selection(
         parts=tuple(str(part.id) for part in comparable or chosen),
         springs=tuple(str(part.id) for part in history.springs),

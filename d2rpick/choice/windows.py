@@ -95,7 +95,7 @@ def alike_windows(
         All candidates.
     chosen : Candidate
     acceptable : array of shape (n, 2)
-        The result of `acceptable_windows`.
+        The result of ``acceptable_windows``.
 
     Returns
     -------
