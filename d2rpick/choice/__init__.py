@@ -9,7 +9,7 @@ these steps:
 3. `quality` ranks the candidates, recommends the first acceptable one, and grades the pair: its motion and its
    vibration; `aftermath` predicts the energy after td.  `decision` makes one verdict of this: use, use with care, do
    not use.
-4. `answers` are the results of ``suggest`` and ``verify``; `windows` adds where else tr is acceptable.
+4. `answers` are the results of ``suggest`` and ``verify``; `windows` adds the ranges of acceptable tr.
 
 If td is not given, `flights` finds the flights of the record and `suggest_td` the best td in one of them; `trade_off`
 compares the td of a window, and `plan` chooses windows for all flights of a run.

@@ -1,6 +1,7 @@
 """Fit the weights of a site to the CPU times of its own runs.
 
-For each leg of a run, with its computed elements, cycles and CPU time,
+A leg of a run is an engine run of Radioss or a restart segment of LS-DYNA.  For each leg, with its computed elements,
+cycles and CPU time,
 
     E = sum of w_k n_k,     T = E + b N + r R
 
