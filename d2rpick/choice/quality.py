@@ -45,7 +45,7 @@ _LIKE_TIMES = 0.1
 def candidates_at(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Yield the candidates of each td of one record, found by ``judged_of`` and ranked, one of them recommended."""
+    """Yield the ranked candidates of each td of one record, found by ``judged_of``, one of them recommended."""
     return chain.from_iterable(map(ranked, judged_of(situations, in_flight=in_flight)))
 
 
