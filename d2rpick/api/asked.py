@@ -1,6 +1,6 @@
-"""The way from a request to what a choice needs: open, let the deck tell, take the energy, cost it.
+"""Turn a request into a question: open the run, complete the settings from the deck, select the energy, add the cost.
 
-The commands of one run and Python go this way; `d2rpick.choice.answers` leads on from there to an answer.
+The commands of one run and the Python functions use this; `d2rpick.choice.answers` computes the answer.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from d2rpick.histories import run as histories
 
 
-class Asked(NamedTuple):
-    """A run that is open, the energy in it that is meant, and how it is judged.
+class RunQuestion(NamedTuple):
+    """A question: the opened run, the selected energy, and how it is judged.
 
-    ``cautions`` are what the deck left unknown, ``selection`` the columns and parts, with those that the deck names;
-    ``on_card`` are parts that stand on the card alone.
+    ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
+    deck.  ``on_card`` are parts that only the card contains.
     """
 
     run: Run
@@ -48,25 +48,25 @@ class Asked(NamedTuple):
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
     of_this_run: bool = (
-        True  # whether the deck, where there is one, may be that of the run
+        True  # True if the deck, if there is one, may be that of the run
     )
 
     @property
     def deck(self) -> str | None:
-        """The main deck of the run; None without one, or if it is the deck of another model."""
+        """The main deck of the run; None without a deck, or if it is the deck of another model."""
         return self.request.deck if self.of_this_run else None
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What follows the times in the command line that asks the same."""
+        """Options that follow the times in the command line of the same question."""
         from d2rpick.report.tables import (
-            positional,
-        )  # not above: most answers repeat no command
+            make_positional,
+        )  # imported here since most answers repeat no command
 
-        return (*self.request.asking(), *positional(self.request.history))
+        return (*self.request.asking(), *make_positional(self.request.history))
 
 
-def request_of(
+def make_request(
     run: Run | None,
     parts: Parts | None,
     flying: Parts | None,
@@ -74,56 +74,56 @@ def request_of(
     weights: Weights | arguments.Path | None,
     choosing: Choosing,
 ) -> Request:
-    """Ask as the arguments say; TypeError for one that is not of its kind or does not exist."""
+    """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument."""
     if run is not None:
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()
     request = Request(
         deck=None
         if deck is None or deck is False
-        else arguments.one_path("deck", deck),
+        else arguments.check_path("deck", deck),
         no_deck=deck is False,
         run_folder=run.folder if run else None,
-        weights=arguments.file_or_weights(weights),
+        weights=arguments.check_weights(weights),
         history=run.sources if run else (),
         input_format=run.input_format if run else "auto",
         time=chosen.time,
         energy=chosen.energy,
-        part=arguments.part_names("parts", parts),
-        flying=arguments.part_names("flying", flying),
+        part=arguments.list_part_names("parts", parts),
+        flying=arguments.list_part_names("flying", flying),
         channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
-        **arguments.chosen(choosing),
+        **arguments.read_choosing(choosing),
     )
     return find_deck_in_folder(request)
 
 
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
-    """Open the run that is asked about, or other files as its files are opened."""
-    from d2rpick.api.runs import Run, folder_of
+    """Open the run of the request, or other files in the same way."""
+    from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening
 
     selection = request.selection(parts=False)
     names = names or request.history
     files = opening.open_run(names, selection, request.input_format)
-    return Run(files, selection, request.input_format, folder_of(names))
+    return Run(files, selection, request.input_format, find_folder(names))
 
 
-def on_card_only(request: Request, run: histories.Run) -> bool:
-    """Whether parts can stand on a card alone: a table knows none, and a named energy judges for all."""
+def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
+    """Return True if parts may be only on the card: a table has no parts, and a named energy stands for all."""
     return bool(request.energy) or not run.parts
 
 
-def ask(
+def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
-) -> Asked:
-    """Take the energy that is asked for of a run, with what its deck tells.
+) -> RunQuestion:
+    """Select the energy of a run that a request asks for, with the data of its deck.
 
     Parameters
     ----------
     run : Run
     request : Request
     card_alone : bool
-        Only a card is asked for: parts that the history has not stand there, and the energy is that of the model.
+        Only a card is requested: it may have parts that the history lacks, and the energy is that of the model.
     merge : int, optional
         Part into which all others are merged on the card: they become one rigid body.
 
@@ -132,32 +132,34 @@ def ask(
     D2RPickError
         If the run has no such parts or energy, or the deck or the weights cannot be read.
     ArgumentError
-        If the recommended set is asked for beside other parts, or without a deck.
+        If the recommended set is requested together with other parts, or without a deck.
     """
-    settings, model, files = request.settings, model_of(request), run.files
+    settings = request.settings
+    model = read_cost_model(request)
+    files = run.files
     selection = request.selection(parts=False)._replace(parts=request.part)
     if request.part:
         _check_recommended(request, files)
     foreign = False
     if model is not None:
-        from d2rpick.choice.deck_of_run import in_deck, of_another_model
+        from d2rpick.choice.deck_of_run import add_surroundings, check_model_of_deck
 
-        foreign = of_another_model(files, model.inventory) is not None
-        files = in_deck(files, model.inventory)
-        selection = selected(files, selection, settings, model)
+        foreign = check_model_of_deck(files, model.inventory) is not None
+        files = add_surroundings(files, model.inventory)
+        selection = complete_selection(files, selection, settings, model)
     parts: tuple[str, ...] = ()
-    if card_alone and on_card_only(request, files):
+    if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # refuses a named energy beside them
+        request.selection()  # refuses a named energy together with parts
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
-        from d2rpick.choice.deck_of_run import with_deck
+        from d2rpick.choice.deck_of_run import add_deck_to_settings
 
-        settings, cautions = with_deck(settings, reference, model)
+        settings, cautions = add_deck_to_settings(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
-    asked = Asked(
+    question = RunQuestion(
         run,
         request,
         reference,
@@ -168,11 +170,11 @@ def ask(
         cautions,
         of_this_run=not foreign,
     )
-    return asked if merge is None else _merged(asked, merge)
+    return question if merge is None else _merge_parts(question, merge)
 
 
-def model_of(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or the file of these; None without one.
+def read_cost_model(request: Request) -> CostModel | None:
+    """Read the deck with its weights, or the weights alone; return None without either.
 
     Raises
     ------
@@ -191,21 +193,21 @@ def model_of(request: Request) -> CostModel | None:
     )
 
 
-def selected(
-    run: histories.Run, selection: Selection, settings: Settings, model: CostModel
+def complete_selection(
+    run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection: the parts of the recommended set for that word, and the springs of deck and energies.
+    """Complete a selection: add the parts of the recommended set, and the springs of the deck that have energies.
 
     Raises
     ------
     FormatError
         If no set can be recommended.
     """
-    from d2rpick.choice.deck_of_run import of_another_model
-    from d2rpick.choice.sets_of_parts import recommended_parts
+    from d2rpick.choice.deck_of_run import check_model_of_deck
+    from d2rpick.choice.sets_of_parts import recommend_parts
     from d2rpick.deck.model import DISCRETE
 
-    if foreign := of_another_model(run, model.inventory):
+    if foreign := check_model_of_deck(run, model.inventory):
         if has_recommended(selection.parts, run.parts):
             raise FormatError(
                 f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
@@ -217,12 +219,12 @@ def selected(
     }
     parts = selection.parts
     if has_recommended(parts, run.parts):
-        parts = tuple(map(str, recommended_parts(run, settings, model)))
+        parts = tuple(map(str, recommend_parts(run, settings, model)))
     return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
-def _check_recommended(request: Request, run: histories.Run) -> None:
-    """Refuse the word for the recommended set beside other parts, or without a deck."""
+def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
+    """Refuse the recommended set together with other parts, or without a deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
@@ -234,22 +236,23 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
             )
 
 
-def _merged(asked: Asked, merge: int) -> Asked:
-    """Let the parts become one rigid body, with a caution where nothing joins them."""
-    from d2rpick.choice.deck_of_run import merged
+def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
+    """Make the parts one rigid body, with a caution if nothing connects them."""
+    from d2rpick.choice.deck_of_run import merge_into_one_body
 
-    parts = asked.reference.history.parts
+    parts = question.reference.history.parts
     if not parts:
-        return asked
-    cautions, bodies = asked.cautions, asked.settings.bodies or ()
+        return question
+    cautions = question.cautions
+    bodies = question.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
-        found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        message = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
         cautions = (
             *cautions,
-            Caution("merged-apart", f"{found}; leave it out to keep them apart"),
+            Caution("merged-apart", f"{message}; leave it out to keep them apart"),
         )
-    body = merged({part.id for part in parts} | {merge}, bodies)
-    return asked._replace(
-        settings=replace(asked.settings, bodies=(body,)), cautions=cautions
+    body = merge_into_one_body({part.id for part in parts} | {merge}, bodies)
+    return question._replace(
+        settings=replace(question.settings, bodies=(body,)), cautions=cautions
     )

@@ -1,4 +1,4 @@
-"""What parts cost: which may be switched, what sets of them save, and the cost of elements fitted to runs of a site."""
+"""Determine which parts may be switched and what sets of them save; fit the cost of elements to runs of a site."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import Answer, Paged, frame_of, written
-from d2rpick.api.asked import model_of, request_of
+from d2rpick.api.answer import Answer, Paged, build_frame, write_page
+from d2rpick.api.asked import make_request, read_cost_model
 from d2rpick.api.deck_in_folder import name_deck
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import calibration, sets_of_parts
-from d2rpick.choice.cost import Weights, weights_as_toml
-from d2rpick.report.tables import positional
+from d2rpick.choice.cost import Weights, format_weights_as_toml
+from d2rpick.report.tables import make_positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PartTable(Paged, sets_of_parts.Parts):
-    """Answer of `parts`; nothing of it changes.
+    """Answer of `parts`; it is immutable.
 
-    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` what is worth comparing, ``recommended`` the
-    set to take, None where there is none; its ``parts`` and ``cost_share`` are what `suggest` and `plan` take.
+    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` the sets that are compared, ``recommended``
+    the set to use, None without one; its ``parts`` and ``cost_share`` are arguments of `suggest` and `plan`.
     """
 
     run: Run
@@ -40,7 +40,7 @@ class PartTable(Paged, sets_of_parts.Parts):
     kind = "parts"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per part.
+        """Return a table with a row per part.
 
         The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
 
@@ -52,20 +52,20 @@ class PartTable(Paged, sets_of_parts.Parts):
         """
         from d2rpick.report.parts import PART
 
-        return frame_of(
+        return build_frame(
             list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources)
         )
 
     def sets_frame(self) -> pd.DataFrame:
-        """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
+        """Return a table with a row per set; the columns are the keys of ``sets`` in the JSON."""
         from d2rpick.report.parts import SET
 
-        return frame_of(
+        return build_frame(
             list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources)
         )
 
     def plot(self) -> Figure:
-        """Draw the energies of the parts that have most, and the flights."""
+        """Draw the energies of the parts with the largest energy, and the flights."""
         from d2rpick.report.figures_choice import draw_parts
 
         return draw_parts(self)
@@ -81,7 +81,7 @@ def parts(
     td: float | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Say which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
 
     Parameters
     ----------
@@ -116,19 +116,30 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    request = request_of(run, given, None, deck, weights, choosing)
-    return tabled(
-        run, request, arguments.optional("tr", tr), arguments.optional("td", td)
+    request = make_request(run, given, None, deck, weights, choosing)
+    return compare_parts(
+        run,
+        request,
+        arguments.check_optional_number("tr", tr),
+        arguments.check_optional_number("td", td),
     )
 
 
-def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
-    """Say which parts may be switched, by sets that are compared from tr to td, or up to td."""
+def compare_parts(
+    run: Run, request: Request, tr: float | None, td: float | None
+) -> PartTable:
+    """Determine which parts may be switched; compare sets of them from tr to td, or up to td."""
     times = check_times(tr, td)
-    model, beside = model_of(request), [request.deck] if request.deck else []
-    ids = sets_of_parts.given_parts(run.files, request.part)
-    found = sets_of_parts.parts_of(
-        run.files, request.settings, model, given=ids, times=times, beside=beside
+    model = read_cost_model(request)
+    deck_names = [request.deck] if request.deck else []
+    ids = sets_of_parts.find_given_parts(run.files, request.part)
+    table = sets_of_parts.compare_sets_of_parts(
+        run.files,
+        request.settings,
+        model,
+        given_ids=ids,
+        times=times,
+        deck_files=deck_names,
     )
     window = [
         text
@@ -136,12 +147,12 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
         if time is not None
         for text in (f"--{name}", repr(time))
     ]
-    command = ("parts", *window, *request.asking(), *positional(request.history))
-    return PartTable.of(found, run=run, command=command, cautions=name_deck(request))
+    command = ("parts", *window, *request.asking(), *make_positional(request.history))
+    return PartTable.of(table, run=run, command=command, cautions=name_deck(request))
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
-    """Give the window to compare sets in, or its end; ArgumentError where there is none."""
+    """Return the window in which sets are compared, or its end; raise ArgumentError if there is none."""
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
@@ -150,12 +161,12 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibration(Answer, calibration.Calibration):
-    """Answer of `calibrate`; nothing of it changes.
+class Calibration(Answer, calibration.FittedWeights):
+    """Answer of `calibrate`; it is immutable.
 
-    ``weights`` are what `parts`, `suggest`, `plan`, `explore` and `verify` take; ``told`` names what the runs decide,
-    the others keep the measured ratio.  ``misfit`` is relative to the time of a leg [-]; ``legs`` have what each took
-    per cycle [us], and what it computed.
+    ``weights`` are an argument of `parts`, `suggest`, `plan`, `explore` and `verify`.  ``told`` names the formulations
+    that the runs determine; the others keep the measured ratio.  ``misfit`` is relative to the time of a run segment
+    [-].  ``legs`` has the time of each segment per cycle [us], and what it computed.
     """
 
     command: tuple[str, ...]
@@ -163,7 +174,7 @@ class Calibration(Answer, calibration.Calibration):
     said = ("weights", "told", "misfit")
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per formulation: its weight, what was measured with OpenRadioss, whether the runs tell it.
+        """Return a row per formulation: its weight, that measured with OpenRadioss, and whether the runs determine it.
 
         Examples
         --------
@@ -171,18 +182,18 @@ class Calibration(Answer, calibration.Calibration):
         >>> d2.calibrate("sample_data/flying_box").to_frame()["formulation"].tolist()
         ['QBAT', 'QEPH', 'point']
         """
-        from d2rpick.report.calibration import COLUMNS, plain_rows
+        from d2rpick.report.calibration import COLUMNS, list_plain_rows
 
-        rows = [dict(zip(COLUMNS, row, strict=True)) for row in plain_rows(self)]
-        return frame_of(rows, COLUMNS, source=[one.name for one in self.legs])
+        rows = [dict(zip(COLUMNS, row, strict=True)) for row in list_plain_rows(self)]
+        return build_frame(rows, COLUMNS, source=[leg.name for leg in self.legs])
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
-        return written(path, f"{weights_as_toml(self.weights)}\n")
+        return write_page(path, f"{format_weights_as_toml(self.weights)}\n")
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
-    """Fit the cost of elements to what runs of a site took, as ``d2rpick calibrate`` does.
+    """Fit the cost of elements to the CPU times of runs of a site, as ``d2rpick calibrate`` does.
 
     Parameters
     ----------
@@ -207,9 +218,9 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     >>> round(found.weights.element_share, 2)
     0.65
     """
-    names = arguments.paths("runs", runs)
-    observations, cautions = calibration.observations_of_runs(names)
-    command = ("calibrate", *positional(names))
+    names = arguments.list_paths("runs", runs)
+    observations, cautions = calibration.read_observations_of_runs(names)
+    command = ("calibrate", *make_positional(names))
     return Calibration.of(
-        calibration.calibrate(observations), cautions=cautions, command=command
+        calibration.fit_weights(observations), cautions=cautions, command=command
     )

@@ -1,4 +1,4 @@
-"""Runs that are computed here: what is asked of the floating oscillator and of the rollover box, and their answers."""
+"""Compute the sample models: the requests for the floating oscillator and the rollover box, and their answers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from d2rpick.api.request import (
     TIME,
     UNLIMITED,
     Request,
-    dashed,
-    option,
+    make_option,
+    make_option_name,
 )
 from d2rpick.base.errors import ArgumentError, Caution
 
@@ -31,62 +31,81 @@ HISTORIES = (
     "hdf5",
     "glstat",
     "matsum",
-)  # of d2rpick.report.history_files, which --help does without
+)  # formats of d2rpick.report.history_files, which --help does not import
+
+MOST_STATES = 1_000_000
+PARAMETERS = (
+    "speed",
+    "stiffness",
+    "yield_strain",
+    "damping",
+    "mesh",
+    "drop",
+    "tilt",
+    "ground_stiffness",
+)
+TD = 0.37  # td of the published study, 10 ms before the ground contact [s]
+TILT = 30.0  # a falling box lands on an edge, so that it tumbles [degrees]
+T_END = {
+    False: 0.42,
+    True: 1.2,
+}  # by whether the box is dropped: time for some bounces [s]
+BALANCED = 0.01  # largest imbalance of the energy of a run [-]
 
 
-def _same(name: str, **changes: Any) -> Any:
-    """Take an option of a request."""
+def _copy_option(name: str, **changes: Any) -> Any:
+    """Return an option of a request, changed for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is computed: the oscillator, its start, and when it is rigid."""
+    """Request for a motion of the oscillator: its parameters, its start, and when it is rigid."""
 
-    stiffness: float = _same("stiffness")
-    mass: float = _same("mass")
-    frame_mass: float | None = _same("frame_mass")
-    beta: float | None = _same("beta")
-    alpha: float = _same("alpha")
-    v0: float | None = _same("v0", help="Velocity of the frame at time 0.")
-    z0: float | None = option(
+    stiffness: float = _copy_option("stiffness")
+    mass: float = _copy_option("mass")
+    frame_mass: float | None = _copy_option("frame_mass")
+    beta: float | None = _copy_option("beta")
+    alpha: float = _copy_option("alpha")
+    v0: float | None = _copy_option("v0", help="Velocity of the frame at time 0.")
+    z0: float | None = make_option(
         "Displacement of the frame at time 0.  [default: 0]", TIME
     )
-    y0: float | None = option(
+    y0: float | None = make_option(
         "Displacement of the suspended mass at time 0.  [default: 0]", TIME
     )
-    vz0: float | None = option(
+    vz0: float | None = make_option(
         "Velocity of the frame at time 0; the same as --v0.  [default: 0]",
         TIME,
         instead_of=("v0",),
     )
-    vy0: float | None = option(
+    vy0: float | None = make_option(
         "Velocity of the suspended mass at time 0.  [default: 0]", TIME
     )
-    tr: float | None = option(
+    tr: float | None = make_option(
         "Switch to rigid at this time; with --td.", NOT_NEGATIVE, "T"
     )
-    td: float | None = option(
+    td: float | None = make_option(
         "Switch back to deformable at this time.", NOT_NEGATIVE, "T"
     )
-    t_end: float = option("Last time.", POSITIVE, "T")
-    dt: float = option("Output interval.", POSITIVE, "T")
-    write_as: str | None = option(
+    t_end: float = make_option("Last time.", POSITIVE, "T")
+    dt: float = make_option("Output interval.", POSITIVE, "T")
+    write_as: str | None = make_option(
         "Format of the result.  [default: by the name of -o, else csv]", HISTORIES
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
-        given = [
+        """Refuse contradictory arguments."""
+        given_names = [
             name
             for name in ("z0", "y0", "v0", "vz0", "vy0")
             if getattr(self, name) is not None
         ]
-        if {"v0", "vz0"} <= {*given}:
+        if {"v0", "vz0"} <= {*given_names}:
             raise ArgumentError(
                 "--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0"
             )
-        if not given:
+        if not given_names:
             raise ArgumentError(
                 "the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0"
             )
@@ -105,25 +124,27 @@ class Motion:
         """The state at time 0."""
         from d2rpick.vibration.oscillator import State
 
-        given = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
-        return State.of(*(value or 0.0 for value in given))
+        values = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
+        return State.of(*(value or 0.0 for value in values))
 
     @property
     def oscillator(self) -> Oscillator:
-        """The oscillator that moves; ArgumentError for half of one."""
-        named = {
+        """The oscillator that moves; raise ArgumentError if it is incomplete."""
+        parameters = {
             name: getattr(self, name)
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
-        oscillator = Request(**named, v0=0.0).oscillator
-        assert oscillator is not None  # its options are required
+        oscillator = Request(**parameters, v0=0.0).oscillator
+        assert oscillator is not None  # the options that define it are required
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
-        """Give the motion, and how it is switched where it is."""
+        """Return the motion, and its replay with switching if windows are given."""
         from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
-        start, oscillator, switched = self.start, self.oscillator, None
+        start = self.start
+        oscillator = self.oscillator
+        switched = None
         if self.tr is not None and self.td is not None:
             switched = Replay(oscillator, start, 0.0, self.tr, self.td)
         return compute_trajectory(
@@ -131,85 +152,68 @@ class Motion:
         ), switched
 
 
-MOST_STATES = 1_000_000
-PARAMETERS = (
-    "speed",
-    "stiffness",
-    "yield_strain",
-    "damping",
-    "mesh",
-    "drop",
-    "tilt",
-    "ground_stiffness",
-)
-TD = 0.37  # of the published study, 10 ms before the ground comes
-TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
-T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
-BALANCED = 0.01  # so well the energy of a run must be balanced [-]
-
-
 @dataclass(frozen=True)
 class Box:
-    """What is computed, in SI units: the box, its windows and the scan."""
+    """Request for the rollover box in SI units: the box, its windows and the scan."""
 
-    tr: tuple[float, ...] = option(
+    tr: tuple[float, ...] = make_option(
         "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
         *(NOT_NEGATIVE, "T"), many=True,
     )  # fmt: skip
-    td: tuple[float, ...] = option(
+    td: tuple[float, ...] = make_option(
         "Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True
     )
-    drop: float | None = option(
+    drop: float | None = make_option(
         "Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
         *(NOT_NEGATIVE, "HEIGHT"),
     )
-    tilt: float | None = option(
+    tilt: float | None = make_option(
         "Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG"
     )
-    ground_stiffness: float | None = option(
+    ground_stiffness: float | None = make_option(
         "Of the ground at a point, N/m.  [default: 5e5]", POSITIVE
     )
-    scan: bool = option(
+    scan: bool = make_option(
         "Compute many tr, and hold each run against the one without switching.",
         "flag",
         default=False,
     )
-    jobs: int | None = option(
+    jobs: int | None = make_option(
         "Processes of a scan.  [default: one for each core]", range(1, UNLIMITED)
     )
-    t_end: float | None = option(
+    t_end: float | None = make_option(
         "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
     )
-    dt: float = option("Output interval.", POSITIVE, "T", default=1e-4)
-    speed: float | None = option(
+    dt: float = make_option("Output interval.", POSITIVE, "T", default=1e-4)
+    speed: float | None = make_option(
         "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]",
         NOT_NEGATIVE,
     )
-    stiffness: float | None = option(
+    stiffness: float | None = make_option(
         "Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE
     )
-    yield_strain: float | None = option(
+    yield_strain: float | None = make_option(
         "Of the bars of the box.  [default: 4.5e-3]", POSITIVE
     )
-    damping: float | None = option(
+    damping: float | None = make_option(
         "Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE
     )
-    mesh: int | None = option(
+    mesh: int | None = make_option(
         "Cells along each side of the box.  [default: 16]", range(4, 201)
     )
-    write_as: str | None = option(
+    write_as: str | None = make_option(
         "Format of a history.  [default: by the name of -o, else csv]", HISTORIES
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
+        """Refuse contradictory arguments."""
         if self.scan:
             lost = [name for name in ("tr", "write_as") if getattr(self, name)] + [
                 "drop"
             ] * (self.drop is not None)
             if lost:
                 raise ArgumentError(
-                    f"--scan and --{dashed(lost[0])} exclude each other"
+                    f"--scan and --{make_option_name(lost[0])} exclude each other"
                 )
             if len(self.td) > 1:
                 raise ArgumentError("--scan takes one --td")
@@ -228,30 +232,30 @@ class Box:
 
     @property
     def end(self) -> float:
-        """Last time [s]."""
+        """End of the simulation [s]."""
         return self.t_end or T_END[self.drop is not None]
 
     @property
     def parameters(self) -> Parameters:
-        """The model that is meant."""
+        """The parameters of the model."""
         from d2rpick.models.box_model import Parameters
 
-        given = {
+        values = {
             name: getattr(self, name)
             for name in PARAMETERS
             if getattr(self, name) is not None
         }
         return Parameters(
             **(
-                {"speed": 0.0, "tilt": TILT, **given}
+                {"speed": 0.0, "tilt": TILT, **values}
                 if self.drop is not None
-                else given
+                else values
             )
         )
 
     @property
     def windows(self) -> tuple[RigidWindow, ...]:
-        """In which it is rigid."""
+        """The windows in which the box is rigid."""
         from d2rpick.models.box_run import RigidWindow
 
         return tuple(map(RigidWindow, self.tr, self.td))
@@ -266,50 +270,51 @@ class Box:
 def _check_windows(
     starts: Sequence[float], ends: Sequence[float], t_end: float
 ) -> None:
-    """ArgumentError unless the times are pairs in order, within the run."""
+    """Raise ArgumentError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
         raise ArgumentError(
             "--tr and --td need each other, as many of the one as of the other"
         )
-    before = None
+    previous_end = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:
             raise ArgumentError(f"--tr {tr:g} is not before --td {td:g}")
-        if before is not None and not before < tr:
+        if previous_end is not None and not previous_end < tr:
             raise ArgumentError(
-                f"--tr {tr:g} is not after --td {before:g} of the window before it"
+                f"--tr {tr:g} is not after --td {previous_end:g} of the window before it"
             )
         if td > t_end:
             raise ArgumentError(
                 f"--td {td:g} lies after the end of the run, --t-end {t_end:g}"
             )
-        before = td
+        previous_end = td
 
 
 class Scanning:
-    """A scan that is about to be computed: the run without switching, what is recommended from it, and other tr."""
+    """A scan to be computed: the reference run, the recommendation from it, and the other tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
 
         start_importing(box.jobs or count_cores(), "d2rpick.models.box_run")
-        from d2rpick.choice.answers import suggest
+        from d2rpick.choice.answers import suggest_in_history
         from d2rpick.choice.question import Settings
         from d2rpick.models.box_run import find_comparison_end, make_history, scan_times
 
         self.box, self.td, self.reference = box, next(iter(box.td), TD), box.simulated()
         find_comparison_end(self.reference, self.td)
         times = scan_times(self.reference.released or self.td / 3, self.td)
-        self.answer = suggest(make_history(self.reference), self.td, Settings())
-        self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
-        self.times = (
-            sorted({*times, self.answer.recommended.tr})
-            if self.answer.recommended
-            else times
+        self.answer = suggest_in_history(
+            make_history(self.reference), self.td, Settings()
         )
+        self.cautions = (*warn_if_unbalanced(self.reference), *self.answer.cautions)
+        if self.answer.recommended:
+            self.times = sorted({*times, self.answer.recommended.tr})
+        else:
+            self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs; ``told`` is called with the number of those that are there."""
+        """Compute the runs; ``told`` is called with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 
@@ -323,15 +328,15 @@ class Scanning:
         return Scan(self.reference, outcomes, self.answer, self.cautions)
 
 
-def unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
-    off = float(abs(record.imbalance).max())
-    if off <= BALANCED:
+def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
+    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
+    imbalance = float(abs(record.imbalance).max())
+    if imbalance <= BALANCED:
         return ()
-    found = f"the energy is balanced within {off:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",
-            f"{found}; these parameters are beyond what the model can do",
+            f"{message}; these parameters are beyond what the model can do",
         ),
     )

@@ -1,4 +1,4 @@
-"""A run in the hands of a script: read from files, from memory, or taken from a table in pandas."""
+"""Give scripts a run: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """One run: its files, opened, and which columns of a table were named; nothing of it changes.
+    """One run: its opened files, and the named columns of a table; it is immutable.
 
-    It can be pickled: a copy, also in another process, holds the same bytes, or opens the same big files again.  Two
+    It can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.  Two
     runs are equal if the same bytes were read under the same names, in the same way.
 
-    ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
-    their content decided.  ``folder`` is the one that was named, in which the main deck is looked for.  Energies are
-    read when they are asked for.
+    ``files`` are the opened files, ``chosen`` the columns, ``input_format`` the format as which the files were read,
+    ``"auto"`` if their content decided.  ``folder`` is the folder that was named; the main deck is searched there.
+    Energies are read only when they are needed.
     """
 
-    files: histories.Run
+    files: histories.OpenedRun
     chosen: Selection
     input_format: str = "auto"
     folder: str | None = None
@@ -54,21 +54,21 @@ class Run:
         return self.sources, digests, self.chosen, self.input_format
 
     def __repr__(self) -> str:
-        from d2rpick.report.pages import of_run
+        from d2rpick.report.pages import describe_run
 
-        return f"Run({of_run(self.files)})"
+        return f"Run({describe_run(self.files)})"
 
     def _repr_html_(self) -> str | None:
-        from d2rpick.report.pages import glance
+        from d2rpick.report.pages import show_at_a_glance
 
         overview = give_if_written(self.overview)
         history = give_if_written(lambda: self.files.history(self.chosen))
         if overview is None or history is None:
-            return glance("overview", overview, None) if overview else None
+            return show_at_a_glance("overview", overview, None) if overview else None
         from d2rpick.report.figures_choice import draw_run
 
         flights = [(flight.start, flight.end) for _, flight in overview.flights]
-        return glance("overview", overview, draw_run(history, flights))
+        return show_at_a_glance("overview", overview, draw_run(history, flights))
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -79,30 +79,32 @@ class Run:
     def channels(self) -> tuple[str, ...]:
         """Names of the histories of the whole model."""
         return tuple(
-            dict.fromkeys(name for one in self.files.databases for name in one.channels)
+            dict.fromkeys(
+                name for database in self.files.databases for name in database.channels
+            )
         )
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that have histories of their own: ``id`` and ``title``."""
+        """Parts with their own histories: ``id`` and ``title``."""
         return self.files.parts
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out or assumed in reading."""
+        """What was left out or assumed while reading."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
-        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
+        """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
 
         The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
         folder that was read; False for none.
         """
-        from d2rpick.choice.overview import survey
+        from d2rpick.choice.overview import describe_run
 
-        named = arguments.one_path("deck", deck) if deck else None
-        return survey(
-            self.files, self.chosen, self._deck_in_folder if deck is None else named
+        deck_name = arguments.check_path("deck", deck) if deck else None
+        return describe_run(
+            self.files, self.chosen, self._deck_in_folder if deck is None else deck_name
         )
 
     @property
@@ -116,7 +118,7 @@ class Run:
         return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
-        """Give energies over time as a table, at full precision.
+        """Return energies over time as a table, at full precision.
 
         Parameters
         ----------
@@ -146,8 +148,10 @@ class Run:
         """
         import pandas as pd
 
-        every = isinstance(parts, str) and parts == "all"
-        names = ("0-4294967295",) if every else arguments.part_names("parts", parts)
+        is_all = isinstance(parts, str) and parts == "all"
+        names = (
+            ("0-4294967295",) if is_all else arguments.list_part_names("parts", parts)
+        )
         history = self.files.history(
             self.chosen._replace(energy=(), parts=names) if names else self.chosen
         )
@@ -158,7 +162,7 @@ class Run:
             columns = {
                 part.name: energies[:, at] for at, part in enumerate(history.parts)
             }
-            # parts and the energy of their sum stand at the same times
+            # the parts and the energy of their sum have the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
             "source": list(history.source),
@@ -214,18 +218,21 @@ def read(
             f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)"
         )
     if hasattr(source, "read"):
-        return _opened(
-            [_in_memory(source)], selection_of(time, energy, channels), input_format
+        return _open_sources(
+            [_read_into_memory(source)],
+            make_selection(time, energy, channels),
+            input_format,
         )
-    names = arguments.paths("source", source)
+    names = arguments.list_paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen, kind = selection_of(time, energy, channels), known_format(input_format)
-    return Run(open_run(names, chosen, kind), chosen, kind, folder_of(names))
+    chosen = make_selection(time, energy, channels)
+    kind = check_format(input_format)
+    return Run(open_run(names, chosen, kind), chosen, kind, find_folder(names))
 
 
-def folder_of(names: Sequence[str]) -> str | None:
-    """Give the folder that names a run; None if files name it."""
+def find_folder(names: Sequence[str]) -> str | None:
+    """Return the folder that names a run; None if files name it."""
     import os
 
     return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
@@ -241,7 +248,8 @@ def from_frame(
 ) -> Run:
     """Take the energies of a run from a table of pandas, polars, pyarrow, xarray or numpy.
 
-    It is checked as the csv file is that ``frame.to_csv()`` writes: its times must rise, its values be finite numbers.
+    The table is checked like the CSV file that ``frame.to_csv()`` writes: times must rise, values must be finite
+    numbers.
 
     Parameters
     ----------
@@ -272,29 +280,30 @@ def from_frame(
     >>> from_frame(table).to_frame()["internal_energy"].tolist()
     [0.0, 4.0, 1.0]
     """
-    from d2rpick.api.tables import frame_of_table, is_plain_array
+    from d2rpick.api.tables import convert_to_frame, is_plain_array
     from d2rpick.histories.source import Source
 
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}, a text was expected")
-    table, chosen = frame_of_table(frame), selection_of(time, energy, channels)
+    table = convert_to_frame(frame)
+    chosen = make_selection(time, energy, channels)
     is_named = not is_plain_array(frame)
     if is_named:
-        table = _timed(table, chosen.time)
-    text = table.apply(_seconds).to_csv(index=False, header=is_named)
-    return _opened([Source(name or "frame", text.encode())], chosen, "csv")
+        table = _set_time_column(table, chosen.time)
+    text = table.apply(_convert_to_seconds).to_csv(index=False, header=is_named)
+    return _open_sources([Source(name or "frame", text.encode())], chosen, "csv")
 
 
-def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Make the index a column where it is the time; ValueError where nothing is."""
+def _set_time_column(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
+    """Make the index a column if it is the time; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
-    known = list(map(str, frame.columns))
+    column_names = list(map(str, frame.columns))
     if (
-        time in known
+        time in column_names
         or (time is not None and time.isdecimal())
-        or any(map(is_time, known))
+        or any(map(is_time, column_names))
     ):
         return frame
     if (
@@ -303,19 +312,19 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
         or is_time(str(index.name))
     ):
         return frame.reset_index(names=time or "time")
-    named = "no name" if index.name is None else f"the name {index.name!r}"
+    index_name = "no name" if index.name is None else f"the name {index.name!r}"
     raise ValueError(
-        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {named}, its columns are "
-        f"{', '.join(map(repr, known))}; name it by frame.rename_axis('time'), or a column of these as `time`"
+        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {index_name}, its columns are "
+        f"{', '.join(map(repr, column_names))}; name it by frame.rename_axis('time'), or a column of these as `time`"
     )
 
 
-def _seconds(column: pd.Series[Any]) -> pd.Series[Any]:
-    """Give timedeltas in seconds, other values as they are."""
+def _convert_to_seconds(column: pd.Series[Any]) -> pd.Series[Any]:
+    """Convert timedeltas to seconds, and return other values unchanged."""
     return column.dt.total_seconds() if column.dtype.kind == "m" else column
 
 
-def _in_memory(file: Any) -> Source:
+def _read_into_memory(file: Any) -> Source:
     from d2rpick.histories.source import Source
 
     data = file.read()
@@ -326,15 +335,17 @@ def _in_memory(file: Any) -> Source:
     return Source(str(getattr(file, "name", "file")), data)
 
 
-def _opened(sources: list[Source], chosen: Selection, input_format: str | None) -> Run:
+def _open_sources(
+    sources: list[Source], chosen: Selection, input_format: str | None
+) -> Run:
     from d2rpick.histories.opening import open_sources
 
-    kind = known_format(input_format)
+    kind = check_format(input_format)
     return Run(open_sources(sources, chosen, kind), chosen, kind)
 
 
-def known_format(input_format: str | None) -> str:
-    """Give the name of a format, or ``"auto"``; ValueError for any other."""
+def check_format(input_format: str | None) -> str:
+    """Return the name of a format, or ``"auto"``; raise ValueError for any other name."""
     from d2rpick.histories.formats import READERS
 
     if input_format is None:
@@ -348,12 +359,12 @@ def known_format(input_format: str | None) -> str:
     return input_format
 
 
-def selection_of(
+def make_selection(
     time: str | int | None,
     energy: str | int | Iterable[str | int] | None,
     channels: Mapping[str, str | int] | None = None,
 ) -> Selection:
-    """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
+    """Return the selected columns; raise TypeError for other types, ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
     single = (
@@ -367,11 +378,11 @@ def selection_of(
         raise TypeError(
             f"channels is {channels!r}, a mapping of quantities to columns was expected"
         )
-    named = dict(channels or {})
+    channel_names = dict(channels or {})
     for name, value in [
         ("time", time),
-        *(("energy", one) for one in listed),
-        *named.items(),
+        *(("energy", energy_name) for energy_name in listed),
+        *channel_names.items(),
     ]:
         if (
             value is not None
@@ -381,26 +392,26 @@ def selection_of(
             raise TypeError(
                 f"{name} is {value!r}, the name or number of a column was expected"
             )
-    if unknown := [name for name in named if name not in QUANTITIES]:
+    if unknown := [name for name in channel_names if name not in QUANTITIES]:
         raise ValueError(
             f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected"
         )
     return Selection(
         time=None if time is None else str(time),
-        energy=tuple(str(one) for one in listed),
-        channels=tuple((name, str(channel)) for name, channel in named.items()),
+        energy=tuple(str(energy_name) for energy_name in listed),
+        channels=tuple((name, str(channel)) for name, channel in channel_names.items()),
     )
 
 
-def extracted(
-    run: histories.Run, selection: Selection
+def extract_columns(
+    run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Give the columns of what is selected of a run, with all that is known at its times, and the notes on it.
+    """Return the selected columns of a run with all that is known at its times, and the notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
-    the momentum by which the flight is seen, each of shape (n,).
+    the momentum that shows the flight, each of shape (n,).
     """
-    from d2rpick.choice.flights import momentum_of_flight
+    from d2rpick.choice.flights import list_momentum_columns
     from d2rpick.choice.question import Reference
 
     history = Reference.of(run, selection).history
@@ -411,15 +422,15 @@ def extracted(
             f"part_{part.id}": column
             for part, column in zip(history.parts, energies.T, strict=True)
         }
-    return table | run.quantities(history.time) | _of_model(
+    return table | run.quantities(history.time) | _list_model_columns(
         history
-    ) | momentum_of_flight(history), history.notes
+    ) | list_momentum_columns(history), history.notes
 
 
-def _of_model(history: History) -> dict[str, Samples]:
-    """Columns of the whole model as its balance takes them, where they are written at the times of the energy.
+def _list_model_columns(history: History) -> dict[str, Samples]:
+    """Return the columns of the whole model's energy balance that are written at the times of the energy.
 
-    The kinetic energy is that with rotation; the internal one is there where the chosen one is that of some parts.
+    The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The choice of switch times, and the verdict on a pair."""
+"""Choose switch times, and judge a pair of them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import Asked, ask, request_of
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
-from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, time_or_window
+from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.asked import RunQuestion, ask_run, make_request
+from d2rpick.api.cards import (
+    CardOptions,
+    Cards,
+    JudgedCard,
+    print_judged_card as card_judged,
+)
+from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers
 from d2rpick.histories.digits import round_as_read
@@ -27,11 +32,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestion(RunAnswer, answers.Suggestion):
-    """Answer of `suggest`; nothing of it changes.
+class Suggestion(RunAnswer, answers.PairSuggestion):
+    """Answer of `suggest`; it is immutable.
 
-    ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
-    are None, with the reason in ``warnings``; a better pair also where it is the recommended one; ``quality`` of the
+    ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
+    are None, with the reason in ``warnings``; the better pair may be the recommended pair.  ``quality`` of the
     recommended pair has ``grade`` good, fair or poor and ``reasons``.
     """
 
@@ -39,7 +44,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
     name = "suggest"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the candidates as a table at full precision.
+        """Return the candidates as a table at full precision.
 
         Returns
         -------
@@ -56,25 +61,29 @@ class Suggestion(RunAnswer, answers.Suggestion):
         """
         from d2rpick.report.suggestion import CANDIDATE
 
-        source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
-        return frame_of(
+        source = list(self.situation.history.source)
+        rows = self.to_dict()["candidates"]
+        return build_frame(
             rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
         return self.printed(Cards.of(options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
-        pair, asked = self.recommended, self.question
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
+        pair = self.recommended
+        question = self.question
         judge = partial(
-            answers.verify_of,
-            asked.reference,
+            answers.verify_run,
+            question.reference,
             settings=self.situation.settings,
-            known=self.situation,
+            earlier=self.situation,
         )
-        return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
+        return (
+            card_judged(question, cards, [(pair.tr, pair.td)], judge) if pair else None
+        )
 
     def page(
         self,
@@ -82,12 +91,12 @@ class Suggestion(RunAnswer, answers.Suggestion):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the recommended pair."""
-        from d2rpick.choice.trade_off import explored_around
+        """Return the page, with the card of the recommended pair."""
+        from d2rpick.choice.trade_off import explore_around
         from d2rpick.report.pages import suggestion_page
 
         chosen = (self.situation, self.recommended.tr) if self.recommended else None
-        explored = explored_around(
+        explored = explore_around(
             self.question.reference, self.situation, self.td_window
         )
         return suggestion_page(
@@ -96,11 +105,12 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verdict(RunAnswer, answers.Verdict):
-    """Answer of `verify`; nothing of it changes.
+class Verdict(RunAnswer, answers.PairVerdict):
+    """Answer of `verify`; it is immutable.
 
-    ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where
-    the record does not tell; ``candidate`` has the measures of the pair; ``quality`` is None where it does not verify.
+    ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
+    None if the record does not show it.  ``candidate`` has the measures of the pair; ``quality`` is None if the pair is
+    not verified.
     """
 
     compared: Run | None = None
@@ -113,7 +123,7 @@ class Verdict(RunAnswer, answers.Verdict):
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
+        """Return the measures of the pair as a table of one row with the columns of the CSV; unknown values are NaN.
 
         Examples
         --------
@@ -122,12 +132,12 @@ class Verdict(RunAnswer, answers.Verdict):
         >>> verdict.to_frame()["verified"].tolist()
         [True]
         """
-        from d2rpick.report.verdict import measures
+        from d2rpick.report.verdict import list_all_measures
 
-        found = measures(self)
-        return frame_of(
-            [found],
-            list(found),
+        values = list_all_measures(self)
+        return build_frame(
+            [values],
+            list(values),
             basis=self.basis,
             source=list(self.situation.history.source),
         )
@@ -138,12 +148,12 @@ class Verdict(RunAnswer, answers.Verdict):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the pair where it is good."""
-        from d2rpick.choice.trade_off import explored_around
+        """Return the page, with the card of the pair if it is good."""
+        from d2rpick.choice.trade_off import explore_around
         from d2rpick.report.pages import verdict_page
 
         chosen = (self.situation, self.tr) if self.verified else None
-        explored = explored_around(self.question.reference, self.situation)
+        explored = explore_around(self.question.reference, self.situation)
         context = self._context(command, judging, cards, chosen, explored)
         return verdict_page(
             self,
@@ -207,31 +217,31 @@ def suggest(
     >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
     '0.013587 0.068753'
     """
-    wanted = time_or_window(
-        arguments.optional("td", td), arguments.window("td_window", td_window)
+    wanted = choose_time_or_window(
+        arguments.check_optional_number("td", td),
+        arguments.check_time_window("td_window", td_window),
     )
-    return suggested(
-        ask(run, request_of(run, parts, flying, deck, weights, choosing)), wanted
+    return suggest_for_question(
+        ask_run(run, make_request(run, parts, flying, deck, weights, choosing)), wanted
     )
 
 
-def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
+def suggest_for_question(
+    question: RunQuestion, td: float | tuple[float, float] | None
+) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
-    found = answers.suggest_of(asked.reference, td, asked.settings)
+    result = answers.suggest_in_run(question.reference, td, question.settings)
     if (
-        found.better_pair
-        and found.recommended
-        and _read(found.better_pair) == _read(found.recommended)
+        result.better_pair
+        and result.recommended
+        and _read(result.better_pair) == _read(result.recommended)
     ):
-        found = replace(found, better_pair=None)
-    times = (
-        ("--td-window", *map(repr, td))
-        if isinstance(td, tuple)
-        else ()
-        if td is None
-        else ("--td", repr(td))
-    )
-    return Suggestion.about(asked, found, *times)
+        result = replace(result, better_pair=None)
+    if isinstance(td, tuple):
+        times = ("--td-window", *map(repr, td))
+    else:
+        times = () if td is None else ("--td", repr(td))
+    return Suggestion.about(question, result, *times)
 
 
 def _read(pair: Pair) -> tuple[float, float]:
@@ -284,51 +294,59 @@ def verify(
     >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
     True
     """
-    pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    least = arguments.number(
+    pair = (
+        arguments.check_optional_number("tr", tr),
+        arguments.check_optional_number("td", td),
+    )
+    min_ratio = arguments.check_number(
         "min_mean_energy",
         MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,
         FRACTION,
     )
     if switched is not None:
         arguments.check_run("switched", switched)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return judged(asked, *pair, switched, least)
+    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    return judge_pair(question, *pair, switched, min_ratio)
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse to judge no pair: without a switched run both times are needed."""
+    """Refuse an incomplete pair: without a switched run both times are needed."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
         )
 
 
-def judged(
-    asked: Asked,
+def judge_pair(
+    question: RunQuestion,
     tr: float | None,
     td: float | None,
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, of which its times are read where they are not given."""
+    """Judge a pair, also by a finished switched run, from which times that are not given are read."""
     check_pair(tr, td, switched)
-    other = switched and asked.reference.like(switched.files, asked.selection)
-    if other and (tr is None or td is None):
-        from d2rpick.choice.comparison import times_of
+    switched_reference = switched and question.reference.like(
+        switched.files, question.selection
+    )
+    if switched_reference and (tr is None or td is None):
+        from d2rpick.choice.comparison import find_switch_times
 
-        read = times_of(other.history, asked.reference.history)
-        tr, td = read[0] if tr is None else tr, read[1] if td is None else td
+        switch_times = find_switch_times(
+            switched_reference.history, question.reference.history
+        )
+        tr = switch_times[0] if tr is None else tr
+        td = switch_times[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found, times = (
-        answers.verify_of(asked.reference, tr, td, asked.settings),
-        ["--tr", repr(tr), "--td", repr(td)],
-    )
-    if switched is not None and other:
-        found = answers.compare_with(found, asked.reference, other, min_mean_energy)
+    result = answers.verify_run(question.reference, tr, td, question.settings)
+    times = ["--tr", repr(tr), "--td", repr(td)]
+    if switched is not None and switched_reference:
+        result = answers.compare_with(
+            result, question.reference, switched_reference, min_mean_energy
+        )
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (
             min_mean_energy != MIN_MEAN_ENERGY
         )
-    return Verdict.about(asked, found, *times, compared=switched)
+    return Verdict.about(question, result, *times, compared=switched)

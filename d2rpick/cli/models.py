@@ -1,4 +1,4 @@
-"""The commands ``replay``, ``rollover`` and ``reproduce``: runs that are computed here."""
+"""Define the commands ``replay``, ``rollover`` and ``reproduce``, which compute sample runs."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, unbalanced
-from d2rpick.api.request import options_of
+from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, warn_if_unbalanced
+from d2rpick.api.request import list_options
 from d2rpick.base.errors import ArgumentError, D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
-from d2rpick.cli.progress import counting
+from d2rpick.cli.progress import show_counting
 from d2rpick.report.formats import FORMATS, PLAIN, write
 
 if TYPE_CHECKING:
@@ -22,13 +22,24 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
+# Columns of a solver's table beside time_s, by what it is.
+SOLVER = {
+    "pairs": ("reference_m", "published_m", "better_m"),
+    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
+}
+SECTIONS = ("1", "2", "3", "4", "5")
+_ABSENT = (
+    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
+    "repository and call d2rpick from there: pip install -e ."
+)
 
-@options.command
-@options.takes(
-    *options_of(Motion), of=[Motion],
+
+@options.make_command
+@options.add_options(
+    *list_options(Motion), of=[Motion],
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
 )  # fmt: skip
-@options.takes(
+@options.add_options(
     "plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf)."
 )
 def replay(motion: Motion, output: Output) -> None:
@@ -45,25 +56,27 @@ def replay(motion: Motion, output: Output) -> None:
         --t-end 0.15 --dt 1e-4 -o switched.csv
     d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --y0 0.02 --vy0 -1.5 --t-end 0.01 --dt 0.001
     """
-    from d2rpick.report.history_files import OSCILLATOR_WRITERS, format_of
+    from d2rpick.report.history_files import OSCILLATOR_WRITERS, choose_history_format
 
-    form = motion.write_as or format_of(output.output_file, HISTORIES)
+    form = motion.write_as or choose_history_format(output.output_file, HISTORIES)
     output = output.beside()
-    found, switched = motion.computed()
+    trajectory, switched = motion.computed()
     if output.plot:
         from d2rpick.report import figures, figures_models
 
         output.write(
             output.plot,
-            figures.render(figures_models.draw_replay(found, switched), output.plot),
+            figures.render(
+                figures_models.draw_replay(trajectory, switched), output.plot
+            ),
         )
     if output.output_file or not output.plot:
-        output.content(OSCILLATOR_WRITERS[form](found, motion.oscillator))
+        output.content(OSCILLATOR_WRITERS[form](trajectory, motion.oscillator))
 
 
-@options.command
-@options.takes(*options_of(Box), of=[Box])
-@options.takes(
+@options.make_command
+@options.add_options(*list_options(Box), of=[Box])
+@options.add_options(
     *("output_format", "plot", *FILES, "exit_zero"),
     output_format={
         "type": click.Choice(list(FORMATS["rollover"])),
@@ -92,14 +105,15 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """One run; for a plot also the one without switching."""
-    from d2rpick.report.history_files import BOX_WRITERS, format_of
+    """Compute one run; for a plot also the reference run."""
+    from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
-    form = box.write_as or format_of(output.output_file, HISTORIES)
+    form = box.write_as or choose_history_format(output.output_file, HISTORIES)
     output = output.beside()
-    windows, plot = box.windows, output.plot
+    windows = box.windows
+    plot = output.plot
     record = box.simulated(*windows)
-    output.notes((), unbalanced(record))
+    output.notes((), warn_if_unbalanced(record))
     if plot:
         from d2rpick.report import figures, figures_models
 
@@ -113,36 +127,25 @@ def _run(box: Box, output: Output) -> None:
 
 
 def _scan(box: Box, output: Output) -> None:
-    """Many switched runs, the tr that the tool recommends among them."""
+    """Compute many switched runs, among them that with the recommended tr."""
     output = output.beside()
-    scanning, plot = Scanning(box), output.plot
+    scanning = Scanning(box)
+    plot = output.plot
     output.notes((), scanning.cautions)
-    with counting(len(scanning.times), quiet=output.quiet) as count:
-        found = scanning.run(count.tell)
+    with show_counting(len(scanning.times), quiet=output.quiet) as count:
+        scan = scanning.run(count.tell)
     if plot:
         from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures_models.draw_scan(*found[:3]), plot))
+        output.write(plot, figures.render(figures_models.draw_scan(*scan[:3]), plot))
     output.result(
-        write("rollover", output.output_format or "table", found, output.shown())
+        write("rollover", output.output_format or "table", scan, output.shown())
     )
-    output.finish(objection=found.answer.recommended is None)
+    output.finish(objection=scan.answer.recommended is None)
 
 
-# Columns of a solver's table beside time_s, by what it is.
-SOLVER = {
-    "pairs": ("reference_m", "published_m", "better_m"),
-    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
-}
-SECTIONS = ("1", "2", "3", "4", "5")
-_ABSENT = (
-    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
-    "repository and call d2rpick from there: pip install -e ."
-)
-
-
-@options.command
-@options.file(
+@options.make_command
+@options.make_file_option(
     "--output-dir",
     "Folder for figures and tables; created if missing.",
     "DIR",
@@ -154,13 +157,13 @@ _ABSENT = (
     help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
     "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
 )  # fmt: skip
-@options.file(
+@options.make_file_option(
     "--solver",
     "A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
     f"{', or '.join(', '.join(columns) for columns in SOLVER.values())}; repeatable.",
     many=True,
 )
-@options.takes(
+@options.add_options(
     "report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN
 )
 def reproduce(

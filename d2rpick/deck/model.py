@@ -125,8 +125,9 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
     """Replace node ids by places in the table; nodes that are not in the table are dropped."""
+    # The nodes of a joint are never None, which mypy reports for that kind alone.
     return tuple(
-        load if load.nodes is None else load._replace(nodes=table.known(load.nodes))
+        load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
         for load in acting
     )
 

@@ -470,7 +470,7 @@ def freeze(values: ArrayLike) -> Samples:
         and values.dtype == np.float64
         and not values.flags.writeable
     ):
-        whole = values if values.base is None else values.base
+        whole: object = values if values.base is None else values.base
         if (
             isinstance(whole, np.ndarray)
             and whole.size == values.size

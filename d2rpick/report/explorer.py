@@ -1,7 +1,7 @@
-"""The interactive part of a page: td can be dragged, typed and moved by keys, and all that depends on it follows.
+"""Build the interactive part of a page: the user drags, types or steps td, and everything that depends on td follows.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.  What every page has stands in
-``explorer.html``.
+Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
+that every page has.
 """
 
 from __future__ import annotations
@@ -13,13 +13,25 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.choice.decision import span_of
+from d2rpick.choice.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
-from d2rpick.report.decision import saved
-from d2rpick.report.page import Explorer, Markup, join, resource, tag
-from d2rpick.report.suggestion import acceptable
-from d2rpick.report.tables import filled, measure, shell_line, short, shown
-from d2rpick.report.view import View, locked_in, response, scale_in, view_of
+from d2rpick.report.decision import format_saved_share
+from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
+from d2rpick.report.suggestion import describe_acceptable_windows
+from d2rpick.report.tables import (
+    fill_table,
+    format_if_known,
+    format_measure,
+    format_short,
+    quote_shell_line,
+)
+from d2rpick.report.view import (
+    View,
+    compute_locked_in_deformation,
+    compute_response,
+    make_scale_of_flight,
+    make_view_of_situation,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -31,145 +43,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.
+# Number of intervals for which the lowest and highest energy is drawn: in the view, and in the overview of the run.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Between the section, the chart of the motion and what is said of a pair.
+# Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
 _NEXT: Final = "<!-- next -->"
 
-
-def styles() -> tuple[Markup, ...]:
-    """Give the style sheets that the interactive part needs."""
-    return resource("uplot/uPlot.min.css"), resource("explorer.css")
-
-
-def scripts() -> tuple[Markup, ...]:
-    """Give the scripts, in their order; that of uPlot with its licence."""
-    licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
-    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
-        "explorer.js"
-    )
-
-
-def explorer(explored: Explorer | None) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data; nothing without any.
-
-    Charts and values stand in two columns; on a narrow page the style puts them below each other in another order.
-    """
-    if explored is None:
-        return Markup()
-    flights = [_flight(one) for one in explored.trade_offs]
-    known = {
-        name for flight in flights for name in flight["texts"]
-    }  # what no pair has is left out
-    listed = (
-        tag("div", tag("dt", name), tag("dd", data_value=key))
-        for key, name in _VALUES.items()
-        if key in known
-    )
-    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
-    values = Template(values).substitute(listed=join(listed))
-    below = (
-        (motion, values)
-        if any(flight["motion"] for flight in flights)
-        else (values, "")
-    )
-    options = (
-        tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
-    )
-    unit = explored.trade_offs[0].situation.history.time_unit
-    section = Template(section).substitute(
-        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight"))
-        if len(flights) > 1
-        else "",
-        unit=join([f" [{unit}]"] if unit else []),
-        windows=tag("li", tag("i", class_="windows"), "acceptable tr")
-        if "windows" in known
-        else "",
-        below_energy=below[0],
-        below_trade=below[1],
-    )
-    before, behind = (shell_line(words) for words in explored.command)
-    found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
-    return join([Markup(section), _data("explorer-data", found)])
-
-
-def _closed_up(text: str) -> str:
-    """Leave out the blanks and line ends between elements, and make one blank of those within a text."""
-    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
-
-
-def _data(name: str, content: Any) -> Markup:
-    """Give data for a script: JSON in which nothing can be taken for markup."""
-    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return tag("script", Markup(text), type="application/json", id=name)
-
-
-def _flight(found: TradeOff) -> dict[str, Any]:
-    """What is drawn and said of one flight."""
-    situation = found.situation
-    history, flight = situation.history, situation.flight
-    first = found.asked or found.recommended or found.start or found.offers[-1]
-    seen = view_of(situation, found.offers[-1].td)
-    levels = [one.energy_td for one in found.offers]
-    scale = scale_in(situation, seen, levels)
-    whole = draw_outline(history.time, history.energy, _OVERVIEW)
-    inner = history.between(seen.start, seen.end)
-    time, energy = draw_outline(*inner, stretches=_STRETCHES)
-    unit = history.time_unit
-    above = [
-        f"the {what}, up to {energy:.4g}"
-        for what, energy in seen.above
-        if energy > scale.high
-    ]
-    cut = f"; cut at the top: {' and '.join(above)}" if above else ""
-    return {
-        "caption": f"Internal energy in the flight{cut}",
-        "time": f"time [{unit}]" if unit else "time (unit of the run)",
-        "error": _error_name(found.offers),
-        "saved": _saved_name(found.offers),
-        "view": [seen.start, seen.end],
-        "flight": [
-            seen.start if flight.start is None else flight.start,
-            seen.end if flight.end is None else flight.end,
-        ],
-        "heights": [scale.low, scale.high],
-        "log": scale.logarithmic,
-        "energy": [
-            _brief(time),
-            _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy),
-        ],
-        "whole": [_brief(column) for column in whole],
-        "motion": _motion(situation),
-        "start": found.offers.index(first),
-        **_table(found, first, seen),
-    }
-
-
-def _motion(situation: Situation) -> dict[str, Any] | None:
-    """Give the curves of which the script composes the deformation; None where no oscillator is known."""
-    found = response(situation)
-    if found is None:
-        return None
-    columns = {
-        "time": found.time,
-        "reference": found.reference,
-        "release": found.release,
-    }
-    return {
-        **{name: _brief(column) for name, column in columns.items()},
-        "preload": found.preload,
-    }
-
-
-def _brief(values: Samples) -> list[float]:
-    """Numbers for a curve, to six digits."""
-    return [float(f"{value:.6g}") for value in values.tolist()]
-
-
-# What is listed of a pair, by key, in this order.
+# Labels of the values shown for a pair, by key and in display order.
 _VALUES: Final[Mapping[str, str]] = {
     "verdict": "verdict",
     "why": "why",
@@ -186,60 +66,215 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "acceptable tr",
     "reason": "no tr",
 }
-# Columns in which windows of acceptable tr are drawn, a multiple of eight.
+# Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
 _COLUMNS: Final = 480
-# Digits of a difference that people read.
+# significant digits of a difference
 _READ: Final = 3
 
 
-def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
-    """Give a row for each td, the names of its values once: ``numbers`` for curves, ``texts`` that stand beside them.
+def read_styles() -> tuple[Markup, ...]:
+    """Return the style sheets of the interactive part."""
+    return read_resource("uplot/uPlot.min.css"), read_resource("explorer.css")
 
-    ``first`` is the td that is shown first, with which others are compared.
+
+def read_scripts() -> tuple[Markup, ...]:
+    """Return the scripts in loading order; that of uPlot includes its licence."""
+    licence = join([Markup("/*!\n"), read_resource("uplot/LICENSE"), Markup("*/\n")])
+    return Markup(licence + read_resource("uplot/uPlot.iife.min.js")), read_resource(
+        "explorer.js"
+    )
+
+
+def build_explorer(explored: Explorer | None) -> Markup:
+    """Return the interactive section and its data, or nothing if there is nothing to explore.
+
+    The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
+    narrow page the style sheet puts them below each other in another order.
     """
-    situation, unit = found.situation, found.situation.history.time_unit
-    columns: dict[str, Callable[[Offer], Any]] = {
-        "td": lambda one: one.td,
-        "tr": lambda one: _short(one.tr),
-        "level": lambda one: _short(one.energy_td),
-        "locked": lambda one: _short(one.best.energy if one.best else None),
-        "deformation": lambda one: _short(
-            locked_in(situation, one.tr) if one.basis == "oscillator" else None
-        ),
-        "saved": lambda one: _short(_saved(one)),
-        "error": lambda one: _short(one.error),
-        "windows": lambda one: _marked_columns(one.answer.windows or (), seen),
-        "peak": lambda one: int(one.peak),
-        "unbeaten": lambda one: int(one.unbeaten),
+    if explored is None:
+        return Markup()
+    flights = [_describe_flight(trade_off) for trade_off in explored.trade_offs]
+    known_values = {
+        name for flight in flights for name in flight["texts"]
+    }  # values that no pair has are left out
+    listed = (
+        make_element(
+            "div", make_element("dt", name), make_element("dd", data_value=key)
+        )
+        for key, name in _VALUES.items()
+        if key in known_values
+    )
+    section, motion, values = _strip_whitespace(read_resource("explorer.html")).split(
+        _NEXT
+    )
+    values = Template(values).substitute(listed=join(listed))
+    if any(flight["motion"] for flight in flights):
+        below = (motion, values)
+    else:
+        below = (values, "")
+    options = (
+        make_element("option", f"flight {i + 1}", value=str(i))
+        for i in range(len(flights))
+    )
+    unit = explored.trade_offs[0].situation.history.time_unit
+    section = Template(section).substitute(
+        chooser=make_element(
+            "label", "flight", make_element("select", *options, id="explorer-flight")
+        )
+        if len(flights) > 1
+        else "",
+        unit=join([f" [{unit}]"] if unit else []),
+        windows=make_element("li", make_element("i", class_="windows"), "acceptable tr")
+        if "windows" in known_values
+        else "",
+        below_energy=below[0],
+        below_trade=below[1],
+    )
+    command_start, command_end = (quote_shell_line(words) for words in explored.command)
+    data = {
+        "flight": 0,
+        "flights": flights,
+        "command": [f"{command_start} ", f" {command_end}"],
     }
-    names, numbers = filled(columns, found.offers)
-    texts = [_texts(one, first, f" {unit}" if unit else "") for one in found.offers]
-    said = list(
+    return join([Markup(section), _build_data_element("explorer-data", data)])
+
+
+def _strip_whitespace(text: str) -> str:
+    """Remove whitespace between elements, and reduce whitespace within a text to one blank."""
+    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
+
+
+def _build_data_element(name: str, content: Any) -> Markup:
+    """Return a data element for a script: JSON in which nothing can be mistaken for markup."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return make_element("script", Markup(text), type="application/json", id=name)
+
+
+def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
+    """Return the curves, marks and texts of one flight."""
+    situation = trade_off.situation
+    history = situation.history
+    flight = situation.flight
+    first = (
+        trade_off.asked
+        or trade_off.recommended
+        or trade_off.start
+        or trade_off.offers[-1]
+    )
+    view = make_view_of_situation(situation, trade_off.offers[-1].td)
+    levels = [offer.energy_td for offer in trade_off.offers]
+    scale = make_scale_of_flight(situation, view, levels)
+    whole = draw_outline(history.time, history.energy, _OVERVIEW)
+    inner = history.between(view.start, view.end)
+    time, energy = draw_outline(*inner, stretches=_STRETCHES)
+    unit = history.time_unit
+    above = [
+        f"the {peak_name}, up to {energy:.4g}"
+        for peak_name, energy in view.above
+        if energy > scale.high
+    ]
+    cut = f"; cut at the top: {' and '.join(above)}" if above else ""
+    return {
+        "caption": f"Internal energy in the flight{cut}",
+        "time": f"time [{unit}]" if unit else "time (unit of the run)",
+        "error": _name_error(trade_off.offers),
+        "saved": _name_saving(trade_off.offers),
+        "view": [view.start, view.end],
+        "flight": [
+            view.start if flight.start is None else flight.start,
+            view.end if flight.end is None else flight.end,
+        ],
+        "heights": [scale.low, scale.high],
+        "log": scale.logarithmic,
+        "energy": [
+            _round_curve(time),
+            _round_curve(
+                np.maximum(energy, scale.low) if scale.logarithmic else energy
+            ),
+        ],
+        "whole": [_round_curve(column) for column in whole],
+        "motion": _list_motion_curves(situation),
+        "start": trade_off.offers.index(first),
+        **_build_offer_table(trade_off, first, view),
+    }
+
+
+def _list_motion_curves(situation: Situation) -> dict[str, Any] | None:
+    """Return the curves from which the script composes the deformation, None if no oscillator is known."""
+    motion = compute_response(situation)
+    if motion is None:
+        return None
+    columns = {
+        "time": motion.time,
+        "reference": motion.reference,
+        "release": motion.release,
+    }
+    return {
+        **{name: _round_curve(column) for name, column in columns.items()},
+        "preload": motion.preload,
+    }
+
+
+def _round_curve(values: Samples) -> list[float]:
+    """Round the values of a curve to six digits."""
+    return [float(f"{value:.6g}") for value in values.tolist()]
+
+
+def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
+    """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
+
+    ``first`` is the offer whose td is shown first; the others are compared with it.
+    """
+    situation, unit = trade_off.situation, trade_off.situation.history.time_unit
+    columns: dict[str, Callable[[Offer], Any]] = {
+        "td": lambda offer: offer.td,
+        "tr": lambda offer: _round_number(offer.tr),
+        "level": lambda offer: _round_number(offer.energy_td),
+        "locked": lambda offer: _round_number(
+            offer.best.energy if offer.best else None
+        ),
+        "deformation": lambda offer: _round_number(
+            compute_locked_in_deformation(situation, offer.tr)
+            if offer.basis == "oscillator"
+            else None
+        ),
+        "saved": lambda offer: _round_number(_compute_saved_percentage(offer)),
+        "error": lambda offer: _round_number(offer.error),
+        "windows": lambda offer: _mark_columns(offer.answer.windows or (), view),
+        "peak": lambda offer: int(offer.peak),
+        "unbeaten": lambda offer: int(offer.unbeaten),
+    }
+    names, numbers = fill_table(columns, trade_off.offers)
+    texts = [
+        _list_texts(offer, first, f" {unit}" if unit else "")
+        for offer in trade_off.offers
+    ]
+    text_names = list(
         dict.fromkeys(name for row in texts for name, text in row.items() if text)
     )
     rows = [
-        [values, [row.get(name) or "" for name in said]]
+        [values, [row.get(name) or "" for name in text_names]]
         for values, row in zip(numbers, texts, strict=True)
     ]
-    return {"numbers": names, "texts": said, "rows": rows}
+    return {"numbers": names, "texts": text_names, "rows": rows}
 
 
-def _saved(offer: Offer) -> float | None:
-    """What a pair saves [%]: of the run time, or of the record where no cost is known."""
-    share = (
-        offer.best.rigid_fraction
-        if offer.best and offer.saving is None
-        else offer.saving
-    )
+def _compute_saved_percentage(offer: Offer) -> float | None:
+    """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
+    share = offer.saving
+    if offer.best and share is None:
+        share = offer.best.rigid_fraction
     return None if share is None else 100 * share
 
 
-def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch, a bit each, in hexadecimal digits; empty without a window.
+def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
+    """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without a window.
 
-    However many windows noise makes, this is short, and finer than a screen shows.
+    The mask stays short however many windows noise makes, and it is finer than the screen.
     """
-    ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
+    ends = np.array([(window.start, window.end) for window in windows]).reshape(-1, 2)
     first, last = (
         np.clip(
             (ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1
@@ -253,93 +288,99 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
     return np.packbits(marked).tobytes().hex() if marked.any() else ""
 
 
-def _short(value: float | None) -> float | None:
-    """Shorten a number that is drawn, not read."""
+def _round_number(value: float | None) -> float | None:
+    """Round a number that is only drawn."""
     return None if value is None else float(f"{value:.6g}")
 
 
-def _error_name(offers: Sequence[Offer]) -> str:
-    """Name what offers are compared by."""
-    return (
-        "shortfall of the level at td"
-        if all(one.basis == "energy" for one in offers)
-        else "residual"
-    )
+def _name_error(offers: Sequence[Offer]) -> str:
+    """Return the name of the error by which the offers are compared."""
+    if all(offer.basis == "energy" for offer in offers):
+        return "shortfall of the level at td"
+    return "residual"
 
 
-def _saved_name(offers: Sequence[Offer]) -> str:
-    """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
-    known = any(one.saving is not None for one in offers)
-    return (
-        "saved, % of the processor time" if known else "rigid, % of the simulated time"
-    )
+def _name_saving(offers: Sequence[Offer]) -> str:
+    """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
+    is_cost_known = any(offer.saving is not None for offer in offers)
+    if is_cost_known:
+        return "saved, % of the processor time"
+    return "rigid, % of the simulated time"
 
 
-def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
-    """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
-    best, decision = offer.best, offer.decision
+def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
+    best = offer.best
+    decision = offer.decision
     return {
-        "td": short(offer.td),
-        "tr": short(best.tr) if best else "none",
+        "td": format_short(offer.td),
+        "tr": format_short(best.tr) if best else "none",
         "exact_td": repr(offer.td),
         "exact_tr": repr(best.tr) if best else "none",
-        "level": short(offer.energy_td),
-        "kinetic": shown(offer.kinetic_share, ".3f"),
+        "level": format_short(offer.energy_td),
+        "kinetic": format_if_known(offer.kinetic_share, ".3f"),
         "verdict": decision and decision.verdict,
         "why": decision and decision.reason,
         "cure": decision and decision.cure,
         "reason": offer.answer.why_none,
-        **(_of_best(offer, best, unit) if best else {}),
-        "compared": _compared(offer, start, unit),
-        "said": _said(offer),
+        **(_list_texts_of_best(offer, best, unit) if best else {}),
+        "compared": _compare_offers(offer, start, unit),
+        "said": _format_for_screen_reader(offer),
     }
 
 
-def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
-    """What is said of the recommended tr."""
-    kept, windows = offer.answer.kept, offer.answer.windows
+def _list_texts_of_best(
+    offer: Offer, best: Candidate, unit: str
+) -> dict[str, str | None]:
+    """Return the texts about the recommended tr."""
+    kept_share = offer.answer.kept
+    windows = offer.answer.windows
     return {
-        "residual": shown(best.residual, ".3f"),
-        "after": None if kept is None else f"{span_of(kept)} of the reference's",
-        "level_error": shown(
+        "residual": format_if_known(best.residual, ".3f"),
+        "after": None
+        if kept_share is None
+        else f"{format_bounds(kept_share)} of the reference's",
+        "level_error": format_if_known(
             best.level_error if best.residual is None else None, ".3f"
         ),
-        "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
-        "run_time": None if best.run_time_share is None else saved(best.run_time_share),
+        "rigid": f"for {format_short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
+        "run_time": None
+        if best.run_time_share is None
+        else format_saved_share(best.run_time_share),
         "tolerance": None
         if best.timing_tolerance is None
         else f"±{best.timing_tolerance:.1e}{unit}",
-        "windows": acceptable(windows, best.tr) if windows else None,
+        "windows": describe_acceptable_windows(windows, best.tr) if windows else None,
     }
 
 
-def _said(offer: Offer) -> str:
-    """What is said of the quality to who listens."""
+def _format_for_screen_reader(offer: Offer) -> str:
+    """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
         return "nothing acceptable"
     if best.residual is not None:
-        return f"residual {measure(best.residual)}"
+        return f"residual {format_measure(best.residual)}"
     return offer.decision.verdict if offer.decision else ""
 
 
-def _compared(offer: Offer, start: Offer, unit: str) -> str:
-    """What an offer costs and gives, against the one that is shown first."""
+def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
+    """Describe what an offer costs and gains compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td
-    said = [
-        f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"
+    comparisons = [
+        f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {format_short(start.td)}{unit}"
     ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
         share = offer.best.rigid_fraction - start.best.rigid_fraction
-        said.append(
+        comparisons.append(
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
             f"{share:+.1%} of the simulated time"
         )
     if offer.saving is not None and start.saving is not None:
-        said.append(
+        comparisons.append(
             f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
         )
     if (
@@ -347,7 +388,7 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         and start.error is not None
         and (offer.basis == "energy") == (start.basis == "energy")
     ):
-        said.append(
-            f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}"
+        comparisons.append(
+            f"{_name_error([offer])} {format_measure(offer.error)} instead of {format_measure(start.error)}"
         )
-    return ", ".join(said)
+    return ", ".join(comparisons)

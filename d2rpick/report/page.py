@@ -1,6 +1,6 @@
-"""HTML pages: elements from nested calls, in which all that is not HTML already is escaped, and what pages share.
+"""Build HTML pages: elements from nested calls, which escape all text that is not HTML, and sections that pages share.
 
-They share cards of a pair, what was read, and how to repeat it.
+Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.report.decision import headed
-from d2rpick.report.situation import heading, measures_of
-from d2rpick.report.tables import Cell, shell_line, short
+from d2rpick.report.decision import list_verdict_lines
+from d2rpick.report.situation import list_health_measures, list_situation_heading
+from d2rpick.report.tables import Cell, format_short, quote_shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -30,25 +30,28 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.histories.history import History
-    from d2rpick.histories.opening import Run
+    from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# Sections from which on a page has a list of its contents.
+# smallest number of sections with which a page has a list of its contents
 _LONG: Final = 4
-# More columns than this do not fit on a narrow screen.
+# tables with more columns do not fit on a narrow screen
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# Characters that no page may hold, and those that turn the text around them.
+# control characters that no page may contain, and those that change the direction of the text around them
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
-_MOST_FILES: Final = 20  # of a deck that are named
-# Lines of a page to be filled in by hand.
+_MOST_FILES: Final = 20  # largest number of files of a deck that are named
+# lines of a page to be filled in by hand
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
+
+# CSS class of the card and badge of each verdict
+CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 class Markup(str):
@@ -64,89 +67,94 @@ class Section(Markup):
     anchor: str
 
 
-def tag(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Give an element; attributes that are Python's words end in an underscore, blanks in names are written so too.
+def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
+    """Return an element; attributes like Python keywords end in an underscore, and ``_`` stands for ``-`` in names.
 
     Examples
     --------
-    >>> tag("p", "a < b, ", tag("b", "bold"), class_="note")
+    >>> make_element("p", "a < b, ", make_element("b", "bold"), class_="note")
     '<p class="note">a &lt; b, <b>bold</b></p>'
-    >>> tag("meta", charset="utf-8")
+    >>> make_element("meta", charset="utf-8")
     '<meta charset="utf-8">'
     """
-    given = "".join(
-        f' {key.rstrip("_").replace("_", "-")}="{_escape(text)}"'
+    written_attributes = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{_replace_markup(text)}"'
         for key, text in attributes.items()
     )
     return Markup(
-        f"<{name}{given}>"
+        f"<{name}{written_attributes}>"
         if name in _VOID
-        else f"<{name}{given}>{join(children)}</{name}>"
+        else f"<{name}{written_attributes}>{join(children)}</{name}>"
     )
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
-    """Put elements and texts one after the other."""
+    """Join elements and texts into one."""
     return Markup(
         between.join(
-            child if isinstance(child, Markup) else _escape(child, quote=False)
+            child if isinstance(child, Markup) else _replace_markup(child, quote=False)
             for child in children
         )
     )
 
 
-def document(
+def build_document(
     title: str,
     *content: str,
     signed: Sequence[str],
     styles: Sequence[Markup] = (),
     scripts: Sequence[Markup] = (),
 ) -> str:
-    """Give a whole page that needs nothing but itself, with lines ``signed`` to be filled in by hand.
+    """Return a whole page that needs no other file, with lines ``signed`` to be filled in by hand.
 
-    ``styles`` and ``scripts`` are what it needs beside the style of every page; nothing else takes effect on it.
+    ``styles`` and ``scripts`` are needed besides the style of every page; the policy of the page blocks all others.
     """
-    sheets = (resource("style.css"), *styles)
+    sheets = (read_resource("style.css"), *styles)
     if any("<pre" in part for part in content):
-        scripts = (resource("copy.js"), *scripts)
-    head = tag(
+        scripts = (read_resource("copy.js"), *scripts)
+    head = make_element(
         "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag(
+        make_element("meta", charset="utf-8"),
+        make_element(
+            "meta", name="viewport", content="width=device-width, initial-scale=1"
+        ),
+        make_element(
             "meta",
             http_equiv="Content-Security-Policy",
-            content=_policy(sheets, scripts),
+            content=_make_policy(sheets, scripts),
         ),
-        tag("title", title),
-        *(tag("style", sheet) for sheet in sheets),
+        make_element("title", title),
+        *(make_element("style", sheet) for sheet in sheets),
     )
-    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
-    sign = tag("p", *(tag("span", line) for line in signed), class_="sign")
-    header = tag(
+    # at the top, next to the times: after a long card it could be printed on a sheet of its own
+    sign = make_element(
+        "p", *(make_element("span", line) for line in signed), class_="sign"
+    )
+    header = make_element(
         "header",
-        tag("h1", title),
-        tag("p", f"d2rpick {__version__}", class_="soft"),
+        make_element("h1", title),
+        make_element("p", f"d2rpick {__version__}", class_="soft"),
         sign,
     )
-    body = tag(
+    body = make_element(
         "body",
         header,
-        contents(content),
-        tag("main", *content),
-        *(tag("script", script) for script in scripts),
+        build_contents(content),
+        make_element("main", *content),
+        *(make_element("script", script) for script in scripts),
     )
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    return f"<!DOCTYPE html>\n{make_element('html', head, body, lang='en')}\n"
 
 
-def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """Nothing is ever fetched, and only what the page itself is made of runs, whatever the files that were read hold.
+def _make_policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
+    """Return the content security policy: nothing is fetched, and only the page's own scripts and styles are used.
 
-    Drawings have styles of their own as attributes.  Older browsers know one rule for all styles only.
+    This holds whatever the input files contain.  Drawings have their styles as attributes.  Older browsers know only
+    one rule for all styles.
     """
     allowed = {"style-src-elem": styles, "script-src": scripts}
     rules = [
-        f"{name} {' '.join(map(_digest, texts)) or _NOTHING}"
+        f"{name} {' '.join(map(_compute_digest, texts)) or _NOTHING}"
         for name, texts in allowed.items()
     ]
     base = f"default-src {_NOTHING}; base-uri {_NOTHING}; form-action {_NOTHING}"
@@ -155,124 +163,144 @@ def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     )
 
 
-def _digest(text: str) -> str:
+def _compute_digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def section(title: str, *content: str) -> Section:
-    """Give a section under its title."""
-    return _anchored(title, tag("h2", title), *content)
+def build_section(title: str, *content: str) -> Section:
+    """Return a section with a title."""
+    return _make_section(title, make_element("h2", title), *content)
 
 
-def _anchored(title: str, *content: str) -> Section:
-    """Give a section with an id made from its title."""
+def _make_section(title: str, *content: str) -> Section:
+    """Return a section with an id made from its title."""
     letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
     anchor = f"section-{''.join(letters)}"
-    made = Section(tag("section", *content, id=anchor))
-    made.name = title
-    made.anchor = anchor
-    return made
+    section = Section(make_element("section", *content, id=anchor))
+    section.name = title
+    section.anchor = anchor
+    return section
 
 
-def contents(parts_of_page: Iterable[str]) -> Markup:
-    """Give links to the sections of a page; nothing if it is short."""
-    sections = [part for part in parts_of_page if isinstance(part, Section)]
+def build_contents(content: Iterable[str]) -> Markup:
+    """Return links to the sections of a page, nothing if it is short."""
+    sections = [part for part in content if isinstance(part, Section)]
     if len(sections) < _LONG:
         return Markup()
     links = (
-        tag("li", tag("a", part.name, href=f"#{part.anchor}")) for part in sections
+        make_element("li", make_element("a", section.name, href=f"#{section.anchor}"))
+        for section in sections
     )
-    return tag("nav", tag("ul", *links), class_="contents", aria_label="Contents")
+    return make_element(
+        "nav", make_element("ul", *links), class_="contents", aria_label="Contents"
+    )
 
 
-def drawing(caption: str, svg: str) -> Markup:
-    """Show an SVG element with its caption."""
-    drawn = tag("div", Markup(svg), role="img", aria_label=caption)
-    return tag("figure", drawn, tag("figcaption", caption), class_="drawn")
+def build_drawing(caption: str, svg: str) -> Markup:
+    """Return an SVG element with its caption."""
+    drawn = make_element("div", Markup(svg), role="img", aria_label=caption)
+    return make_element(
+        "figure", drawn, make_element("figcaption", caption), class_="drawn"
+    )
 
 
-def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """List reasons and warnings; nothing where there are none."""
-    lines = [tag("li", reason) for reason in reasons]
+def build_remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
+    """Return a list of reasons and warnings, nothing if there are none."""
+    lines = [make_element("li", reason) for reason in reasons]
     lines += [
-        tag("li", tag("b", caution.code), f": {caution.message}")
+        make_element("li", make_element("b", caution.code), f": {caution.message}")
         for caution in cautions
     ]
-    return tag("ul", *lines, class_="warnings") if lines else Markup()
+    return make_element("ul", *lines, class_="warnings") if lines else Markup()
 
 
-def resource(name: str) -> Markup:
-    """Read a text that is part of the package."""
+def read_resource(name: str) -> Markup:
+    """Read a text file of the package."""
     return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))
 
 
-def table(
+def build_scrolling_table(
     title: str,
     head: Sequence[str],
     rows: Iterable[Sequence[Cell]],
     marked: int | None = None,
 ) -> Markup:
-    """Give a table in a box that scrolls sideways where it is too wide; ``title`` is what a keyboard reaches it by."""
-    box = tag(
+    """Return a table in a box that scrolls sideways if needed; keyboard users reach it by its ``title``."""
+    box = make_element(
         "div",
-        grid(head, rows, marked),
+        build_grid(head, rows, marked),
         class_="scroll",
         role="region",
         aria_label=title,
         tabindex="0",
     )
-    return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
+    return (
+        join([make_element("p", _HINT, class_="hint"), box])
+        if len(head) > _FIT
+        else box
+    )
 
 
-def grid(
+def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Give a table alone; the row ``marked`` stands out.
+    """Return a bare table in which the row ``marked`` is highlighted.
 
-    Columns of numbers, and of what is not known, are set to the right.  Lines break at blanks alone, never within a
-    number.
+    Columns of numbers are aligned right.  Lines break only at blanks, never within a number.
     """
     body = [list(row) for row in rows]
-    right = [
+    is_number = [
         name == "±"
         or all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
         for i, name in enumerate(head)
     ]
-    classes = [{"class_": "number"} if one else {} for one in right]
+    classes = [{"class_": "number"} if is_right else {} for is_right in is_number]
     top = (
-        tag("th", name, scope="col", **own)
-        for name, own in zip(head, classes, strict=True)
+        make_element("th", name, scope="col", **cell_class)
+        for name, cell_class in zip(head, classes, strict=True)
     )
     lines = [
-        tag(
+        make_element(
             "tr",
-            *(_cell(cell, own) for cell, own in zip(row, classes, strict=True)),
+            *(
+                _build_cell(cell, cell_class)
+                for cell, cell_class in zip(row, classes, strict=True)
+            ),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
     ]
-    return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
+    return make_element(
+        "table",
+        make_element("thead", make_element("tr", *top)),
+        make_element("tbody", *lines),
+    )
 
 
-def _cell(cell: Cell, own: Mapping[str, str]) -> Markup:
-    text = cell if isinstance(cell, Markup) else short(cell)
-    return tag("td", text, **(own or ({"class_": "words"} if " " in text else {})))
+def _build_cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
+    text = cell if isinstance(cell, Markup) else format_short(cell)
+    return make_element(
+        "td", text, **(attributes or ({"class_": "words"} if " " in text else {}))
+    )
 
 
-def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Give a list of names, each with what it stands for; nothing where there are none."""
-    listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
-    return tag("dl", *listed) if listed else Markup()
+def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
+    """Return a list of names and descriptions, nothing if there are none."""
+    listed = [
+        make_element("div", make_element("dt", name), make_element("dd", text))
+        for name, text in rows
+    ]
+    return make_element("dl", *listed) if listed else Markup()
 
 
-def _escape(text: str, *, quote: bool = True) -> str:
+def _replace_markup(text: str, *, quote: bool = True) -> str:
     return escape(text, quote=quote).translate(_CONTROLS)
 
 
 class Explorer(NamedTuple):
-    """What can be explored: the trade-offs of one or several flights.
+    """The trade-offs of one or several flights, to be explored on a page.
 
-    ``command`` is the command line that asks for the pair of a td, in front of td and behind it.
+    ``command`` is the command line that asks for the pair at a td, as its words before and after the value of td.
     """
 
     trade_offs: tuple[TradeOff, ...]
@@ -282,227 +310,253 @@ class Explorer(NamedTuple):
 class PageContext(NamedTuple):
     """What a page shows besides the answer.
 
-    ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
-    options of ``card`` that judge by the same history.   ``card`` is the
-    solver input of a pair that is recommended or verified; ``explorer`` makes the page live.
+    ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
+    options of ``card`` that select the same history.  ``card`` is the solver input of a recommended or verified pair;
+    ``explorer`` makes the page interactive.
     """
 
-    run: Run
+    run: OpenedRun
     command: Sequence[str]
     judging: Sequence[str]
     card: SolverInput | None = None
-    switched: Run | None = None
+    switched: OpenedRun | None = None
     explorer: Explorer | None = None
 
 
-def front(cards: Sequence[Markup], *below: Markup) -> Markup:
-    """Give the first section: cards of what was chosen or judged beside each other, and what to know of them."""
-    return tag("section", tag("div", *cards, class_="choice"), *below)
+def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:
+    """Return the first section: cards of the chosen or judged pairs next to each other, and remarks below."""
+    return make_element("section", make_element("div", *cards, class_="choice"), *below)
 
 
-def refused(reason: str) -> Markup:
-    """Give the card of an answer that recommends nothing."""
-    return tag(
+def build_refusal(reason: str) -> Markup:
+    """Return the card of an answer that recommends nothing."""
+    return make_element(
         "div",
-        tag("h2", tag("span", "nothing to use", class_="badge refused")),
-        tag("p", reason),
+        make_element(
+            "h2", make_element("span", "nothing to use", class_="badge refused")
+        ),
+        make_element("p", reason),
         class_="card refused",
     )
 
 
-def title_of(run: Run) -> str:
-    """Title that the solver wrote, else the name of the file."""
+def get_title(run: OpenedRun) -> str:
+    """Return the title that the solver wrote, or else the name of the file."""
     return (
         next((database.title for database in run.databases if database.title), "")
         or run.name
     )
 
 
-def pair(
-    title: str, times: tuple[float, float], told: Markup, history: History, class_: str
+def build_pair_card(
+    title: str,
+    times: tuple[float, float],
+    description: Markup,
+    history: History,
+    class_: str,
 ) -> Markup:
-    """Show (tr, td) large, what is ``told`` of them, and the times in full."""
+    """Return the card of (tr, td): the times large, a description of the pair, and the times with all digits."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    shown = (
-        tag("span", tag("i", name), f"{short(time)}{unit}")
+    large_times = (
+        make_element("span", make_element("i", name), f"{format_short(time)}{unit}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
     full = (
-        tag("span", f"{name} = {time!r}")
+        make_element("span", f"{name} = {time!r}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
-    exact = tag("p", "in full: ", join(full, ", "), class_="soft exact")
-    return tag(
+    exact = make_element("p", "in full: ", join(full, ", "), class_="soft exact")
+    return make_element(
         "div",
-        tag("h2", title),
-        tag("div", *shown, class_="times"),
-        told,
+        make_element("h2", title),
+        make_element("div", *large_times, class_="times"),
+        description,
         exact,
         class_=class_,
     )
 
 
-# The class of the card of a verdict, and of its badge.
-CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
-
-
-def decided(
+def build_verdict_card(
     title: str,
     decision: Decision,
     times: tuple[float, float],
     history: History,
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
-    """Show the verdict on a pair as a badge, its times large, and why; ``title`` stands before the verdict."""
+    """Return the card of a verdict: ``title``, the verdict as a badge, the times large, and the reason."""
     kind = CLASSES[decision.verdict]
-    badge = tag("span", decision.verdict, class_=f"badge {kind}")
-    _, *why = headed(decision, *times)
-    return pair(
-        join([title, badge]), times, pairs([*why, *facts]), history, f"card {kind}"
+    badge = make_element("span", decision.verdict, class_=f"badge {kind}")
+    _, *why = list_verdict_lines(decision, *times)
+    return build_pair_card(
+        join([title, badge]),
+        times,
+        build_pairs([*why, *facts]),
+        history,
+        f"card {kind}",
     )
 
 
-def digests(files: Iterable[Read]) -> list[tuple[str, str]]:
-    """Name each file with the SHA-256 of what was read of it."""
+def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
+    """Return each file with the SHA-256 digest of its content."""
     return [("SHA-256", f"{file.name}: {file.sha256()}") for file in files]
 
 
-def deck_digests(
+def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """The same of a deck, its main file first, and of a file of weights; of many includes the first are named."""
+    """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
     files = list({file.name: file for file in deck}.values())
-    more = len(files) - _MOST_FILES
-    left = (
-        [("SHA-256", f"of {more} more files of the deck: in the JSON result")]
-        if more > 0
-        else []
-    )
+    hidden_count = len(files) - _MOST_FILES
+    if hidden_count > 0:
+        hidden = [
+            ("SHA-256", f"of {hidden_count} more files of the deck: in the JSON result")
+        ]
+    else:
+        hidden = []
     return [
-        *digests(files[:_MOST_FILES]),
-        *left,
-        *digests([weights.file] if weights and weights.file else []),
+        *list_digests(files[:_MOST_FILES]),
+        *hidden,
+        *list_digests([weights.file] if weights and weights.file else []),
     ]
 
 
-def digests_of(settings: Settings) -> list[tuple[str, str]]:
-    """The same of the deck that an answer rests on; nothing without one."""
+def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
+    """Return the digests of the deck that an answer uses, nothing without a deck."""
     used = settings.by_deck
-    return deck_digests(used.files, used.weights) if used else []
+    return list_deck_digests(used.files, used.weights) if used else []
 
 
-def parts(candidate: Candidate | None) -> Markup:
-    """Show what each part has of the mismatch at a pair; nothing where the parts are not known."""
+def build_part_table(candidate: Candidate | None) -> Markup:
+    """Return a table of each part's contribution to the mismatch of a pair, nothing if the parts are unknown."""
     if candidate is None or not candidate.parts:
         return Markup()
     sign = {True: "same", False: "opposite", None: "unknown"}
     listed = [
         (
-            one.name,
-            sign[one.sign_match],
-            "-" if one.share is None else f"{one.share:.0%}",
-            one.reason or "",
+            part.name,
+            sign[part.sign_match],
+            "-" if part.share is None else f"{part.share:.0%}",
+            part.reason or "",
         )
-        for one in candidate.parts
+        for part in candidate.parts
     ]
     title = "Parts at this pair"
-    return section(
-        title, table(title, ("part", "sign", "share of the mismatch", "remark"), listed)
+    return build_section(
+        title,
+        build_scrolling_table(
+            title, ("part", "sign", "share of the mismatch", "remark"), listed
+        ),
     )
 
 
-def evidence(
+def build_evidence(
     situation: Situation, health: Health | None, record: PageContext
 ) -> Iterator[Markup]:
-    """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
-    yield section("What was read", _read(situation, record.run))
-    yield section("Health of the reference run", *_health(health))
-    yield from method(record.command, "-" in record.run.sources)
+    """Return the sections on the input, its health, the method, and how to repeat the answer."""
+    yield build_section("What was read", _build_input(situation, record.run))
+    yield build_section("Health of the reference run", *_build_health(health))
+    yield from build_method(record.command, "-" in record.run.sources)
 
 
-def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
-    """Tell by what method an answer was found, and how to repeat it."""
-    folded = tag(
+def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
+    """Return the sections on the method of an answer, and how to repeat it."""
+    folded = make_element(
         "details",
-        tag("summary", tag("h2", "Method and limits")),
-        resource("method.html"),
+        make_element("summary", make_element("h2", "Method and limits")),
+        read_resource("method.html"),
     )
-    yield _anchored("Method and limits", folded)
-    yield repeated(command, stdin)
+    yield _make_section("Method and limits", folded)
+    yield build_command(command, stdin)
 
 
-def repeated(command: Sequence[str], stdin: bool = False) -> Section:
-    """Give the arguments that repeat an answer as a line to paste."""
-    said = [tag("p", "with the same history on standard input:")] if stdin else []
-    return section(
-        "To repeat this", *said, tag("pre", shell_line(command), class_="wrap")
+def build_command(command: Sequence[str], stdin: bool = False) -> Section:
+    """Return the arguments that repeat an answer as a command line to paste."""
+    stdin_note = (
+        [make_element("p", "with the same history on standard input:")] if stdin else []
+    )
+    return build_section(
+        "To repeat this",
+        *stdin_note,
+        make_element("pre", quote_shell_line(command), class_="wrap"),
     )
 
 
-def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
-    """Give the solver's card where it is known whom it switches, else the command that prints it."""
-    title, card = "Solver input", record.card
+def build_solver_input(times: tuple[float, float], record: PageContext) -> Markup:
+    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+    title = "Solver input"
+    card = record.card
     assert card is not None
     if card.refusal:
-        return section(
-            title, tag("p", f"No card can be printed for these times: {card.refusal}")
+        return build_section(
+            title,
+            make_element(
+                "p", f"No card can be printed for these times: {card.refusal}"
+            ),
         )
     if card.text:
-        return section(title, tag("pre", card.text, tabindex="0"))
+        return build_section(title, make_element("pre", card.text, tabindex="0"))
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += ["--solver", card.solver] if card.solver else []
-    line = tag(
+    line = make_element(
         "pre",
-        shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
+        quote_shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
         class_="wrap",
     )
-    return section(title, tag("p", "Printed, and judged again as printed, by"), line)
+    return build_section(
+        title, make_element("p", "Printed, and judged again as printed, by"), line
+    )
 
 
-def _read(situation: Situation, run: Run) -> Markup:
+def _build_input(situation: Situation, run: OpenedRun) -> Markup:
     listed = [
-        *heading(situation, verbose=True),
-        *digests(run.files),
-        *digests_of(situation.settings),
+        *list_situation_heading(situation, verbose=True),
+        *list_digests(run.files),
+        *list_digests_of_settings(situation.settings),
     ]
     listed += [
         (f"{database.format} by", database.version)
         for database in run.databases
         if database.version
     ]
-    whole = (
-        "the files end after a complete state"
-        if situation.history.complete
-        else "only complete states were used"
-    )
+    if situation.history.complete:
+        whole = "the files end after a complete state"
+    else:
+        whole = "only complete states were used"
     listed += [("complete", whole)]
-    return pairs(listed + [("note", note) for note in situation.history.notes])
+    return build_pairs(listed + [("note", note) for note in situation.history.notes])
 
 
-def _health(health: Health | None) -> Iterator[Markup]:
-    if health is None or not any(one.value for one in measures_of(health)):
-        yield tag("p", "The files do not hold the energies this needs.")
+def _build_health(health: Health | None) -> Iterator[Markup]:
+    if health is None or not any(
+        health_measure.value for health_measure in list_health_measures(health)
+    ):
+        yield make_element("p", "The files do not hold the energies this needs.")
         return
     verdicts = {
-        True: tag("span", "kept", class_="good"),
-        False: tag("span", "exceeded", class_="bad"),
+        True: make_element("span", "kept", class_="good"),
+        False: make_element("span", "exceeded", class_="bad"),
         None: "-",
     }
     listed = [
-        (one.what, one.value or "not written", one.limit, verdicts[one.good])
-        for one in measures_of(health)
+        (
+            health_measure.what,
+            health_measure.value or "not written",
+            health_measure.limit,
+            verdicts[health_measure.good],
+        )
+        for health_measure in list_health_measures(health)
     ]
-    yield table(
+    yield build_scrolling_table(
         "Health of the reference run",
         ("measure", "this run", "practice", "verdict"),
         listed,
     )
     window = health.window
     where = " The window is {:.6g} to {:.6g}.".format(*window) if window else ""
-    yield tag(
+    yield make_element(
         "p",
         f"Up to td; shares are of the peak of the internal energy.{where}",
         class_="soft",
     )
     if health.reason:
-        yield tag("p", health.reason)
+        yield make_element("p", health.reason)

@@ -1,4 +1,4 @@
-"""Answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
+"""Write answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import give_if_written
 from d2rpick.choice.grades import POOR, VERDICTS
-from d2rpick.choice.study import Study, runs_of
+from d2rpick.choice.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
     drive,
     overview,
@@ -18,203 +18,265 @@ from d2rpick.report import (
     trade_off,
     verdict,
 )
-from d2rpick.report.decision import rigid_for, statements
-from d2rpick.report.explorer import explorer, scripts, styles
+from d2rpick.report.decision import format_rigid_time, list_statements
+from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
 from d2rpick.report.page import (
     Explorer,
     Markup,
-    document,
-    grid,
-    pairs,
-    remarks,
-    section,
-    table,
-    tag,
+    build_document,
+    build_grid,
+    build_pairs,
+    build_remarks,
+    build_scrolling_table,
+    build_section,
+    make_element,
 )
-from d2rpick.report.situation import what_was_read
-from d2rpick.report.tables import Cell, known, short, unstarred
+from d2rpick.report.situation import describe_input
+from d2rpick.report.tables import (
+    Cell,
+    format_short,
+    remove_star_column,
+    select_known_columns,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
-    from d2rpick.choice.answers import Suggestion, Verdict
+    from d2rpick.choice.answers import PairSuggestion, PairVerdict
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.plan import Plan, Planned
+    from d2rpick.choice.plan import PlannedFlight, RunPlan
     from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.histories.source import Source
     from d2rpick.running.drive import Driven
 
 
-# More rows than one compares by eye; csv and json hold all.
+# Most rows of a table on a page: the eye cannot compare more, and CSV and JSON hold all.
 _MOST_ROWS = 20
 
+# Most rows of a table in a notebook.
+_FEW_ROWS: Final = 12
+_WIDEST: Final = "max-width: 40em"  # a picture without a width fills the screen
 
-def _of_run(record: page.PageContext, *sections: Markup) -> str:
-    """Write a page about one run; where something can be explored it runs a script."""
-    needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
-    return document(
-        f"Switch times: {page.title_of(record.run)}",
+
+def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
+    """Write a page about one run, with its script if something can be explored."""
+    needed = (
+        {"styles": read_styles(), "scripts": read_scripts()} if record.explorer else {}
+    )
+    return build_document(
+        f"Switch times: {page.get_title(record.run)}",
         *sections,
         signed=page.SIGNED,
         **needed,
     )
 
 
-def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
-    """Draw something of a kind under its caption, an SVG element whose ids begin with ``prefix``."""
+def _build_figure(
+    prefix: str, caption: str, kind: str, *arguments: Any, **how: Any
+) -> Markup:
+    """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
-    drawn = getattr(figures_choice, f"draw_{kind}")(*asked, **how)
-    return page.drawing(caption, figures.svg_element(drawn, prefix))
+    drawn = getattr(figures_choice, f"draw_{kind}")(*arguments, **how)
+    return page.build_drawing(caption, figures.render_svg_element(drawn, prefix))
 
 
-def _draw_suggestion(answer: Suggestion) -> Markup:
-    shown = (
-        "the choice, and a better pair" if answer.clearly_better else "and the choice"
-    )
-    return _figures(
+def _draw_suggestion(answer: PairSuggestion) -> Markup:
+    if answer.clearly_better:
+        choice_text = "the choice, and a better pair"
+    else:
+        choice_text = "and the choice"
+    return _build_figure(
         "choice-",
-        f"Internal energy with its level at td, {shown}",
+        f"Internal energy with its level at td, {choice_text}",
         "suggestion",
         answer,
         page=True,
     )
 
 
-def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
-    """Give a table whose first column has a star for what is recommended: the row stands out instead."""
+def _build_starred_table(
+    title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
+) -> Markup:
+    """Return a table without its first column; a star there marks the recommended row, which is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
-    return table(title, *unstarred(head, rows), marked)
+    return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
 
-def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
+def suggestion_page(answer: PairSuggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
-    shown = (_choice(answer), explorer(record.explorer), _draw_suggestion(answer))
-    return _of_run(record, *shown, *_below_figures(answer, record))
+    first_sections = (
+        _build_choice(answer),
+        build_explorer(record.explorer),
+        _draw_suggestion(answer),
+    )
+    return _write_run_page(
+        record, *first_sections, *_build_lower_sections(answer, record)
+    )
 
 
-def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
-    yield section("Candidates", *_candidates(answer))
-    yield page.parts(answer.chosen)
-    yield from page.evidence(answer.situation, answer.health, record)
+def _build_lower_sections(
+    answer: PairSuggestion, record: page.PageContext
+) -> Iterator[Markup]:
+    yield build_section("Candidates", *_build_candidates(answer))
+    yield page.build_part_table(answer.chosen)
+    yield from page.build_evidence(answer.situation, answer.health, record)
     if answer.recommended:
-        yield page.solver_input((answer.recommended.tr, answer.recommended.td), record)
-
-
-def _choice(answer: Suggestion) -> Markup:
-    """Give the section above the figures: the pairs, large, and what to know of them."""
-    cards, better = [_recommended(answer)], answer.clearly_better
-    if better:
-        told, times = (
-            tag("p", suggestion.better_about(answer, better)),
-            (better.tr, better.td),
+        yield page.build_solver_input(
+            (answer.recommended.tr, answer.recommended.td), record
         )
+
+
+def _build_choice(answer: PairSuggestion) -> Markup:
+    """Return the section above the figures: the pairs in large type, and remarks."""
+    cards = [_build_recommendation(answer)]
+    better = answer.clearly_better
+    if better:
+        better_text = make_element("p", suggestion.describe_improvement(answer, better))
+        times = (better.tr, better.td)
         cards.append(
-            page.pair(
-                "Better pair: another td", times, told, answer.situation.history, "card"
+            page.build_pair_card(
+                "Better pair: another td",
+                times,
+                better_text,
+                answer.situation.history,
+                "card",
             )
         )
-    return page.front(
-        cards, remarks(answer.cautions), pairs(suggestion.outlook(answer))
+    return page.build_front(
+        cards,
+        build_remarks(answer.cautions),
+        build_pairs(suggestion.list_alternatives(answer)),
     )
 
 
-def _recommended(answer: Suggestion) -> Markup:
-    best, decision = answer.chosen, answer.decision
+def _build_recommendation(answer: PairSuggestion) -> Markup:
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
-        return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
+        return page.build_refusal(
+            f"No tr can be recommended for this td: {answer.why_none}"
+        )
     times = best.tr, answer.td
-    return page.decided(
-        "", decision, times, answer.situation.history, suggestion.facts(answer)
+    return page.build_verdict_card(
+        "", decision, times, answer.situation.history, suggestion.list_evidence(answer)
     )
 
 
-def _candidates(answer: Suggestion) -> Iterator[Markup]:
+def _build_candidates(answer: PairSuggestion) -> Iterator[Markup]:
     if not answer.candidates:
-        yield tag("p", "None.")
+        yield make_element("p", "None.")
         return
-    yield _starred("Candidates", *known(*suggestion.table(answer, _MOST_ROWS)))
-    if (left := len(answer.candidates) - _MOST_ROWS) > 0:
-        yield tag("p", f"{left} more in the csv and json results.", class_="soft")
-
-
-def verdict_page(answer: Verdict, record: page.PageContext) -> str:
-    """Write the page of ``verify``."""
-    return _of_run(record, *_of_verdict(answer, record))
-
-
-def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
-    situation, candidate = answer.situation, answer.candidate
-    times = candidate.tr, situation.td
-    card = page.decided(
-        "", answer.decision, times, situation.history, verdict.facts(answer)
+    yield _build_starred_table(
+        "Candidates",
+        *select_known_columns(*suggestion.build_candidate_table(answer, _MOST_ROWS)),
     )
-    remarked = [one for one in answer.reasons if one not in answer.decision.reason]
-    yield page.front([card], remarks(answer.cautions, remarked))
-    yield explorer(record.explorer)
+    if (hidden_count := len(answer.candidates) - _MOST_ROWS) > 0:
+        yield make_element(
+            "p", f"{hidden_count} more in the csv and json results.", class_="soft"
+        )
+
+
+def verdict_page(answer: PairVerdict, record: page.PageContext) -> str:
+    """Write the page of ``verify``."""
+    return _write_run_page(record, *_build_verdict(answer, record))
+
+
+def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Markup]:
+    situation = answer.situation
+    candidate = answer.candidate
+    times = candidate.tr, situation.td
+    card = page.build_verdict_card(
+        "",
+        answer.decision,
+        times,
+        situation.history,
+        verdict.list_pair_evidence(answer),
+    )
+    further_reasons = [
+        reason for reason in answer.reasons if reason not in answer.decision.reason
+    ]
+    yield page.build_front([card], build_remarks(answer.cautions, further_reasons))
+    yield build_explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
-    yield _figures("pair-", caption, "verdict", answer, page=True)
-    measures = verdict.measured(answer)
-    yield section("Measures", pairs((name, short(value)) for name, value in measures))
-    yield page.parts(candidate)
+    yield _build_figure("pair-", caption, "verdict", answer, page=True)
+    measures = verdict.list_known_measures(answer)
+    yield build_section(
+        "Measures", build_pairs((name, format_short(value)) for name, value in measures)
+    )
+    yield page.build_part_table(candidate)
     if answer.switched:
-        yield _switched(
+        yield _build_comparison(
             answer.switched, record.switched.files if record.switched else ()
         )
-    yield from page.evidence(situation, answer.health, record)
+    yield from page.build_evidence(situation, answer.health, record)
     if record.card:
-        yield page.solver_input(times, record)
+        yield page.build_solver_input(times, record)
 
 
-def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
-    """Show what the finished switched run has of the reference."""
+def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:
+    """Return the comparison of the finished switched run with the reference."""
     title = "The switched run"
     listed = [
-        ("compared", f"from td to {found.end:.6g}"),
-        *verdict.deviations(found),
-        *page.digests(files),
+        ("compared", f"from td to {comparison.end:.6g}"),
+        *verdict.list_deviations(comparison),
+        *page.list_digests(files),
     ]
-    listed += [("note", note) for note in found.notes]
-    return section(
+    listed += [("note", note) for note in comparison.notes]
+    return build_section(
         title,
-        table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)),
-        pairs(listed),
+        build_scrolling_table(
+            title,
+            ("quantity", *verdict.COMPARED[1:]),
+            verdict.compare_values(comparison),
+        ),
+        build_pairs(listed),
     )
 
 
-def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
+def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
     """Write the page of ``explore``."""
-    further = [one for one in found.cautions if one not in found.suggestion.cautions]
+    further = [
+        caution
+        for caution in answer.cautions
+        if caution not in answer.suggestion.cautions
+    ]
     caption = "Error and rigid time of the best pair for each td"
-    best = trade_off.some_of(found, _MOST_ROWS)
-    left = tag(
+    best = trade_off.select_offers(answer, _MOST_ROWS)
+    hidden = make_element(
         "p",
-        f"{len(found.offers) - len(best)} more td in the csv and json results.",
+        f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
-    return _of_run(
+    return _write_run_page(
         record,
-        _choice(found.suggestion),
-        tag("section", tag("p", trade_off.answer(found)), remarks(further)),
-        explorer(record.explorer),
-        _draw_suggestion(found.suggestion),
-        _figures("explore-", caption, "trade_off", found, page=True),
-        section(
-            "Pairs that nothing beats",
-            _starred("Pairs", *known(*trade_off.table(best))),
-            left,
+        _build_choice(answer.suggestion),
+        make_element(
+            "section",
+            make_element("p", trade_off.give_answer(answer)),
+            build_remarks(further),
         ),
-        *_below_figures(found.suggestion, record),
+        build_explorer(record.explorer),
+        _draw_suggestion(answer.suggestion),
+        _build_figure("explore-", caption, "trade_off", answer, page=True),
+        build_section(
+            "Pairs that nothing beats",
+            _build_starred_table(
+                "Pairs", *select_known_columns(*trade_off.build_offer_table(best))
+            ),
+            hidden,
+        ),
+        *_build_lower_sections(answer.suggestion, record),
     )
 
 
 def plan_page(
-    found: Plan,
-    run: Run,
+    answer: RunPlan,
+    run: OpenedRun,
     command: Sequence[str],
     card: str | None,
     explored: Explorer | None = None,
@@ -225,117 +287,138 @@ def plan_page(
     ----------
     found : Plan
     run : Run
-        What was read.
+        The run that was read.
     command : sequence of str
         Arguments that repeat the answer.
     card : str or None
-        Solver input for the next run, where it is known whom it switches.
+        Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
         The flights of the plan.
     """
-    cards = [_window(row, found) for row in found.supported]
-    cards = cards or [page.refused("No window of this run can be recommended.")]
+    cards = [_build_window_card(row, answer) for row in answer.supported]
+    cards = cards or [page.build_refusal("No window of this run can be recommended.")]
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    files = [*page.digests(run.files), *page.digests_of(found.settings)]
-    notes = [("note", note) for note in found.history.notes]
-    return _of_run(
+    files = [
+        *page.list_digests(run.files),
+        *page.list_digests_of_settings(answer.settings),
+    ]
+    notes = [("note", note) for note in answer.history.notes]
+    return _write_run_page(
         page.PageContext(run, command, (), explorer=explored),
-        page.front(
+        page.build_front(
             cards,
-            remarks(found.cautions),
-            pairs(
+            build_remarks(answer.cautions),
+            build_pairs(
                 [
-                    ("plan", plan.sentence(found)),
-                    *plan.next_steps(found),
-                    *plan.outlook(found),
+                    ("plan", plan.give_plan_sentence(answer)),
+                    *plan.list_next_steps(answer),
+                    *plan.list_plan_remarks(answer),
                 ]
             ),
         ),
-        explorer(explored),
-        _figures("plan-", caption, "plan", found, page=True),
-        section(
+        build_explorer(explored),
+        _build_figure("plan-", caption, "plan", answer, page=True),
+        build_section(
             "Flights",
-            table("Flights", *unstarred(*plan.table(found))),
-            pairs([*plan.verdicts(found), *plan.reasons(found)]),
+            build_scrolling_table(
+                "Flights", *remove_star_column(*plan.build_flight_table(answer))
+            ),
+            build_pairs([*plan.list_verdicts(answer), *plan.list_reasons(answer)]),
         ),
-        section("For the solver's input", tag("pre", card, tabindex="0"))
+        build_section("For the solver's input", make_element("pre", card, tabindex="0"))
         if card
         else Markup(),
-        section(
+        build_section(
             "What was read",
-            pairs([("history", what_was_read(found.history)), *files, *notes]),
+            build_pairs([("history", describe_input(answer.history)), *files, *notes]),
         ),
-        *page.method(command),
+        *page.build_method(command),
     )
 
 
-def _window(row: Planned, found: Plan) -> Markup:
+def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
     assert row.window is not None
     assert row.candidate is not None
     assert row.decision is not None
-    facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
+    facts = [
+        ("rigid for", format_rigid_time(row.candidate)),
+        *list_statements(row.decision),
+    ]
     title = f"Flight {row.number}: "
-    return page.decided(title, row.decision, row.window, found.history, facts)
+    return page.build_verdict_card(
+        title, row.decision, row.window, answer.history, facts
+    )
 
 
-def study_page(answer: Study, command: Sequence[str]) -> str:
+def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
     caption = (
         "Internal energies of all runs, with the tr of each, the common one and td"
     )
-    head, rows = study.table(answer)
-    return document(
-        f"Switch times of {runs_of(len(answer.runs))}",
-        page.front(
-            [_common(answer)],
-            remarks(answer.cautions),
-            pairs([*_below_card(answer), *study.reasons(answer)]),
+    head, rows = study.build_run_table(answer)
+    return build_document(
+        f"Switch times of {format_number_of_runs(len(answer.runs))}",
+        page.build_front(
+            [_build_common_card(answer)],
+            build_remarks(answer.cautions),
+            build_pairs([*_list_below_card(answer), *study.list_run_reasons(answer)]),
         ),
-        _figures("runs-", caption, "study", answer, page=True),
-        section(
+        _build_figure("runs-", caption, "study", answer, page=True),
+        build_section(
             "Runs",
-            table("Runs", *known([name.replace("+-", "±") for name in head], rows)),
+            build_scrolling_table(
+                "Runs",
+                *select_known_columns([name.replace("+-", "±") for name in head], rows),
+            ),
         ),
-        section("Files", tag("pre", _files(answer), class_="wrap")),
-        *page.method(command),
+        build_section(
+            "Files", make_element("pre", _list_input_files(answer), class_="wrap")
+        ),
+        *page.build_method(command),
         signed=page.CHECKED,
     )
 
 
-def _below_card(answer: Study) -> Iterable[tuple[str, str]]:
+def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
     """Return the outcome without what the card of the common tr has already."""
-    outcome = study.outcome(answer)
-    return outcome if answer.common.tr is None else list(outcome)[1:]
+    outcome = study.list_outcome(answer)
+    return outcome if answer.common.tr is None else outcome[1:]
 
 
-def _common(answer: Study) -> Markup:
-    tr, title = answer.common.tr, tag("h2", "One tr for all runs")
+def _build_common_card(answer: StudyOfRuns) -> Markup:
+    tr = answer.common.tr
+    title = make_element("h2", "One tr for all runs")
     if tr is None:
-        return tag(
-            "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
+        return make_element(
+            "div",
+            title,
+            make_element("p", "None: ", answer.common.reason or ""),
+            class_="card",
         )
-    times = [tag("span", tag("i", "tr"), f"{tr:.6g}")]
+    times = [make_element("span", make_element("i", "tr"), f"{tr:.6g}")]
     if answer.td is not None:
-        times.append(tag("span", tag("i", "td"), f"{answer.td:.6g}"))
+        times.append(make_element("span", make_element("i", "td"), f"{answer.td:.6g}"))
     exact = f"in full: tr = {tr!r}" + (
         "" if answer.td is None else f", td = {answer.td!r}"
     )
     verdict = VERDICTS[answer.grade or POOR]
-    (_, said), *_ = study.outcome(answer)
+    (_, outcome), *_ = study.list_outcome(answer)
     kind = page.CLASSES[verdict]
     lines = (
-        tag("div", *times, class_="times"),
-        tag("p", said),
-        tag("p", exact, class_="soft"),
+        make_element("div", *times, class_="times"),
+        make_element("p", outcome),
+        make_element("p", exact, class_="soft"),
     )
-    badge = tag(
-        "h2", "One tr for all runs: ", tag("span", verdict, class_=f"badge {kind}")
+    badge = make_element(
+        "h2",
+        "One tr for all runs: ",
+        make_element("span", verdict, class_=f"badge {kind}"),
     )
-    return tag("div", badge, *lines, class_=f"card {kind}")
+    return make_element("div", badge, *lines, class_=f"card {kind}")
 
 
-def _files(answer: Study) -> str:
-    """Name what was read, with size and time, in the order of the runs."""
+def _list_input_files(answer: StudyOfRuns) -> str:
+    """Return the input files with size and time, in the order of the runs."""
     from datetime import UTC, datetime
 
     files = dict.fromkeys(stamp for row in answer.runs for stamp in row.files)
@@ -345,172 +428,206 @@ def _files(answer: Study) -> str:
     )
 
 
-def parts_page(found: Parts, command: Sequence[str]) -> str:
+def parts_page(answer: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    sets = (
-        [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
-        if found.sets
-        else []
-    )
+    if answer.sets:
+        sets = [
+            build_section(
+                "Sets",
+                _build_starred_table(
+                    "Sets", *parts.build_set_table(answer, parts.SETS)
+                ),
+            )
+        ]
+    else:
+        sets = []
     tables = {
-        name: unstarred(*parts.table(found, columns))
+        name: remove_star_column(*parts.build_part_table(answer, columns))
         for name, columns in parts.TABLES.items()
     }
-    weights = [("weights", found.weights.source)] if found.weights else []
-    deck = (
-        page.deck_digests(found.inventory.files, found.weights)
-        if found.inventory
-        else []
-    )
-    return document(
-        f"Parts to switch: {page.title_of(found.files)}",
-        page.front([_set(found.recommended)], remarks(found.cautions)),
+    weights = [("weights", answer.weights.source)] if answer.weights else []
+    if answer.inventory:
+        deck = page.list_deck_digests(answer.inventory.files, answer.weights)
+    else:
+        deck = []
+    return build_document(
+        f"Parts to switch: {page.get_title(answer.files)}",
+        page.build_front(
+            [_build_set_card(answer.recommended)], build_remarks(answer.cautions)
+        ),
         *sets,
-        *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What to know", pairs(parts.outlook(found))),
-        section(
+        *(
+            build_section(name, build_scrolling_table(name, *cells))
+            for name, cells in tables.items()
+        ),
+        build_section("What to know", build_pairs(parts.list_remarks(answer))),
+        build_section(
             "What was read",
-            pairs(
+            build_pairs(
                 [
-                    *parts.heading(found),
+                    *parts.list_heading(answer),
                     *weights,
-                    *page.digests(found.files.files),
+                    *page.list_digests(answer.files.files),
                     *deck,
                 ]
             ),
         ),
-        page.repeated(command),
+        page.build_command(command),
         signed=page.SIGNED,
     )
 
 
-def _set(best: PartSet | None) -> Markup:
+def _build_set_card(best: PartSet | None) -> Markup:
     if best is None:
-        return page.refused("No set of parts can be recommended.")
-    saved = tag(
+        return page.build_refusal("No set of parts can be recommended.")
+    saved = make_element(
         "span",
-        tag("i", "saves about"),
+        make_element("i", "saves about"),
         f"{best.saving:.0%}",
-        tag("i", " of the processor time"),
+        make_element("i", " of the processor time"),
     )
-    listed = tag("p", f"parts {parts.ranges(best.parts)}")
-    return tag(
+    listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
+    return make_element(
         "div",
-        tag("h2", parts.set_name(best)),
-        tag("div", saved, class_="times"),
+        make_element("h2", parts.name_set(best)),
+        make_element("div", saved, class_="times"),
         listed,
         class_="card chosen",
     )
 
 
-def drive_page(found: Driven, command: Sequence[str]) -> str:
+def drive_page(answer: Driven, command: Sequence[str]) -> str:
     """Write the page of ``drive``; ``command`` are the arguments that repeat the run."""
     from d2rpick.histories.names import Selection
 
-    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
-    switched = [one for one in found.windows if not one.reason]
+    history = answer.run.history(Selection(parts=tuple(map(str, answer.deck.parts))))
+    switched = [window for window in answer.windows if not window.reason]
     contacts = (
-        "none to the end" if one.contact is None else f"{one.contact:.6g}"
-        for one in switched
+        "none to the end" if window.contact is None else f"{window.contact:.6g}"
+        for window in switched
     )
     cards = [
-        page.pair(
+        page.build_pair_card(
             f"Window {number}",
-            (one.tr, one.td),
-            pairs([("contact", text)]),
+            (window.tr, window.td),
+            build_pairs([("contact", text)]),
             history,
             "card chosen",
         )
-        for number, (one, text) in enumerate(
+        for number, (window, text) in enumerate(
             zip(switched, contacts, strict=True), start=1
         )
     ]
-    cards = cards or [tag("p", "No flight was switched.")]
+    cards = cards or [make_element("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights, rigid = (
-        [(one.free, one.contact or one.td) for one in switched],
-        [(one.tr, one.td) for one in switched],
-    )
-    return document(
-        f"First run: {found.deck.name}",
-        page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
-        _figures("driven-", caption, "run", history, flights, rigid),
-        section("Evidence", table("Windows", *drive.windows(found))),
-        section("Cost", table("Legs", *drive.legs(found))),
-        section("What was read", pairs(page.digests(found.run.files))),
-        page.repeated(command),
+    flights = [(window.free, window.contact or window.td) for window in switched]
+    rigid = [(window.tr, window.td) for window in switched]
+    return build_document(
+        f"First run: {answer.deck.name}",
+        page.build_front(
+            cards,
+            build_remarks(answer.cautions),
+            build_pairs(drive.list_savings(answer)),
+        ),
+        _build_figure("driven-", caption, "run", history, flights, rigid),
+        build_section(
+            "Evidence",
+            build_scrolling_table("Windows", *drive.list_window_rows(answer)),
+        ),
+        build_section(
+            "Cost", build_scrolling_table("Legs", *drive.list_leg_rows(answer))
+        ),
+        build_section(
+            "What was read", build_pairs(page.list_digests(answer.run.files))
+        ),
+        page.build_command(command),
         signed=page.CHECKED,
     )
 
 
-# Of a table in a notebook.
-_FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
-# What is said, the shortest first, and the head and rows of the table.
+# For each kind of answer: sentences, the shortest first, and the head and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        overview.verdict,
-        lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
+        overview.list_verdict_lines,
+        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
     ),
-    "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
+    "suggestion": (
+        suggestion.list_verdict,
+        lambda answer: suggestion.build_candidate_table(answer, _FEW_ROWS),
+    ),
     "verdict": (
-        verdict.verdict,
-        lambda one: (("measure", "value"), verdict.measured(one)),
+        verdict.list_pair_verdict,
+        lambda answer: (("measure", "value"), verdict.list_known_measures(answer)),
     ),
     "trade_off": (
-        lambda one: [("", trade_off.answer(one))],
-        lambda one: trade_off.table(trade_off.some_of(one, _FEW_ROWS)),
+        lambda answer: [("", trade_off.give_answer(answer))],
+        lambda answer: trade_off.build_offer_table(
+            trade_off.select_offers(answer, _FEW_ROWS)
+        ),
     ),
-    "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
+    "plan": (
+        lambda answer: [
+            ("", plan.give_plan_sentence(answer)),
+            *plan.list_plan_remarks(answer),
+        ],
+        plan.build_flight_table,
+    ),
     "parts": (
-        parts.verdict_on_set,
-        lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
+        parts.list_verdict_on_set,
+        lambda answer: parts.build_part_table(
+            answer, next(iter(parts.TABLES.values()))
+        ),
     ),
-    "study": (study.outcome, study.table),
+    "study": (study.list_outcome, study.build_run_table),
 }
 
 
-def sentence(kind: str, answer: Any) -> str:
-    """Say an answer in short."""
+def give_sentence(kind: str, answer: Any) -> str:
+    """Return an answer in one sentence."""
     return ": ".join(filter(None, _LOOKS[kind][0](answer)[0]))
 
 
-def of_run(run: Run) -> str:
-    """Say what a run is in short: files, format, states, times, parts, as far as its files can be read."""
+def describe_run(run: OpenedRun) -> str:
+    """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
-    told = [" + ".join(one.format for one in run.databases)]
+    facts = [" + ".join(database.format for database in run.databases)]
     if time is not None and time.size:
-        told += [
+        facts += [
             f"{time.size} states",
             f"{time[0]:.6g} to {time[-1]:.6g} {first.time_unit}".rstrip(),
         ]
-    told += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
-    return f"{', '.join(map(repr, run.sources))}: {', '.join(told)}"
+    facts += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
+    return f"{', '.join(map(repr, run.sources))}: {', '.join(facts)}"
 
 
-def glance(kind: str, answer: Any, figure: Figure | None) -> str:
-    """Show an answer, or the overview of a run, as HTML; columns in which nothing is known are left out."""
-    said, table = _LOOKS[kind]
-    lines = [tag("div", tag("b", name), f" {text}") for name, text in said(answer)]
+def show_at_a_glance(kind: str, answer: Any, figure: Figure | None) -> str:
+    """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
+    give_sentences, table = _LOOKS[kind]
+    lines = [
+        make_element("div", make_element("b", name), f" {text}")
+        for name, text in give_sentences(answer)
+    ]
     head, rows = table(answer)
-    lines += [grid(*known(head, rows[:_FEW_ROWS]))] if rows else []
+    lines += [build_grid(*select_known_columns(head, rows[:_FEW_ROWS]))] if rows else []
     lines += (
-        [tag("div", f"... and {len(rows) - _FEW_ROWS} more")]
+        [make_element("div", f"... and {len(rows) - _FEW_ROWS} more")]
         if len(rows) > _FEW_ROWS
         else []
     )
-    return tag("div", *lines, *([_picture(figure)] if figure else []))
+    return make_element("div", *lines, *([_build_picture(figure)] if figure else []))
 
 
-def _picture(figure: Figure) -> Markup:
-    from d2rpick.report.figures import svg_element
+def _build_picture(figure: Figure) -> Markup:
+    from d2rpick.report.figures import render_svg_element
 
-    return tag("div", Markup(svg_element(figure, "glance-")), style=_WIDEST)
+    return make_element(
+        "div", Markup(render_svg_element(figure, "glance-")), style=_WIDEST
+    )
 
 
-def _told(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
-    """Leave out what is not known."""
+def _select_known_facts(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
+    """Return only the facts whose values are known."""
     return [fact for fact in facts if fact[1] is not None]

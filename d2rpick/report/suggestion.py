@@ -1,4 +1,4 @@
-"""The answer of ``suggest`` as table, JSON, CSV, Markdown and bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
 
 from __future__ import annotations
 
@@ -9,53 +9,65 @@ from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
-    accuracy,
-    headed,
-    in_short,
-    rigid_for,
-    saving,
-    statements,
+    format_accuracy,
+    format_in_short,
+    format_rigid_time,
+    format_saving,
+    list_statements,
+    list_verdict_lines,
 )
-from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
-from d2rpick.report.situation import heading
+from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow, Suggestion
+    from d2rpick.choice.answers import AcceptableWindow, PairSuggestion
     from d2rpick.choice.candidates import Candidate, Pair
     from d2rpick.choice.decision import Decision
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
-# Windows of acceptable tr that a line names.
+# largest number of windows of acceptable tr that a line names
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
 )
-# A candidate, and the decision on it.
+# a candidate and the decision on it
 CANDIDATE: Final = row(
-    *keys.CANDIDATE.of_part(lambda one: one[0]),
-    keys.MATCHES._replace(get=lambda one: one[0].parts),
-    *keys.DECIDED.of_part(lambda one: one[1], ("verdict", "verdict_reason", "cure")),
+    *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
+    keys.MATCHES._replace(
+        get=lambda candidate_and_decision: candidate_and_decision[0].parts
+    ),
+    *keys.DECIDED.of_part(
+        lambda candidate_and_decision: candidate_and_decision[1],
+        ("verdict", "verdict_reason", "cure"),
+    ),
     name="candidate",
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
+# Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
+_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
+_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
-def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
-    """Give the candidates, each with the decision on it."""
-    return [(one, answer.decision_on(one)) for one in answer.candidates]
+
+def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
+    """Return each candidate with the decision on it."""
+    return [
+        (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
+    ]
 
 
-def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
-    """Give the windows of acceptable tr, and which of them holds the recommended one."""
+def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | None:
+    """Return the windows of acceptable tr, and which of them contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
-    return (
-        None
-        if windows is None
-        else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
-    )
+    if windows is None:
+        return None
+    return [
+        {**window._asdict(), "recommended": has_recommended_tr(window, tr)}
+        for window in windows
+    ]
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -67,9 +79,9 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
           "the longest acceptable pair in td_window, where much rigid time was given up for quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
-    Field("candidates", many(CANDIDATE), get=_decided),
+    Field("candidates", many(CANDIDATE), get=_add_decisions),
     Field("acceptable_windows", maybe(many(_WINDOW)),
-          "on basis energy: windows in which every tr is acceptable, null on another basis", _windows),
+          "on basis energy: windows in which every tr is acceptable, null on another basis", _list_acceptable_windows),
     Field("recommended", maybe(keys.TIMES)),
     *keys.QUALITY,
     keys.HEALTH,
@@ -81,86 +93,104 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 ))  # fmt: skip
 
 
-# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
-_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
+    """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
 
-
-def as_table(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, what it rests on, and the first candidates; the recommended row has a star.
-
-    Where nothing is recommended the candidates stand there only if all is asked for.
+    If nothing is recommended, candidates are listed only if all details are asked for.
     """
-    above = heading(answer.situation, verbose=shown.verbose)
+    above = list_situation_heading(answer.situation, verbose=display.verbose)
     lines = [
-        *tables.in_line((*verdict(answer), *next_step(answer))),
+        *tables.format_in_line((*list_verdict(answer), *list_next_step(answer))),
         "",
-        *tables.in_line((*facts(answer), *outlook(answer), *above)),
+        *tables.format_in_line(
+            (*list_evidence(answer), *list_alternatives(answer), *above)
+        ),
     ]
-    if answer.candidates and (answer.recommended or shown.verbose):
-        lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]
-        left = len(answer.candidates) - shown.limit
-        lines += [f"... and {left} more (--limit)"] * (left > 0)
+    if answer.candidates and (answer.recommended or display.verbose):
+        lines += [
+            "",
+            tables.as_text(
+                *_select_shown_candidates(answer, display), display.width, _SPARE
+            ),
+        ]
+        hidden_count = len(answer.candidates) - display.limit
+        lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
     return "\n".join(lines)
 
 
-def as_markdown(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, the candidates as a Markdown table, and below it what the verdict rests on."""
-    above = tables.listed((*verdict(answer), *next_step(answer)))
-    below = tables.listed((*facts(answer), *outlook(answer)))
-    table = tables.as_markdown(*_some(answer, shown))
+def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
+    """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
+    above = tables.format_as_list((*list_verdict(answer), *list_next_step(answer)))
+    below = tables.format_as_list((*list_evidence(answer), *list_alternatives(answer)))
+    table = tables.as_markdown(*_select_shown_candidates(answer, display))
     return "\n\n".join([*above, table, *below])
 
 
-def _some(
-    answer: Suggestion, shown: Shown
+def _select_shown_candidates(
+    answer: PairSuggestion, display: DisplayOptions
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the first candidates, in the columns that hold something."""
-    head, rows = tables.known(*table(answer, shown.limit))
-    kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
-    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    """Return the first candidates, without empty columns."""
+    head, rows = tables.select_known_columns(
+        *build_candidate_table(answer, display.limit)
+    )
+    shown_columns = [
+        i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
+    ]
+    return [head[i] for i in shown_columns], [
+        [row[i] for i in shown_columns] for row in rows
+    ]
 
 
-def as_csv(answer: Suggestion, _: Shown) -> str:
-    """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
+def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
+    """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
-    return csv_of(
-        columns, ({**CANDIDATE.plain(one), "td": td} for one in _decided(answer))
+    return write_csv(
+        columns,
+        (
+            {**CANDIDATE.plain(candidate), "td": td}
+            for candidate in _add_decisions(answer)
+        ),
     )
 
 
-def verdict(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to do with the recommended pair, why, and what comes after td; a name and a sentence each."""
-    best, decision, better = answer.chosen, answer.decision, answer.clearly_better
+def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
+    """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
+    best = answer.chosen
+    decision = answer.decision
+    better = answer.clearly_better
     lines = [("no pair to use", answer.why_none)]
     if best and decision:
-        lines = headed(decision, best.tr, answer.td)
+        lines = list_verdict_lines(decision, best.tr, answer.td)
     if better and not (decision and decision.better):
         lines.append(
-            ("better pair", f"{_times(better)}: {better_about(answer, better)}")
+            (
+                "better pair",
+                f"{_format_times(better)}: {describe_improvement(answer, better)}",
+            )
         )
     return lines
 
 
-def facts(answer: Suggestion) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
-    best, decision = answer.chosen, answer.decision
+def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
         return []
-    lines = [*statements(decision), ("rigid for", rigid_for(best))]
-    if saves := saving(best):
+    lines = [*list_statements(decision), ("rigid for", format_rigid_time(best))]
+    if saves := format_saving(best):
         lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
         lines.append(("keeps", "no switch keeps this vibration"))
-    if exact := accuracy(best):
+    if exact := format_accuracy(best):
         lines.append(("tr", exact))
     return lines
 
 
-def next_step(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to type next: for a pair that can be used."""
+def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
+    """Return the next command for a pair that can be used."""
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
         return []
@@ -172,41 +202,47 @@ def next_step(answer: Suggestion) -> list[tuple[str, str]]:
     ]
 
 
-def better_about(answer: Suggestion, better: Pair) -> str:
-    """What is better about the better pair."""
-    own = answer.recommended
-    if own is None:
+def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
+    """Return in which respect the better pair is better."""
+    recommended = answer.recommended
+    if recommended is None:
         return "there an acceptable tr exists"
-    if better.residual is not None and own.residual is not None:
-        return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
-    level, here = (
-        answer.situation.vibration.whole.energy(better.td),
-        answer.situation.energy_td,
-    )
-    return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
+    if better.residual is not None and recommended.residual is not None:
+        residuals = [
+            tables.format_measure(pair.residual) for pair in (better, recommended)
+        ]
+        return f"residual {residuals[0]} instead of {residuals[1]}"
+    level = answer.situation.vibration.whole.energy(better.td)
+    own_level = answer.situation.energy_td
+    return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
 
 
-def outlook(answer: Suggestion) -> list[tuple[str, str]]:
-    """What else there is to choose from; a name and a sentence each."""
+def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
+    """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
-    lines = (
-        [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
-    )
+    if answer.windows:
+        lines = [("acceptable", describe_acceptable_windows(answer.windows, chosen))]
+    else:
+        lines = []
     best = answer.chosen
     if best and best.position_error is not None:
         lines.append(
             (
                 "position",
-                position(best, deck=answer.situation.settings.bodies is not None),
+                describe_position_error(
+                    best, deck=answer.situation.settings.bodies is not None
+                ),
             )
         )
     if answer.longer and answer.recommended:
-        lines.append(("longer", given_up(answer.longer, answer.recommended)))
+        lines.append(
+            ("longer", describe_given_up_time(answer.longer, answer.recommended))
+        )
     return lines
 
 
-def position(best: Candidate, *, deck: bool) -> str:
-    """How far a body is out of place at td, why, and what that takes for granted, with a ``deck`` or without."""
+def describe_position_error(best: Candidate, *, deck: bool) -> str:
+    """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` tells which do)" if taken and not deck else ""
@@ -214,75 +250,94 @@ def position(best: Candidate, *, deck: bool) -> str:
         return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
-    least = "at least " if best.position_error_is_lower_bound else ""
-    return f"off by {least}{best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    bound_text = "at least " if best.position_error_is_lower_bound else ""
+    size = f"{bound_text}{best.position_error:.2g}"
+    return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
-def given_up(longer: Pair, chosen: Pair) -> str:
-    """How much rigid time was given up for a better level or residual, and for which."""
-    what = (
-        "a lower level at td"
-        if longer.residual is None
-        else f"residual {tables.measure(longer.residual)}"
-    )
+def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
+    """Return how much rigid time was given up for a better level or residual, and how much better it is."""
+    if longer.residual is None:
+        better_quality = "a lower level at td"
+    else:
+        better_quality = f"residual {tables.format_measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
+    return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
-def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
-    """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
-    share = sum(one.share for one in windows)
+def describe_acceptable_windows(
+    windows: Sequence[AcceptableWindow], tr: float | None
+) -> str:
+    """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
+    share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[
-        :_NAMED
+    named_windows = sorted(
+        windows,
+        key=lambda window: (
+            not has_recommended_tr(window, tr),
+            window.start - window.end,
+        ),
+    )[:_NAMED]
+    window_texts = [
+        f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * has_recommended_tr(w, tr)})"
+        for w in named_windows
     ]
-    shown = [
-        f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
-        for w in named
-    ]
-    more = (
-        f" and {len(windows) - len(named)} shorter windows"
-        if len(windows) > len(named)
-        else ""
-    )
-    return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
+    if len(windows) > len(named_windows):
+        shorter_text = f" and {len(windows) - len(named_windows)} shorter windows"
+    else:
+        shorter_text = ""
+    return f"every tr from {'; '.join(window_texts)}{shorter_text}; in all {share:.0%} of the flight up to td"
 
 
-def holds(window: AcceptableWindow, tr: float | None) -> bool:
-    """Whether the recommended tr lies in a window."""
+def has_recommended_tr(window: AcceptableWindow, tr: float | None) -> bool:
+    """Return True if the recommended tr lies in the window."""
     return tr is not None and window.start <= tr <= window.end
 
 
-def as_value(answer: Suggestion, _: Shown) -> str:
-    """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
+def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
+    """Return the recommended tr, and td if it was chosen too, with the fewest digits that give the same number.
+
+    Without a recommendation the text is empty.
+    """
     pair = answer.recommended
     if pair is None:
         return ""
     return f"{pair.tr!r} {pair.td!r}" if answer.td_window else repr(pair.tr)
 
 
-def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the first ``limit`` candidates."""
+def build_candidate_table(
+    answer: PairSuggestion, limit: int
+) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Return the column names and cells of the first ``limit`` candidates."""
     columns: dict[str, Callable[[Candidate], tables.Cell]] = {
         "": lambda c: "*" if c.recommended else " ",
         "rank": lambda c: c.rank,
         "tr": lambda c: c.tr,
-        "+-": lambda c: tables.half(c.tr_low, c.tr_high),
+        "+-": lambda c: tables.format_half_width(c.tr_low, c.tr_high),
         "kind": lambda c: c.kind,
         "E(tr)/E(td)": lambda c: c.level_ratio,
         "direction": lambda c: {True: "same", False: "opposite", None: None}[
             c.sign_match
         ],
-        "lock-in error": lambda c: tables.measure(c.lock_in_error),
-        "residual": lambda c: tables.measure(c.residual),
-        "timing tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
+        "lock-in error": lambda c: tables.format_measure(c.lock_in_error),
+        "residual": lambda c: tables.format_measure(c.residual),
+        "timing tolerance": lambda c: tables.format_if_known(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,
-        "verdict": lambda c: in_short(answer.decision_on(c)),
+        "verdict": lambda c: _shorten_verdict(answer, c),
     }
-    return tables.filled(columns, answer.candidates[:limit])
+    return tables.fill_table(columns, answer.candidates[:limit])
 
 
-def _times(pair: Pair) -> str:
+def _shorten_verdict(answer: PairSuggestion, candidate: Candidate) -> str:
+    """Return the verdict on a candidate with its reason, unless the lines above the table give the same reason."""
+    decision = answer.decision_on(candidate)
+    answered = answer.decision
+    if answered is not None and decision.reason == answered.reason:
+        return decision.verdict
+    return format_in_short(decision)
+
+
+def _format_times(pair: Pair) -> str:
     return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"

@@ -1,4 +1,4 @@
-"""The answer of ``verify`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``verify`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -6,16 +6,22 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import accuracy, headed, rigid_for, saved, statements
-from d2rpick.report.fields import Document, Field, kind_of, maybe, row
-from d2rpick.report.situation import heading
+from d2rpick.report.decision import (
+    format_accuracy,
+    format_rigid_time,
+    format_saved_share,
+    list_statements,
+    list_verdict_lines,
+)
+from d2rpick.report.fields import Document, Field, get_kind, maybe, row
+from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
-    from d2rpick.choice.answers import Verdict
+    from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
-# The pair that was judged, its measures and what they come to.
+# the judged pair, its measures and the verdict
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -29,14 +35,14 @@ MEASURES: Final = row(
     ),
 )
 SWITCHED: Final = row(
-    Field("source", kind_of("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1)),
     Field("energy_frozen", "number", "came back at td"),
     Field("energy_td", "number", "of the reference at td"),
     Field("level_ratio", "number?", "energy_frozen over energy_td"),
     Field("end", "number", "compared from td to here"),
     Field("mean_after", "number"), Field("mean_after_reference", "number"),
-    Field("spread_after", kind_of("number", minimum=0), "standard deviation"),
-    Field("spread_after_reference", kind_of("number", minimum=0)),
+    Field("spread_after", get_kind("number", minimum=0), "standard deviation"),
+    Field("spread_after_reference", get_kind("number", minimum=0)),
     Field("momentum_error", "size?",
           "largest deviation after td relative to the largest momentum of the reference there"),
     Field("displacement", "size?", "largest distance of the parts' centre from where the reference has it"),
@@ -59,78 +65,85 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
 COMPARED = ("", "switched", "reference")
 
 
-def as_table(answer: Verdict, shown: Shown) -> str:
-    """The verdict, why, and what would be better; then what it rests on, and the measures of the pair."""
+def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
+    """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
     decided = answer.decision.reason
-    remarks = [("note", what) for what in answer.reasons if what not in decided]
-    above = heading(answer.situation, verbose=shown.verbose)
-    lines = tables.in_line(verdict(answer))
+    remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
+    above = list_situation_heading(answer.situation, verbose=display.verbose)
+    lines = tables.format_in_line(list_pair_verdict(answer))
     if answer.switched:
-        lines += ["", *_comparison(answer.switched)]
-    listed = [*facts(answer), *above, *remarks]
-    said = [(name, make_printable(text)) for name, text in listed]
+        lines += ["", *_format_comparison(answer.switched)]
+    listed = [*list_pair_evidence(answer), *above, *remarks]
+    printable = [(name, make_printable(text)) for name, text in listed]
     return "\n".join(
-        [*lines, "", *tables.in_line(said), "", *tables.in_line(measured(answer))]
+        [
+            *lines,
+            "",
+            *tables.format_in_line(printable),
+            "",
+            *tables.format_in_line(list_known_measures(answer)),
+        ]
     )
 
 
-def verdict(answer: Verdict) -> list[tuple[str, str]]:
-    """What to do with the pair, why, and what would be better; a name and a sentence each."""
-    return headed(answer.decision, answer.candidate.tr, answer.td)
+def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
+    """Return what to do with the pair, why, and what would be better, as pairs of a name and a sentence."""
+    return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
 
 
-def facts(answer: Verdict) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.candidate
-    lines = [*statements(answer.decision), ("rigid for", rigid_for(best))]
+    lines = [*list_statements(answer.decision), ("rigid for", format_rigid_time(best))]
     if best.run_time_share is not None:
-        lines.append(("saves", saved(best.run_time_share)))
-    if exact := accuracy(best):
+        lines.append(("saves", format_saved_share(best.run_time_share)))
+    if exact := format_accuracy(best):
         lines.append(("tr", exact))
     return lines
 
 
-def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
-    """The measures of the pair by names for people, without those that are not known."""
+def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
+    """Return the known measures of the pair with their names for people."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
-    found: list[tuple[str, tables.Cell]] = [
+    rows: list[tuple[str, tables.Cell]] = [
         ("energy at tr", best.energy),
         ("energy at td", answer.energy_td),
         ("energy at tr / at td", best.level_ratio),
-        ("level error", tables.shown(best.level_error, ".3f")),
+        ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
-        ("kinetic fraction at td", tables.shown(answer.kinetic_share, ".3f")),
-        ("lock-in error", tables.shown(best.lock_in_error, ".3f")),
-        ("residual, expected", tables.shown(best.residual, ".3f")),
-        ("residual, lowest", tables.shown(best.residual_low, ".3f")),
-        ("residual, highest", tables.shown(best.residual_high, ".3f")),
-        ("mismatch of the parts", tables.shown(best.part_mismatch, ".3f")),
+        ("kinetic fraction at td", tables.format_if_known(answer.kinetic_share, ".3f")),
+        ("lock-in error", tables.format_if_known(best.lock_in_error, ".3f")),
+        ("residual, expected", tables.format_if_known(best.residual, ".3f")),
+        ("residual, lowest", tables.format_if_known(best.residual_low, ".3f")),
+        ("residual, highest", tables.format_if_known(best.residual_high, ".3f")),
+        ("mismatch of the parts", tables.format_if_known(best.part_mismatch, ".3f")),
         ("timing tolerance", best.timing_tolerance),
         ("position error", best.position_error),
     ]
-    return [one for one in found if one[1] is not None]
+    return [row for row in rows if row[1] is not None]
 
 
-def as_markdown(answer: Verdict, _: Shown) -> str:
-    """The verdict, and the measures as a Markdown table of two columns."""
-    said = tables.listed((*verdict(answer), *facts(answer)))
-    table = tables.as_markdown(("measure", "value"), measured(answer))
-    switched = answer.switched
-    compared = (
-        [
-            tables.as_markdown(COMPARED, comparison(switched)),
-            *tables.listed(deviations(switched)),
-        ]
-        if switched
-        else []
+def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
+    """Return the verdict, and the measures as a Markdown table of two columns."""
+    paragraphs = tables.format_as_list(
+        (*list_pair_verdict(answer), *list_pair_evidence(answer))
     )
-    reasons = [f"* {tables.in_markdown(reason)}" for reason in answer.reasons]
-    return "\n\n".join([*said, table, *compared, *reasons])
+    table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
+    switched = answer.switched
+    if switched:
+        compared = [
+            tables.as_markdown(COMPARED, compare_values(switched)),
+            *tables.format_as_list(list_deviations(switched)),
+        ]
+    else:
+        compared = []
+    reasons = [f"* {tables.escape_markdown(reason)}" for reason in answer.reasons]
+    return "\n\n".join([*paragraphs, table, *compared, *reasons])
 
 
-def measures(answer: Verdict) -> dict[str, Any]:
-    """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
+def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
+    """Return each measure by its key, those of a switched run with the prefix ``switched_``; reasons are one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -140,21 +153,21 @@ def measures(answer: Verdict) -> dict[str, Any]:
     decided = {field.key: field.of(answer) for field in keys.DECISION}
     return {
         **measured,
-        **_of_switched(answer),
+        **_list_switched_measures(answer),
         **decided,
         "quality": answer.decision.grade,
         "reasons": "; ".join(answer.reasons),
     }
 
 
-def as_csv(answer: Verdict, _: Shown) -> str:
-    """One row, a column for each key of `measures`."""
-    found = measures(answer)
-    return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
+def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
+    """Return one row of CSV with a column for each key of `measures`."""
+    values = list_all_measures(answer)
+    return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
 
-def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Rows of numbers that both runs have, below ``COMPARED``."""
+def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
+    """Return the numbers that both runs have as rows of name, reference and switched run, below `COMPARED`."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
@@ -166,40 +179,40 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
     ]
 
 
-def deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """How far the switched run moves off the reference after td."""
-    error, displacement = switched.momentum_error, switched.displacement
-    off = (
-        []
-        if error is None
-        else [("largest error of the momentum after td", f"{error:.2g} of its maximum")]
-    )
-    return (
-        off
-        if displacement is None
-        else [*off, ("largest displacement after td", f"{displacement:.3g}")]
-    )
+def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
+    """Return how far the switched run deviates from the reference after td, as pairs of a name and a text."""
+    error = switched.momentum_error
+    displacement = switched.displacement
+    if error is None:
+        rows = []
+    else:
+        rows = [
+            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+        ]
+    if displacement is None:
+        return rows
+    return [*rows, ("largest displacement after td", f"{displacement:.3g}")]
 
 
-def _comparison(switched: Comparison) -> list[str]:
-    """Lines that hold the switched run against the reference."""
+def _format_comparison(switched: Comparison) -> list[str]:
+    """Return the lines that compare the switched run with the reference."""
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
-        tables.as_text(COMPARED, comparison(switched)),
-        *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
+        tables.as_text(COMPARED, compare_values(switched)),
+        *(f"{name.ljust(38)}  {text}" for name, text in list_deviations(switched)),
         *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
 
 
-def _of_switched(answer: Verdict) -> dict[str, Any]:
-    """Measures of the switched run under names of their own; empty where there is none."""
-    found = SWITCHED.plain(answer.switched) if answer.switched else {}
-    found = {
+def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
+    """Return the measures of the switched run under their own names, empty without a switched run."""
+    values = SWITCHED.plain(answer.switched) if answer.switched else {}
+    values = {
         name: "; ".join(value) if name == "objections" else value
-        for name, value in found.items()
+        for name, value in values.items()
     }
     return {
         f"switched_{name}": value
-        for name, value in found.items()
+        for name, value in values.items()
         if name not in ("source", "notes")
     }

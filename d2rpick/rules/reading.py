@@ -223,7 +223,7 @@ def _check_parameters(case: Case) -> Iterator[Objection]:
             differing = [
                 later
                 for later in later_definitions
-                if later and first and later.value != first.value
+                if first and later.value != first.value
             ]
             if first and differing and (card, name) not in reported:
                 reported.add((card, name))

@@ -231,7 +231,7 @@ class Solver:
                 os.killpg(int(text), sign)
             begun = time.monotonic()
             with suppress(KeyboardInterrupt):  # pressed again
-                while self.alive and time.monotonic() - begun < _TIME_TO_STOP:
+                while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:

@@ -1,6 +1,6 @@
 """Print the cards of a first run that switches itself: without a reference, the solver sees flights by contact forces.
 
-Radioss: legs that sensors end by /STOP/LSENSOR (tried with OpenRadioss; see docs/first-run.md).  LS-DYNA: a pair of
+Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
 """
 

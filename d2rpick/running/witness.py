@@ -2,7 +2,7 @@
 
 From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
 momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
-since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/first-run.md, "The wait").
+since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
 The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
 past the middle of the flight.
@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
 from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, find_farthest
-from d2rpick.running.record import Column
+from d2rpick.running.record import GrowingColumn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,7 +89,7 @@ class _SampledFall(FreeFall):
         return sampled._fitted(0, _MOST_COMPARED - 1)
 
 
-class Witness:
+class GrowingWitness:
     """Tells at each of its states since when no force has acted on some parts, or on the whole model.
 
     Attributes
@@ -113,7 +113,7 @@ class Witness:
         # For each state, whether the written digits are enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         names = ("time", "momentum", "contact", "alone")
-        self._columns = {name: Column() for name in names}
+        self._columns = {name: GrowingColumn() for name in names}
         self._tested_count = self._test_again_at = 0
 
     @property
@@ -190,7 +190,7 @@ class Witness:
     def look(
         self,
         needed: Needed,
-        find_gravity: Callable[[Witness, int, int], float | None],
+        find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
         """Add the flights that begin in the new states, and the ends of those that end in them.
 

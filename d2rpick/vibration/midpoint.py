@@ -12,7 +12,7 @@ energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr an
 
 exactly, whatever the damping of each mode, for the product of two cosines is half the sum of that of their sum, which
 is twice the angle halfway, and that of their difference.  V itself is the record.  The rest follows from its lines: a
-mode has one at twice its rate and twice its decay, with half of its h for an amplitude (docs/midpoint.md).
+mode has one at twice its rate and twice its decay, with half of its h for an amplitude (docs/explanation/midpoint.md).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.histories.digits import convert_to_unit, parse_seconds
-from tests.command import ENERGY, refused, run
+from tests.command import ENERGY, read_refusal, run
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
 
@@ -84,13 +84,13 @@ def test_a_study_takes_the_unit_that_all_its_runs_have(tmp_path: Path) -> None:
     in_seconds, in_milliseconds = (written_in(tmp_path, unit) for unit in ("s", "ms"))
     typed = answered("study", "--td", "64ms", in_seconds)
     assert typed == answered("study", "--td", "0.064", in_seconds)
-    line = refused("study", "--td", "64ms", in_seconds, in_milliseconds)
+    line = read_refusal("study", "--td", "64ms", in_seconds, in_milliseconds)
     assert "give 0.064 if it is s, 64 if it is ms" in line
 
 
 def test_limits_hold_for_a_time_with_its_unit(tmp_path: Path) -> None:
     name = written_in(tmp_path, "ms")
-    line = refused("suggest", "--td", "64ms", "--margin=-1ms", name)
+    line = read_refusal("suggest", "--td", "64ms", "--margin=-1ms", name)
     assert "--margin" in line
     assert "-1.0 was found, a number of at least 0 was expected" in line
 
@@ -104,7 +104,7 @@ def test_limits_hold_for_a_time_with_its_unit(tmp_path: Path) -> None:
     ],
 )
 def test_without_a_unit_of_the_record_the_number_to_give_is_named(words: str) -> None:
-    line = refused(*words.split())
+    line = read_refusal(*words.split())
     assert "the unit of time is not known from" in line
     assert "if it is s, " in line
     assert "if it is ms" in line
@@ -114,7 +114,7 @@ def test_without_a_unit_of_the_record_the_number_to_give_is_named(words: str) ->
     "typed", ["64mm", "ms", "64ms2", "6,4ms", "0x4s", "64 m s", "nan s"]
 )
 def test_what_is_no_time_is_refused(tmp_path: Path, typed: str) -> None:
-    assert "is not a number" in refused(
+    assert "is not a number" in read_refusal(
         "suggest", "--td", typed, written_in(tmp_path, "s")
     )
 

@@ -15,7 +15,7 @@ from d2rpick.models.box_model import (
     build_structure,
     compute_stiffest_rate,
 )
-from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
+from d2rpick.models.box_motion import SLIP, BoxMotion, Contact, RigidPoints
 from d2rpick.models.box_run import (
     BOX,
     Record,
@@ -28,7 +28,7 @@ from d2rpick.models.box_run import (
     scan_times,
     simulate,
 )
-from tests.energies import sure
+from tests.energies import require
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 5e-4
@@ -36,7 +36,7 @@ ANGLES = st.floats(-np.pi, np.pi)
 TIMES = st.integers(0, 12).map(lambda count: count / 100)
 
 
-def momenta(motion: Motion) -> tuple[complex, float]:
+def momenta(motion: BoxMotion) -> tuple[complex, float]:
     """Return momentum and angular momentum about the origin of the whole model."""
     point_momenta = motion.structure.masses * motion.velocities
     return complex(point_momenta.sum()), float(
@@ -45,18 +45,18 @@ def momenta(motion: Motion) -> tuple[complex, float]:
 
 
 @cache
-def advance_to(time: float) -> Motion:
+def advance_to(time: float) -> BoxMotion:
     """Return a motion advanced to ``time``; it is cached and must not be changed."""
     motion = (
         advance_to(round(time - 0.01, 2)).copy()
         if time > 0
-        else Motion(COARSE, INTERVAL)
+        else BoxMotion(COARSE, INTERVAL)
     )
     run_to(motion, time)
     return motion
 
 
-def copy_at(time: float) -> Motion:
+def copy_at(time: float) -> BoxMotion:
     """Return a copy of a motion advanced to ``time``, a multiple of 0.01 s."""
     return advance_to(time).copy()
 
@@ -131,7 +131,7 @@ def test_a_free_fall_locks_in_nothing_and_moves_no_landing() -> None:
 def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
     window: tuple[float, float] | None, parameters: Parameters
 ) -> None:
-    motion = Motion(parameters, INTERVAL)
+    motion = BoxMotion(parameters, INTERVAL)
     linear, angular = momenta(motion)
     scale = motion.structure.masses.sum() * 7.0
     for count in range(motion.step_at(0.42)):
@@ -173,9 +173,9 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
         motion.box.internal_energy(motion.places),
         motion.box.forces(motion.places),
     )
-    turned = sure(motion.body).arms[0]
+    turned = require(motion.body).arms[0]
     run_to(motion, tr + rigid)
-    turned = sure(motion.body).arms[0] / turned
+    turned = require(motion.body).arms[0] / turned
     momenta_before = momenta(motion)
     motion.make_deformable()
     assert momenta(motion) == momenta_before
@@ -206,7 +206,7 @@ def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_els
         abs(np.vdot(motion.places[of_box], (masses * lost)[of_box]).imag)
         < 1e-9 * masses.sum()
     )
-    rigid = RigidBody(
+    rigid = RigidPoints(
         masses[of_box], motion.places[of_box], untouched.velocities[of_box]
     )
     np.testing.assert_allclose(motion.velocities[of_box], rigid.velocities)
@@ -314,7 +314,7 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
 
 def test_a_body_without_forces_moves_and_turns_evenly() -> None:
     masses, points = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
-    body = RigidBody(
+    body = RigidPoints(
         masses, points, np.asarray(2.0 + 1j * 3.0 * (points - 0.5), dtype=np.complex128)
     )
     spin, velocity, centre = body.spin, body.velocity, body.centre
@@ -334,7 +334,7 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
             structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0)
         )
         points = structure.places + 1j * (level - depth)
-        push = sure(
+        push = require(
             contact.push(
                 1.0,
                 points - 1.0 + p.speed * p.braking / 2,
@@ -441,7 +441,7 @@ def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
     base, weak = (
         simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7)
     )
-    before_landing = base.time < sure(base.landed)
+    before_landing = base.time < require(base.landed)
     np.testing.assert_array_equal(
         weak.internal_energy[before_landing], base.internal_energy[before_landing]
     )

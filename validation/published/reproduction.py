@@ -6,23 +6,29 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
-from d2rpick.report.fields import Document, Field, Kind, kind_of, many, one_of, row
-from d2rpick.report.figures import svg_element
-from d2rpick.report.page import Markup, document, section, table, tag
+from d2rpick.report.fields import Document, Field, Kind, get_kind, many, one_of, row
+from d2rpick.report.figures import render_svg_element
+from d2rpick.report.page import (
+    Markup,
+    build_document,
+    build_scrolling_table,
+    build_section,
+    make_element,
+)
 from validation.published.drawing import draw_exhibit
 from validation.published.exhibits import IN_PART, NO, NOTHING, VERDICTS, YES
 from validation.published.values import (
     MISPRINTS,
     MOST_DIFFERENCE,
     PUBLISHED,
-    pair_at_peak,
-    residual,
+    compute_residual,
+    find_pair_at_peak,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
     from validation.published.exhibits import Exhibit
     from validation.published.values import PublishedValue
 
@@ -63,13 +69,13 @@ class Reproduction(NamedTuple):
     @property
     def pairs(self) -> Sequence[str]:
         """How good the published and the better pair are, if the section that chooses them is asked for."""
-        return pairs_of() if self._has_section(_CHOICE) else ()
+        return describe_pairs() if self._has_section(_CHOICE) else ()
 
     def _has_section(self, section: int) -> bool:
         """Return True if figures of a section of the paper are in the answer."""
         return any(exhibit.section == section for exhibit in self.exhibits)
 
-    def values_of(self, exhibit: Exhibit) -> Sequence[PublishedValue]:
+    def list_values(self, exhibit: Exhibit) -> Sequence[PublishedValue]:
         """Return the values that belong to a figure; with several pictures of it, those of the first."""
         place = (exhibit.section, exhibit.figure)
         first = next(
@@ -80,7 +86,7 @@ class Reproduction(NamedTuple):
 
 _PAIR: Final = Kind(
     row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
-    lambda pair: {"tr": pair[0], "td": pair[1], "residual": residual(pair)},
+    lambda pair: {"tr": pair[0], "td": pair[1], "residual": compute_residual(pair)},
     "pair",
 )
 _ROW: Final = row(
@@ -89,14 +95,14 @@ _ROW: Final = row(
     Field("reference", "number?", "computed in another way, see source"),
     Field("here", "number"),
     Field("difference", "number", "here less published, or less reference where nothing is published"),
-    Field("tolerance", kind_of("number", minimum=0)),
+    Field("tolerance", get_kind("number", minimum=0)),
     Field("source", "text", "where the published number or the reference value is from"),
     Field("agrees", "flag", "the difference is within the tolerance"),
-    Field("section", kind_of("integer", minimum=1, maximum=5), "section of the paper", later=True),
+    Field("section", get_kind("integer", minimum=1, maximum=5), "section of the paper", later=True),
     Field("figure", "text", "number of the figure in the paper", later=True),
 )  # fmt: skip
 _FIGURE: Final = row(
-    Field("name", "text"), Field("title", "text"), Field("section", kind_of("integer", minimum=1, maximum=5)),
+    Field("name", "text"), Field("title", "text"), Field("section", get_kind("integer", minimum=1, maximum=5)),
     Field("figure", "text", "number in the paper"),
     Field("paper", "text", "what the paper shows"),
     Field("found", "text", "what is found here"),
@@ -110,7 +116,7 @@ DOCUMENT: Final = Document(
         keys.WARNINGS._replace(get=lambda _: ()),
         Field("rows", many(_ROW)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
-        Field("better", _PAIR, get=lambda _: pair_at_peak()),
+        Field("better", _PAIR, get=lambda _: find_pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
         Field("misprints", "texts"),
         Field("files", "texts"),
@@ -118,36 +124,38 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction, shown: Shown) -> str:
+def as_table(answer: Reproduction, shown: DisplayOptions) -> str:
     """Each figure with its verdict; then, in the order of the paper, what it shows, what is found here, the values."""
     overview = [
-        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
         for exhibit in answer.exhibits
     ]
     blocks = [tables.as_text(_OVERVIEW, overview, shown.width)]
     for exhibit in answer.exhibits:
         lines = [
-            f"{heading(exhibit)}: {exhibit.verdict}",
+            f"{write_heading(exhibit)}: {exhibit.verdict}",
             f"  paper  {exhibit.paper}",
             f"  here   {exhibit.found}",
         ]
-        if rows := answer.values_of(exhibit):
-            body = [cells(row)[:-1] for row in rows]
+        if rows := answer.list_values(exhibit):
+            body = [list_cells(row)[:-1] for row in rows]
             lines += ["", tables.as_text(_VALUES, body, shown.width)]
-            lines += [f"sources  {'; '.join(sources(rows))}"]
+            lines += [f"sources  {'; '.join(list_sources(rows))}"]
         blocks.append("\n".join(lines))
     if answer.pairs:
         blocks.append("\n".join(answer.pairs))
     if answer.misprints:
         listed = (f"  {misprint}" for misprint in answer.misprints)
         blocks.append("\n".join(["misprints in the paper", *listed]))
-    return tables.wrapped("\n\n".join(blocks), shown.width)
+    return tables.wrap_lines("\n\n".join(blocks), shown.width)
 
 
-def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
+def as_markdown(
+    answer: Reproduction, _: DisplayOptions, *, pictures: bool = False
+) -> str:
     """Give the same as Markdown, with the figures if ``pictures`` are in the same folder."""
     overview = [
-        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
         for exhibit in answer.exhibits
     ]
     blocks = [
@@ -158,14 +166,14 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
     for exhibit in answer.exhibits:
         picture = f"![{exhibit.title}]({exhibit.name}.svg)"
         blocks += [
-            f"## {heading(exhibit)}",
+            f"## {write_heading(exhibit)}",
             *((picture,) if pictures else ()),
             f"Paper: {exhibit.paper}",
             f"Here: {exhibit.found}",
             f"Agrees: {exhibit.verdict}.",
         ]
-        if rows := answer.values_of(exhibit):
-            blocks.append(tables.as_markdown(HEAD, [cells(row) for row in rows]))
+        if rows := answer.list_values(exhibit):
+            blocks.append(tables.as_markdown(HEAD, [list_cells(row) for row in rows]))
     blocks += answer.pairs
     if answer.misprints:
         listed = "\n".join(f"* {misprint}" for misprint in answer.misprints)
@@ -173,7 +181,7 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
     return "\n\n".join(blocks)
 
 
-def as_csv(answer: Reproduction, _: Shown) -> str:
+def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
     """Give the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
@@ -193,7 +201,7 @@ def as_csv(answer: Reproduction, _: Shown) -> str:
     return tables.as_csv(HEAD, body).rstrip("\n")
 
 
-def cells(row: PublishedValue) -> list[tables.Cell]:
+def list_cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
     known = (
         None if value is None else f"{round(value, _DECIMALS):.12g}"
@@ -208,50 +216,55 @@ def cells(row: PublishedValue) -> list[tables.Cell]:
     return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
 
 
-def place_of(exhibit: Exhibit) -> str:
+def name_place(exhibit: Exhibit) -> str:
     """Return the figure or the section of the paper."""
     is_section = exhibit.figure.startswith("section")
     return exhibit.figure if is_section else f"fig. {exhibit.figure}"
 
 
-def heading(exhibit: Exhibit) -> str:
+def write_heading(exhibit: Exhibit) -> str:
     """Give the figure of the paper and what it shows."""
-    place = place_of(exhibit)
+    place = name_place(exhibit)
     return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
 
 
-def sources(rows: Sequence[PublishedValue]) -> list[str]:
+def list_sources(rows: Sequence[PublishedValue]) -> list[str]:
     """Return the sources of some values, each once."""
     return [*dict.fromkeys(row.source for row in rows)]
 
 
-def pairs_of() -> list[str]:
+def describe_pairs() -> list[str]:
     """Say how good the published and the better pair are."""
     return [
-        f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {residual(pair):.3f}"
-        for name, pair in (("published", PUBLISHED), ("better", pair_at_peak()))
+        f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {compute_residual(pair):.3f}"
+        for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak()))
     ]
 
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     """Write the page: every figure with what the paper shows, what is found here, and its values."""
     overview = [
-        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
         for exhibit in answer.exhibits
     ]
-    pairs = tag("ul", *(tag("li", text) for text in answer.pairs))
-    misprints = tag("ul", *(tag("li", text) for text in answer.misprints))
-    return document(
+    pairs = make_element("ul", *(make_element("li", text) for text in answer.pairs))
+    misprints = make_element(
+        "ul", *(make_element("li", text) for text in answer.misprints)
+    )
+    return build_document(
         "Analysis of switched-rigid floating oscillator, reproduced",
-        tag(
+        make_element(
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
-        section("Overview", table("Figures of the paper", _OVERVIEW, overview)),
-        *(_exhibited(exhibit, answer) for exhibit in answer.exhibits),
-        section("Published and better pair", pairs) if answer.pairs else "",
-        section("Misprints in the paper", misprints) if answer.misprints else "",
-        page.repeated(command),
+        build_section(
+            "Overview",
+            build_scrolling_table("Figures of the paper", _OVERVIEW, overview),
+        ),
+        *(_show_exhibit(exhibit, answer) for exhibit in answer.exhibits),
+        build_section("Published and better pair", pairs) if answer.pairs else "",
+        build_section("Misprints in the paper", misprints) if answer.misprints else "",
+        page.build_command(command),
         signed=page.CHECKED,
     )
 
@@ -259,16 +272,20 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
 _CLASSES: Final = {YES: "good", IN_PART: "care", NO: "bad", NOTHING: "soft"}
 
 
-def _exhibited(exhibit: Exhibit, answer: Reproduction) -> Markup:
+def _show_exhibit(exhibit: Exhibit, answer: Reproduction) -> Markup:
     """Show a figure with the verdict on it and the values that belong to it."""
-    drawing = Markup(svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
-    rows = [cells(row) for row in answer.values_of(exhibit)]
-    verdict = tag("span", exhibit.verdict, class_=_CLASSES[exhibit.verdict])
-    return section(
-        heading(exhibit),
-        tag("figure", tag("div", drawing, role="img", aria_label=exhibit.title)),
-        tag("p", tag("b", "Paper: "), exhibit.paper),
-        tag("p", tag("b", "Here: "), exhibit.found),
-        tag("p", "Agrees: ", verdict),
-        table(f"Values of {place_of(exhibit)}", HEAD, rows) if rows else "",
+    drawing = Markup(render_svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
+    rows = [list_cells(row) for row in answer.list_values(exhibit)]
+    verdict = make_element("span", exhibit.verdict, class_=_CLASSES[exhibit.verdict])
+    return build_section(
+        write_heading(exhibit),
+        make_element(
+            "figure", make_element("div", drawing, role="img", aria_label=exhibit.title)
+        ),
+        make_element("p", make_element("b", "Paper: "), exhibit.paper),
+        make_element("p", make_element("b", "Here: "), exhibit.found),
+        make_element("p", "Agrees: ", verdict),
+        build_scrolling_table(f"Values of {name_place(exhibit)}", HEAD, rows)
+        if rows
+        else "",
     )
