@@ -210,7 +210,7 @@ def test_without_a_flight_nothing_can_be_explored_and_only_copying_has_a_script(
         "time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)),
     )
     page = read_page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
-    assert not page.scripts
+    assert page.scripts == [read_resource("copy.js")]
     assert not page.data
 
 
