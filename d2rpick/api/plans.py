@@ -108,7 +108,7 @@ def explore(
     td_window : (float, float), optional
         Where td is looked for [time].  Default: the longest flight; where none is seen but td is named, the record.
     steps : int
-        Number of evenly spaced td; peaks of the energy come on top.
+        Number of evenly spaced td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing
         As for `suggest`.
 

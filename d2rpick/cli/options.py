@@ -49,11 +49,11 @@ ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
-    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
-    "and which of them become one rigid body"
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): defines the cost of the parts, and "
+    "which of them become one rigid body"
 )
 DECK_OF_PARTS: Final = (
-    f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+    f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
 )
 # Sections of the help, after the options of a command that belong to no section.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -407,7 +407,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Say all that is known, and on stderr what was read and how long it took.",
+            "Print all details, and on stderr what was read and how long reading took.",
         ),
     )
 ]
