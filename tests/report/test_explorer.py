@@ -547,7 +547,16 @@ def test_each_flight_of_a_plan_can_be_explored(
         ).exit_code
         == 0
     )
-    page = write_page(tmp_path, "plan", "--no-verify", "--part", "box", motion)
+    page = write_page(
+        tmp_path,
+        "plan",
+        "--no-verify",
+        "--min-quality",
+        "poor",
+        "--part",
+        "box",
+        motion,
+    )
     browser.open(page)
     flights = read_content(page)["flights"]
     assert len(flights) > 1

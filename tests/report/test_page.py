@@ -157,7 +157,7 @@ def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(
 def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> None:
     arguments = ("--tr", "0.1", "--td", "0.2838", locate_stored("drop2T01.gz"))
     page = read_page_of(tmp_path, *arguments, command="verify")
-    assert "<dt>level error</dt><dd>0</dd>" in page.source
+    assert "<dt>level error</dt><dd>0.000</dd>" in page.source
     assert "<dt>energy ratio</dt>" not in page.source
     document = json.loads(page.data[0])["flights"][0]
     assert (document["log"], document["heights"][1] > 40) == (False, True)
