@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from d2rpick.api.drives import Drive
     from d2rpick.running.sequence import Leg, Window
 
+_MOST: Final = 1.03  # of the processor time of the reference, whatever a run does
+TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
+_AFTER: Final = 2e-4  # behind td the body is looked at [s]
+
 
 class Goal(NamedTuple):
     """At most: shift of a landing [s], place [m] and angle [degrees] of the body at td, share of the processor time.
@@ -53,14 +57,11 @@ class Goal(NamedTuple):
 
 _CAR: Final = Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.78, 2, 12)
 _BOX: Final = Goal(2e-3, 8e-3, np.inf, 0.70, 0.60, 3, 8)
-_MOST: Final = 1.03  # of the processor time of the reference, whatever a run does
 GOALS: Final = {
     name: _CAR if name.startswith("CAR") else _BOX
     for name in MODELS
     if name.startswith(("CAR", "DROP"))
 }
-TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
-_AFTER: Final = 2e-4  # behind td the body is looked at [s]
 
 
 def drive_model(name: str, folder: Path) -> Drive:

@@ -47,6 +47,84 @@ _PUSH_TIME: Final = 4e-3  # half a sine [s]
 _GAP: Final = 1e-3  # of the contact [m]
 _GROUND_SIDE: Final = 2.4  # [m]
 
+_HEAD: Final = f"""#RADIOSS STARTER
+/BEGIN
+{NAME}
+      2022         0
+                  kg                   m                   s
+                  kg                   m                   s
+/TITLE
+frame with heavy corners"""
+_PLASTIC: Final = """/MAT/PLAS_JOHNS/{number}
+{title}
+{density:20.10g}
+{modulus:20.10g}                 0.3         0
+{strength:20.10g}{hardening:20.10g}                 0.5                   0                   0
+                   0                   0         0         0                   0                   0
+                   0                   0                   0                   0"""
+_ELASTIC: Final = """/MAT/ELAST/{number}
+{title}
+{density:20.10g}
+{modulus:20.10g}                 0.3"""
+_MATERIALS: Final = "\n".join(
+    (
+        _PLASTIC.format(
+            number=1,
+            title="steel",
+            density=7850,
+            modulus=2.1e11,
+            strength=350e6,
+            hardening=5e8,
+        ),
+        _ELASTIC.format(number=2, title="dense", density=8e4, modulus=2.1e11),
+        _ELASTIC.format(number=3, title="ground", density=7850, modulus=2.1e11),
+    )
+)
+_BEAM: Final = """/PROP/BEAM/{number}
+beam
+                   0
+                   0                   0
+{area:20.10g}{bending:20.10g}{bending:20.10g}{torsion:20.10g}
+   000 000         0"""
+_SHELL: Final = """/PROP/SHELL/{number}
+shell
+{formulation:10d}         0         0         0                                       0
+                   0                   0                   0                   0                   0
+{layers:10d}         0{thickness:20.10g}                   0                   1         1"""
+# beams: a square tube of 35 x 2.5 mm
+_PROPERTIES: Final = "\n".join(
+    (
+        _BEAM.format(number=1, area=3.25e-4, bending=5.75e-8, torsion=8.6e-8),
+        _SHELL.format(number=2, formulation=24, layers=3, thickness=0.010),
+        _SHELL.format(number=3, formulation=24, layers=3, thickness=0.022),
+        _SHELL.format(number=4, formulation=24, layers=5, thickness=0.0012),
+        _SHELL.format(number=5, formulation=1, layers=1, thickness=0.010),
+    )
+)
+_START: Final = """/INIVEL/TRA/1
+thrown
+                   0                   0{speed:20.10g}         4         0
+/BCS/1
+ground fixed
+   111 111         0         2
+/RBODY/1
+frame
+{main:10d}         0         0         0                   0         1         0         0         0
+                   0                   0                   0
+                   0                   0                   0
+         0         0         0"""
+_CONTACT: Final = f"""/SURF/PART/1
+ground
+         5
+/INTER/TYPE7/1
+frame to ground
+         1         1         4         0         0                   0         0         0         0
+                   0                   0                   0
+                1000                   0                   0                   0         0         0
+                   1                 0.2{_GAP:20.3g}                   0                   0
+       000                             6                   0                   0                   0
+         0         0                   0         2         0         0                   0         0"""
+
 
 @dataclass(frozen=True)
 class Landing:
@@ -73,88 +151,6 @@ _PARTS: Final = (
     Part("ground", "SHELL", 5, 3),
 )
 _BEAMS, _PLATES, _HEAVY, _FEET, _GROUND = range(len(_PARTS))
-
-
-_HEAD: Final = f"""#RADIOSS STARTER
-/BEGIN
-{NAME}
-      2022         0
-                  kg                   m                   s
-                  kg                   m                   s
-/TITLE
-frame with heavy corners"""
-
-_PLASTIC: Final = """/MAT/PLAS_JOHNS/{number}
-{title}
-{density:20.10g}
-{modulus:20.10g}                 0.3         0
-{strength:20.10g}{hardening:20.10g}                 0.5                   0                   0
-                   0                   0         0         0                   0                   0
-                   0                   0                   0                   0"""
-_ELASTIC: Final = """/MAT/ELAST/{number}
-{title}
-{density:20.10g}
-{modulus:20.10g}                 0.3"""
-_MATERIALS: Final = "\n".join(
-    (
-        _PLASTIC.format(
-            number=1,
-            title="steel",
-            density=7850,
-            modulus=2.1e11,
-            strength=350e6,
-            hardening=5e8,
-        ),
-        _ELASTIC.format(number=2, title="dense", density=8e4, modulus=2.1e11),
-        _ELASTIC.format(number=3, title="ground", density=7850, modulus=2.1e11),
-    )
-)
-
-_BEAM: Final = """/PROP/BEAM/{number}
-beam
-                   0
-                   0                   0
-{area:20.10g}{bending:20.10g}{bending:20.10g}{torsion:20.10g}
-   000 000         0"""
-_SHELL: Final = """/PROP/SHELL/{number}
-shell
-{formulation:10d}         0         0         0                                       0
-                   0                   0                   0                   0                   0
-{layers:10d}         0{thickness:20.10g}                   0                   1         1"""
-# beams: a square tube of 35 x 2.5 mm
-_PROPERTIES: Final = "\n".join(
-    (
-        _BEAM.format(number=1, area=3.25e-4, bending=5.75e-8, torsion=8.6e-8),
-        _SHELL.format(number=2, formulation=24, layers=3, thickness=0.010),
-        _SHELL.format(number=3, formulation=24, layers=3, thickness=0.022),
-        _SHELL.format(number=4, formulation=24, layers=5, thickness=0.0012),
-        _SHELL.format(number=5, formulation=1, layers=1, thickness=0.010),
-    )
-)
-
-_START: Final = """/INIVEL/TRA/1
-thrown
-                   0                   0{speed:20.10g}         4         0
-/BCS/1
-ground fixed
-   111 111         0         2
-/RBODY/1
-frame
-{main:10d}         0         0         0                   0         1         0         0         0
-                   0                   0                   0
-                   0                   0                   0
-         0         0         0"""
-_CONTACT: Final = f"""/SURF/PART/1
-ground
-         5
-/INTER/TYPE7/1
-frame to ground
-         1         1         4         0         0                   0         0         0         0
-                   0                   0                   0
-                1000                   0                   0                   0         0         0
-                   1                 0.2{_GAP:20.3g}                   0                   0
-       000                             6                   0                   0                   0
-         0         0                   0         2         0         0                   0         0"""
 
 
 @dataclass

@@ -57,6 +57,37 @@ _THINNED: Final = 4  # every so many states are written to a csv history
 _GROUP_OF_BODY: Final = (60, 70)  # columns of the group in the card of a rigid body
 _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
 
+_ROLL_PAIRS: Final = (
+    (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
+)  # fmt: skip
+_CAR_PAIRS: Final = ((0.0386669, 0.146717), (0.0496, 0.1464), (0.1, 0.1464))
+_CAR_PARTS: Final = (
+    "floor", "rail_p", "rail_m", "side_p", "side_m", "roof", "bulkheads", "glass", "hood", "bumper", "bows", "engine",
+    "battery", "wheels",
+)  # fmt: skip
+_LANDING, _REACH = (
+    0.1155,
+    0.0975,
+)  # of the frame [s]; how far its lowest foot leads then [m]
+_TD_FRAME: Final = 0.10025
+_FRAME_STARTS: Final = (
+    0.019475,
+    0.018775,
+    0.01835,
+    0.028825,
+    0.0121,
+    0.045325,
+    0.048425,
+    0.014575,
+    0.024125,
+)
+_FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
+_COLUMNS: Final = (
+    "case", "tr_s", "td_s", "R_predicted", "R_high", "mean_energy_low", "mean_energy_high",
+    "R_nodes", "correlation", "mean_energy", "worth", "shift_s", "impulse", "place_m",
+    "turned_deg", "energy", "rise_J", "rms", "peak", "final",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Frame(Model):
@@ -121,33 +152,6 @@ def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
     return AllNodes(
         name, model.what, model.main, model.t_end, interval, model.cap, group=group
     )
-
-
-_ROLL_PAIRS: Final = (
-    (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
-)  # fmt: skip
-_CAR_PAIRS: Final = ((0.0386669, 0.146717), (0.0496, 0.1464), (0.1, 0.1464))
-_CAR_PARTS: Final = (
-    "floor", "rail_p", "rail_m", "side_p", "side_m", "roof", "bulkheads", "glass", "hood", "bumper", "bows", "engine",
-    "battery", "wheels",
-)  # fmt: skip
-_LANDING, _REACH = (
-    0.1155,
-    0.0975,
-)  # of the frame [s]; how far its lowest foot leads then [m]
-_TD_FRAME: Final = 0.10025
-_FRAME_STARTS: Final = (
-    0.019475,
-    0.018775,
-    0.01835,
-    0.028825,
-    0.0121,
-    0.045325,
-    0.048425,
-    0.014575,
-    0.024125,
-)
-_FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
 
 
 def _make_frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
@@ -324,13 +328,6 @@ def compute(
         run(model, folder, windows, solver)
         done.touch()
     return sorted(folder.glob(f"{model.name}T[0-9][0-9]"))
-
-
-_COLUMNS: Final = (
-    "case", "tr_s", "td_s", "R_predicted", "R_high", "mean_energy_low", "mean_energy_high",
-    "R_nodes", "correlation", "mean_energy", "worth", "shift_s", "impulse", "place_m",
-    "turned_deg", "energy", "rise_J", "rms", "peak", "final",
-)  # fmt: skip
 
 
 def list_cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:

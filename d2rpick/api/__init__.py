@@ -22,7 +22,7 @@ _NAMES = {
     "api.studies": "Study study",
     "running.events": "Event",
     "vibration.oscillator": "Oscillator",
-    "choice.cost": "Weights",
+    "choice.parts.cost": "Weights",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

@@ -38,6 +38,18 @@ from tests.reading import read_solved
 
 PLAIN = Settings()
 
+LIMITS = st.none() | st.floats(0.0, 1.2)
+OPTIONS = st.builds(
+    Settings,
+    after=st.none() | st.floats(2.0, 5.0),
+    margin=st.sampled_from([0.0, 0.1]),
+    tolerance=st.floats(0.0, 1.0),
+    max_kinetic_share=LIMITS,
+    max_residual=LIMITS,
+    replay=st.booleans(),
+)
+BOX = Selection(parts=("box",))
+
 
 @pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
@@ -202,18 +214,6 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
         )
 
 
-LIMITS = st.none() | st.floats(0.0, 1.2)
-OPTIONS = st.builds(
-    Settings,
-    after=st.none() | st.floats(2.0, 5.0),
-    margin=st.sampled_from([0.0, 0.1]),
-    tolerance=st.floats(0.0, 1.0),
-    max_kinetic_share=LIMITS,
-    max_residual=LIMITS,
-    replay=st.booleans(),
-)
-
-
 @st.composite
 def histories(draw: st.DrawFn) -> History:
     """Draw a load that falls, then one or two modes, damped or not, with noise, finely or coarsely sampled."""
@@ -309,9 +309,6 @@ def test_too_few_states_per_period_recommend_nothing() -> None:
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
     assert any("states per period" in note for note in answer.candidates[0].notes)
-
-
-BOX = Selection(parts=("box",))
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:

@@ -44,6 +44,20 @@ TR, TD = 0.0135867, 0.0687534
 VERIFY = ("verify", "--no-verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
 LEGS = locate_stored("rollover_r100_T0*.gz")
 
+RIGHT = ("--part", "box", BOX, "--switched", LEGS)
+AT_20 = (
+    "--energy",
+    "boxIE_J",
+    ROLLOVER,
+    "--switched",
+    locate_stored("rollover_r20.csv.gz"),
+)
+SWITCHES = ("--tr", str(TR), "--td", str(TD))
+TIME: Samples = np.linspace(0.0, 1.0, 101)
+NONE = (None, None)
+LONG: Samples = np.linspace(0.0, 1.0, 1001)
+CAR_TR, CAR_TD = 0.0496, 0.1464
+
 
 def scan(run_name: str) -> dict[str, float]:
     """Return a row of the table with the results of the solver's switched runs."""
@@ -178,16 +192,6 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
     assert result.exit_code == 1
 
 
-RIGHT = ("--part", "box", BOX, "--switched", LEGS)
-AT_20 = (
-    "--energy",
-    "boxIE_J",
-    ROLLOVER,
-    "--switched",
-    locate_stored("rollover_r20.csv.gz"),
-)
-
-
 @pytest.mark.parametrize(
     ("tr", "td", "runs", "message"),
     [
@@ -276,8 +280,6 @@ def test_a_switched_table_is_compared_by_its_energy(
 
 
 # The closed form, written as a solver would.
-
-SWITCHES = ("--tr", str(TR), "--td", str(TD))
 
 
 @pytest.fixture
@@ -476,9 +478,6 @@ def test_a_switched_run_that_lacks_a_part_that_flies_has_no_momentum_to_compare(
 
 # The comparison itself.
 
-TIME: Samples = np.linspace(0.0, 1.0, 101)
-NONE = (None, None)
-
 
 def make_history(energy: Samples, time: Samples = TIME, name: str = "run") -> History:
     return History(time, energy, source=(name,), format="csv", channel="E")
@@ -568,9 +567,6 @@ def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
         ).level_ratio
         is None
     )
-
-
-LONG: Samples = np.linspace(0.0, 1.0, 1001)
 
 
 def make_crushed_energy(vibration: float) -> Samples:
@@ -666,9 +662,6 @@ def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
     for option in ("-o", "--report"):
         assert "this is an input" in run(*arguments, option, str(file)).stderr
     assert file.read_bytes() == content_before
-
-
-CAR_TR, CAR_TD = 0.0496, 0.1464
 
 
 def list_legs(run: str) -> list[str]:

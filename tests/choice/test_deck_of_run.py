@@ -39,6 +39,38 @@ from tests.sample_deck import DECK
 
 TD = ("--td", "0.0687534")
 
+ASKED = {
+    "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
+    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
+    "explore": (
+        "--td-window",
+        "0.3",
+        "0.37",
+        "--steps",
+        "2",
+        "--part",
+        "all",
+        "--no-verify",
+    ),
+    "plan": ("--part", "all", "--no-verify"),
+    "parts": ("--part", "all"),
+}
+# Parts with the numbers of the box under other titles; and with its titles under other numbers.
+OTHER = {
+    "titles": DECK.read_text("utf-8")
+    .replace("\nbox\n", "\nfloor\n")
+    .replace("\nstep\n", "\nrail\n"),
+    "numbers": f"*KEYWORD\n*INCLUDE_TRANSFORM\n{DECK}\n{0:10d}{0:10d}{10:10d}\n*END\n",
+}
+TIME = np.linspace(0.0, 1.0, 1001)
+PARTS = (Part(1, "body"), Part(2, "other"))
+PUSH = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
+PLAIN = Settings(replay=False)
+HELD = (
+    "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
+)
+MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         X         0         0         1\n"
+
 
 def place_example(folder: Path, example: Example) -> str:
     return write(folder, example.deck, example.files, example.name)
@@ -227,31 +259,6 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     ] == found
 
 
-ASKED = {
-    "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
-    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
-    "explore": (
-        "--td-window",
-        "0.3",
-        "0.37",
-        "--steps",
-        "2",
-        "--part",
-        "all",
-        "--no-verify",
-    ),
-    "plan": ("--part", "all", "--no-verify"),
-    "parts": ("--part", "all"),
-}
-# Parts with the numbers of the box under other titles; and with its titles under other numbers.
-OTHER = {
-    "titles": DECK.read_text("utf-8")
-    .replace("\nbox\n", "\nfloor\n")
-    .replace("\nstep\n", "\nrail\n"),
-    "numbers": f"*KEYWORD\n*INCLUDE_TRANSFORM\n{DECK}\n{0:10d}{0:10d}{10:10d}\n*END\n",
-}
-
-
 @pytest.fixture(params=OTHER)
 def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return str(put(tmp_path / "main.k", OTHER[request.param]))
@@ -364,14 +371,6 @@ def test_titles_are_compared_without_letters_that_files_encode_in_different_ways
     )
 
 
-TIME = np.linspace(0.0, 1.0, 1001)
-PARTS = (Part(1, "body"), Part(2, "other"))
-PUSH = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
-PLAIN = Settings(replay=False)
-HELD = (
-    "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
-)
-MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         X         0         0         1\n"
 MOVED += f"{0:20d}{1:20d}{0:20d}{{stop:20g}}\n"
 
 

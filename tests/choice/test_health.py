@@ -32,6 +32,17 @@ PRINTED = np.round(2e6 + 3 * WORK, -1)
 PART = Part(7, "floor")
 WINDOW = (0.2, 0.8)
 
+LOADED = np.linspace(0, 0.1, 201)
+# A body that is shaken, and falls apart between two states at 0.03.
+TORN = LOADED > 0.03
+TORN_INTERNAL = np.where(TORN, 8e3, 3 * LOADED)
+TORN_KINETIC = np.where(TORN, 1.5e13, 0.2 * np.sqrt(LOADED))
+LATE = LOADED > 0.05
+COMMANDS = (
+    ("suggest",), ("suggest", "--td", "0.02"), ("suggest", "--td-window", "0.01", "0.02"), ("plan",), ("explore",),
+    ("study", "--td", "0.02"),
+)  # fmt: skip
+
 
 def list_warnings(
     balance: Balance, window: tuple[float, float] | None = WINDOW
@@ -331,14 +342,6 @@ def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
     assert suggestion["health"]["until"] == 0.064
 
 
-LOADED = np.linspace(0, 0.1, 201)
-# A body that is shaken, and falls apart between two states at 0.03.
-TORN = LOADED > 0.03
-TORN_INTERNAL = np.where(TORN, 8e3, 3 * LOADED)
-TORN_KINETIC = np.where(TORN, 1.5e13, 0.2 * np.sqrt(LOADED))
-LATE = LOADED > 0.05
-
-
 def record(internal: Samples, kinetic: Samples, **terms: Any) -> History:
     balance = Balance(LOADED, internal=internal, kinetic=kinetic, **terms)
     return History(
@@ -424,12 +427,6 @@ def csv(tmp_path: Path) -> Any:
         return str(file)
 
     return write
-
-
-COMMANDS = (
-    ("suggest",), ("suggest", "--td", "0.02"), ("suggest", "--td-window", "0.01", "0.02"), ("plan",), ("explore",),
-    ("study", "--td", "0.02"),
-)  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,13 @@ rows = st.lists(
     max_size=12,
 )
 
+RECORD = make_energy_history(ENERGY, TIME)
+ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
+UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
+DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
+STATES = np.arange(400)
+EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
+
 
 def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     settings_asked = Settings(max_residual=10.0, replay=False)
@@ -163,10 +170,6 @@ def test_candidates_are_kept_together_as_one_by_one(
     ].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
     assert ranked[-1].tr == ranked.tr[-1]
-
-
-RECORD = make_energy_history(ENERGY, TIME)
-ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
 
 
 def find_grade(history: History, td: float, **arguments: float | bool) -> str | None:
@@ -294,12 +297,6 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert guessed.at_rest
     quality = grade_pair(guessed, require(suggestion.chosen))
     assert (quality.grade, quality.reasons) == ("fair", ("the flight is not certain",))
-
-
-UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
-DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
-STATES = np.arange(400)
-EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
 
 
 def make_crushed_energy(vibration: float) -> np.ndarray:

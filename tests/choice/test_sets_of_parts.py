@@ -42,6 +42,12 @@ from tests.text_files import make_matsum_text
 
 opened = cache(lambda history: open_run([history]))
 
+STEP = "step\n         2         2         1"
+TIMES = (0.1, 0.37)
+PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
+CAR = "1-6"
+TR, TD = "0.02", "0.14"
+
 
 def rank_sets(history: str, deck: str | None = None, **options: object) -> Parts:
     model = CostModel(read_inventory(deck)) if deck else None
@@ -93,11 +99,6 @@ def write_variant(folder: Path, *changes: tuple[str, str]) -> str:
 def rank_sets_of_variant(folder: Path, *changes: tuple[str, str]) -> Parts:
     """Rank the sets with a changed deck, in a given window so that none is searched."""
     return rank_sets(MATSUM, write_variant(folder, *changes), times=TIMES)
-
-
-STEP = "step\n         2         2         1"
-TIMES = (0.1, 0.37)
-PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
 
 
 @pytest.mark.parametrize(
@@ -439,10 +440,6 @@ def test_ties_that_may_join_parts_are_told_where_these_are_several_bodies(
     assert "*CONTACT_TIED_NODES_TO_SURFACE" in messages["ties-not-followed"]
     whole = rank_sets_of_variant(tmp_path, ("*END", f"{tie}*END"))
     assert "ties-not-followed" not in [caution.code for caution in whole.cautions]
-
-
-CAR = "1-6"
-TR, TD = "0.02", "0.14"
 
 
 @pytest.fixture(scope="module")

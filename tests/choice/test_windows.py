@@ -48,6 +48,12 @@ from tests.records import ENERGY, MODE, TIME, add_noise, sum_energies
 
 positive = st.floats(0.1, 10.0)
 
+TD = 0.064
+PAPER = make_energy_history(ENERGY, TIME)
+WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
+    lambda ends: np.array(sorted(ends)[: len(ends) // 2 * 2], float).reshape(-1, 2)
+)
+
 
 def make_flying_oscillator(
     omega: float, amplitude: float, speed: float, mass: float, periods: int = 20
@@ -307,10 +313,6 @@ def test_the_landings_of_the_switched_box_lie_within_the_margin(
     assert 1e-3 < moved < compute_margin(history, flight).time
 
 
-TD = 0.064
-PAPER = make_energy_history(ENERGY, TIME)
-
-
 def find_windows_of(answer: PairSuggestion) -> Samples:
     best = answer.recommended
     return find_acceptable_windows(
@@ -560,11 +562,6 @@ def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     ]
     assert are_in_windows(shared_windows, times).tolist() == expected
     assert any(expected)
-
-
-WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
-    lambda ends: np.array(sorted(ends)[: len(ends) // 2 * 2], float).reshape(-1, 2)
-)
 
 
 @given(st.lists(WINDOWS, min_size=1, max_size=5))

@@ -30,6 +30,9 @@ COARSE = GOOD.replace("    0.0001", "      0.01")
 
 pytestmark = pytest.mark.usefixtures("here")
 
+RUN_EXAMPLE = RULES["D2R401"].passing[0]
+TIMES = np.linspace(0.001, 0.149, 12).tolist()
+
 
 def place(name: str, deck: str) -> str:
     """Write a deck below the working folder."""
@@ -249,9 +252,6 @@ def test_ndjson_is_a_line_for_each_deck() -> None:
         check_output("json", line)
 
 
-RUN_EXAMPLE = RULES["D2R401"].passing[0]
-
-
 def place_run(folder: str = ".") -> list[str]:
     """Write the starter deck and the engine files of a run."""
     files = {RUN_EXAMPLE.name: RUN_EXAMPLE.deck, **RUN_EXAMPLE.files}
@@ -467,9 +467,6 @@ def test_the_result_never_replaces_an_input() -> None:
 
 
 # Judged by a history.
-
-
-TIMES = np.linspace(0.001, 0.149, 12).tolist()
 
 
 @pytest.mark.parametrize(

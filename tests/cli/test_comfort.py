@@ -26,6 +26,8 @@ from tests.command import (
     run_json,
 )
 
+ASKED = ("suggest", "--td", "0.064", ENERGY)
+
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -296,9 +298,6 @@ def test_the_manual_is_roff_without_warnings() -> None:
     )
     assert not manual_page.stderr
     assert "d2rpick" in manual_page.stdout
-
-
-ASKED = ("suggest", "--td", "0.064", ENERGY)
 
 
 @pytest.fixture

@@ -37,6 +37,8 @@ SLOW = ("rollover", "reproduce", "plan", "study", "follow", "explore")
 BY_VIBRATION = dict.fromkeys(("D2RPICK_SUGGEST_NO_VERIFY", "D2RPICK_VERIFY_NO_VERIFY"))
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
+GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
+
 
 def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
     """Run ``python -m d2rpick`` as a separate process."""
@@ -393,9 +395,6 @@ def test_options_come_from_the_environment_too() -> None:
     )
     assert float(result.stdout) == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-10)
     assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
-
-
-GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
 
 
 @pytest.mark.slow

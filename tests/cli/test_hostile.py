@@ -32,6 +32,19 @@ from tests.made_binout import make_binout as made_binout
 from tests.made_t01 import make_t01, make_value
 from tests.text_files import make_glstat_text, make_matsum_text
 
+SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
+ODD = {
+    "binout": bytes(made_binout(range(1, 9)).data).replace(
+        np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
+    ),  # a time
+    "T01": bytes(make_t01(8).data).replace(
+        np.array(make_value(3, 0, 1), ">f4").tobytes(), SIGNALLING
+    ),  # an energy
+    "matsum": make_matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
+        b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
+    ),
+}
+
 
 def run_in_shell(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
     """Call the program in a shell, which can close streams and limit memory; ``$@`` are the arguments."""
@@ -510,20 +523,6 @@ def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> N
         "info", first_file, second_file
     )
     assert run("info", first_file, leg).exit_code == 0
-
-
-SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
-ODD = {
-    "binout": bytes(made_binout(range(1, 9)).data).replace(
-        np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
-    ),  # a time
-    "T01": bytes(make_t01(8).data).replace(
-        np.array(make_value(3, 0, 1), ">f4").tobytes(), SIGNALLING
-    ),  # an energy
-    "matsum": make_matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
-        b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
-    ),
-}
 
 
 @pytest.mark.parametrize("name", ODD)

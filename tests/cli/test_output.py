@@ -57,6 +57,13 @@ FORMATS = {
     "verify": ("table", "json", "csv", "markdown"),
 }
 
+TEXTS = (
+    *("kind", "notes", "reasons", "quality"),
+    *("verdict", "verdict_reason", "cure", "expected_after_td", "worst_case"),
+)
+FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
+PERIOD = 0.02
+
 
 def read_rows(text: str) -> list[dict[str, Any]]:
     """Return the rows of a CSV result with the types of JSON."""
@@ -70,12 +77,6 @@ def _convert_cell(key: str, cell: str) -> Any:
     if key in TEXTS:
         return cell
     return json.loads(cell) if cell else None
-
-
-TEXTS = (
-    *("kind", "notes", "reasons", "quality"),
-    *("verdict", "verdict_reason", "cure", "expected_after_td", "worst_case"),
-)
 
 
 # Formats.
@@ -370,8 +371,6 @@ def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
 
 # Figures.
 
-FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -474,7 +473,6 @@ def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(
 
 
 pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")
-PERIOD = 0.02
 
 
 class Terminal(io.StringIO):

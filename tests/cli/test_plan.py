@@ -20,6 +20,22 @@ PART = (
     "--no-verify",
 )  # no oscillator describes it, and none is sought
 
+DECK = """*KEYWORD
+*CONTROL_TERMINATION
+       1.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+*PART
+box
+         1         1         1
+*PART
+step
+         2         1         1
+*END
+"""
+
 
 @pytest.fixture(scope="module")
 def history(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
@@ -321,23 +337,6 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         "/RBODY with main node 536 is new, for parts 1-5" in result.stderr,
     ) == (0, True)
     assert "parts 1-5: rigid from" in result.stdout
-
-
-DECK = """*KEYWORD
-*CONTROL_TERMINATION
-       1.2
-*DATABASE_GLSTAT
-    0.0001
-*DATABASE_MATSUM
-    0.0001
-*PART
-box
-         1         1         1
-*PART
-step
-         2         1         1
-*END
-"""
 
 
 def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(

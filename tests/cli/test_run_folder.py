@@ -19,6 +19,8 @@ NODAL_BODY = (
     "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
 )
 
+ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
+
 
 def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
     """Write the sample run with its deck."""
@@ -218,9 +220,6 @@ def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> No
     assert "--deck and --no-deck exclude each other" in read_refusal(
         "plan", "--deck", "a.k", "--no-deck", str(box)
     )
-
-
-ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
 def write_radioss_run(path: Path, root: str) -> Path:

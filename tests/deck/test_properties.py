@@ -15,6 +15,17 @@ from tests.decks import list_spans, read, write
 
 TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)
 
+PIECES = [
+    *("*DEFORMABLE_TO_RIGID_AUTOMATIC\n", "*DEFORMABLE_TO_RIGID\n", "*PARAMETER\n", "*PARAMETER_EXPRESSION\n"),
+    *("*DEFORMABLE_TO_RIGID_INERTIA\n", "*RIGID_DEFORMABLE_CONTROL\n", "*INCLUDE\n", "*INCLUDE_TRANSFORM\n"),
+    *("*PART\n", "*PART_INERTIA\n", "*SET_PART_LIST_GENERATE\n", "*SET_PART_ADD\n", "*CONTROL_TERMINATION\n"),
+    *("*DATABASE_GLSTAT\n", "*MAT_RIGID\n", "*ELEMENT_SHELL\n", "*COMMENT ", "*KEYWORD LONG=Y\n", "*\n", "main.k\n"),
+    *("R a       &b+1\n", "R b       &a\n", "&a", "<1/0>", "-&a", "1e999", "PSET", "\xe9"),
+    *("-----BEGIN PGP MESSAGE\n", "\0"),
+    *("         1", "         2", "       0.5", "        -1", "9999999999", "    1.e300"),
+    *("\n", "\r\n", ",", "$", " +\n", "&"),
+]  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Written:
@@ -110,18 +121,6 @@ def check_survives(content: bytes) -> None:
 @given(st.binary(max_size=400))
 def test_any_bytes(content: bytes) -> None:
     check_survives(content)
-
-
-PIECES = [
-    *("*DEFORMABLE_TO_RIGID_AUTOMATIC\n", "*DEFORMABLE_TO_RIGID\n", "*PARAMETER\n", "*PARAMETER_EXPRESSION\n"),
-    *("*DEFORMABLE_TO_RIGID_INERTIA\n", "*RIGID_DEFORMABLE_CONTROL\n", "*INCLUDE\n", "*INCLUDE_TRANSFORM\n"),
-    *("*PART\n", "*PART_INERTIA\n", "*SET_PART_LIST_GENERATE\n", "*SET_PART_ADD\n", "*CONTROL_TERMINATION\n"),
-    *("*DATABASE_GLSTAT\n", "*MAT_RIGID\n", "*ELEMENT_SHELL\n", "*COMMENT ", "*KEYWORD LONG=Y\n", "*\n", "main.k\n"),
-    *("R a       &b+1\n", "R b       &a\n", "&a", "<1/0>", "-&a", "1e999", "PSET", "\xe9"),
-    *("-----BEGIN PGP MESSAGE\n", "\0"),
-    *("         1", "         2", "       0.5", "        -1", "9999999999", "    1.e300"),
-    *("\n", "\r\n", ",", "$", " +\n", "&"),
-]  # fmt: skip
 
 
 @given(st.lists(st.sampled_from(PIECES), max_size=40))

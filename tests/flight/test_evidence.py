@@ -41,6 +41,8 @@ from tests.sample_box import make_t01
 MILLISECOND = 1e-3
 CAR, DROP = locate_stored("carT01.gz"), locate_stored("drop2T01.gz")
 
+ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
+
 
 class Rolled(NamedTuple):
     """Computed rollover run, and its true flight."""
@@ -381,9 +383,6 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
     (doubt,) = flight.doubts
     assert "by the momentum" in doubt
     assert "by the contact energy" in doubt
-
-
-ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:

@@ -42,6 +42,8 @@ ENGINE = 4
 numbers = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
 vectors = st.tuples(numbers, numbers, numbers).map(np.array)
 
+SPAN = np.linspace(0.0, 1.0, 11)
+
 
 def rotate_about(rate: Samples, angle: Samples) -> Samples:
     """Return rotation matrices, (n, 3, 3), about ``rate`` by ``angle`` times its length (Rodrigues)."""
@@ -319,9 +321,6 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
         )
         is None
     )
-
-
-SPAN = np.linspace(0.0, 1.0, 11)
 
 
 def make_moving_body(part: int, rate: float, path: float = 100.0) -> Drift:

@@ -54,6 +54,20 @@ return [...document.body.querySelectorAll("*")]
   .map((one) => one.outerHTML.slice(0, 120));
 """
 
+# Where the first and the last td lie in the chart of the energy, in pixels.
+ENDS = """
+const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
+const width = document.querySelector(".energy .u-over").clientWidth;
+return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
+"""
+# All that is said of the td in sight, at once: each question to a browser takes its time.
+SAID = """
+const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
+const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
+return { ...Object.fromEntries(values.reverse()), typed: document.getElementById("explorer-td").value, spoken };
+"""
+WIDTHS = (390, 768, 1280)
+
 
 def mark_for_browser(test: Test) -> Test:
     """Mark a test that needs a browser and is slow."""
@@ -140,21 +154,6 @@ class Browser:
     def complaints(self) -> list[dict[str, Any]]:
         """Return the console messages since the last call."""
         return list(self.driver.get_log("browser"))  # type: ignore[no-untyped-call]
-
-
-# Where the first and the last td lie in the chart of the energy, in pixels.
-ENDS = """
-const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
-const width = document.querySelector(".energy .u-over").clientWidth;
-return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
-"""
-# All that is said of the td in sight, at once: each question to a browser takes its time.
-SAID = """
-const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
-const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
-return { ...Object.fromEntries(values.reverse()), typed: document.getElementById("explorer-td").value, spoken };
-"""
-WIDTHS = (390, 768, 1280)
 
 
 def write_page(folder: Path, *args: str) -> Path:

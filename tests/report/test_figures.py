@@ -18,6 +18,8 @@ from d2rpick.report.study import shorten_names
 from tests.command import BOX, ENERGY, ROOT
 from tests.energies import require
 
+SWITCHED_RUN = "switched run, as computed"
+
 
 def list_texts(axes: Axes) -> list[str]:
     return [text.get_text() for text in axes.texts]
@@ -236,9 +238,6 @@ def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:
         if energy_line.get_label() == SWITCHED_RUN
     )
     assert np.array_equal(line.get_ydata(), require(verdict.computed).energy)
-
-
-SWITCHED_RUN = "switched run, as computed"
 
 
 def test_a_plan_names_no_negative_energies_and_the_times_of_its_windows() -> None:

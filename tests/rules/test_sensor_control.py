@@ -15,13 +15,18 @@ from tests.rules.test_by_force import list_windows
 
 END = 1.0
 
+TIMES = np.arange(0.0, END + 5e-3, 0.01)
+CONTACT = (
+    "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n"
+    "         7     floor\n"
+    "         8\n*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n         8      wall\n"
+)
+SET = write_automatic_card(20, "0.0", rigid=["1"], code=5)
+
 
 def flat(found: dict[str, object]) -> list[float | None]:
     """List all ends of the windows."""
     return [time for pair in list_windows(found) for time in pair]
-
-
-TIMES = np.arange(0.0, END + 5e-3, 0.01)
 
 
 def control(switches: str, initial: str = "OFF", repeats: int = 0) -> str:
@@ -45,14 +50,6 @@ def by_force(
 
 def force_of(kind: str = "CONTACT", entity: int = 7, direction: str = "M") -> str:
     return f"*SENSOR_DEFINE_FORCE\n{3:10d}{kind:>10}{entity:10d}{direction:>10}\n"
-
-
-CONTACT = (
-    "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n"
-    "         7     floor\n"
-    "         8\n*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n         8      wall\n"
-)
-SET = write_automatic_card(20, "0.0", rigid=["1"], code=5)
 
 
 def write(folder: Path, *cards: str, switch_set: str = SET) -> str:

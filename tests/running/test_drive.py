@@ -46,6 +46,13 @@ GRAVITY = (
 WALL = "/RWALL/PLANE/8\nground\n" + pad(0, 0, 0, 0) + 3 * pad(0.0, 0.0, 1.0, width=20)
 WAIT, END, LANDS, LOADED = 0.02, 0.22, 0.17, 0.03
 
+IDLE, SWINGS = (
+    LegFindings(0.0, 0.02, flies=True, idle=True),
+    LegFindings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
+)
+WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
+FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
+
 
 def give_solver_command(kind: str) -> str:
     return shlex.join([sys.executable, str(FAKE), kind, "{deck}"])
@@ -378,14 +385,6 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         assert driver.progress(3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
         assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
-
-
-IDLE, SWINGS = (
-    LegFindings(0.0, 0.02, flies=True, idle=True),
-    LegFindings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
-)
-WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
-FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
 
 @pytest.mark.parametrize(

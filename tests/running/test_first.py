@@ -21,6 +21,12 @@ THROWN = f"/GRNOD/PART/1\nall\n{pad(1, 2)}/INIVEL/TRA/3\nthrown\n{pad(10.0, 0.0,
 MASS, STIFFNESS = 5.0, 1e6
 PERIOD = 2 * math.pi * math.sqrt(MASS / 2 / STIFFNESS)
 
+SHELL = (
+    "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
+)
+CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
+FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
+
 
 def write_radioss_run(folder: Path, contents: str = CONTACT + THROWN + GRAVITY) -> str:
     folder.mkdir(exist_ok=True)
@@ -198,13 +204,6 @@ def test_a_contact_that_triggers_nothing_is_refused(
             parts=1,
             wait=0.02,
         )
-
-
-SHELL = (
-    "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
-)
-CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
-FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
 
 
 def read_offsets(files: tuple[str, ...]) -> list[str]:

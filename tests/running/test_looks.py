@@ -21,6 +21,9 @@ LEGS = [
     for leg in (1, 2)
 ]
 
+FORMS = {**WRITERS, **FALL_WRITERS}
+SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
+
 
 def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
     tmp_path: Path,
@@ -83,10 +86,6 @@ def make_falling_masses() -> Written:
     kinetic = (momentum**2).sum(axis=2) / (2 * masses)
     internal = np.outer(1 + np.cos(60 * time) ** 2, [1.0, 1.0, 0.0])
     return Written(time, momentum, kinetic, internal, 0 * time, masses, 0 * time)
-
-
-FORMS = {**WRITERS, **FALL_WRITERS}
-SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
 
 
 def _find_state(data: bytes, share: float) -> int:

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.models.box_model import Plane
 
+# (tr, td) [s] whose responses are superposed: the two of the paper, and two beside them
+_PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
+# Around a switch, so much shows what a solver does there [ms].
+_NEAR: Final = 1.2
+
 
 class Curve(NamedTuple):
     """A column as it is drawn: "line", "thin" or "dots"; over the column ``x``, over the first one without it."""
@@ -90,11 +95,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
     Tables = Mapping[str, Mapping[str, Samples]]
-
-# (tr, td) [s] whose responses are superposed: the two of the paper, and two beside them
-_PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
-# Around a switch, so much shows what a solver does there [ms].
-_NEAR: Final = 1.2
 
 
 def list_exhibits(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:

@@ -44,15 +44,6 @@ HEAD = (
     "source",
 )
 
-
-class Reproduction(NamedTuple):
-    """Values and figures of the paper beside those found here; ``files`` were written."""
-
-    rows: Sequence[PublishedValue]
-    exhibits: Sequence[Exhibit]
-    files: Sequence[str] = ()
-
-
 _PAIR: Final = Kind(
     row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
     lambda pair: {"tr": pair[0], "td": pair[1], "residual": compute_residual(pair)},
@@ -88,6 +79,14 @@ DOCUMENT: Final = Document(
         Field("files", "texts"),
     ),
 )
+
+
+class Reproduction(NamedTuple):
+    """Values and figures of the paper beside those found here; ``files`` were written."""
+
+    rows: Sequence[PublishedValue]
+    exhibits: Sequence[Exhibit]
+    files: Sequence[str] = ()
 
 
 def as_table(answer: Reproduction, is_shown: DisplayOptions) -> str:

@@ -42,6 +42,27 @@ MOST_DIFFERENCE: Final = 1e-9
 # What a solver gives differs from the closed form by its one-step lag and the mass of its spring [-].
 _SOLVER_DIFFERENCE: Final = 0.006
 
+# z [m], y [m], E [J] at times [s] of the switched runs
+_STATES: Final = {
+    INTEGRATED: (
+        (0.006, 0.02411074833512, 0.003495532591536, 140.245749651),
+        (0.012, 0.03179101171863, 0.01117579597504, 140.245749651),
+        (0.064, 0.05211298900326, 0.03149777325967, 140.245749651),
+        (0.080, 0.05301085160684, 0.03239563586326, 140.245749651),
+        (0.100, 0.04127297724204, 0.03895923455904, 1.766623717034),
+        (0.150, 0.04024623325594, 0.03984369830982, 0.05347134633845),
+    ),
+    PUBLISHED: (
+        (0.040, 0.03335536800817, 0.03520219900172, 1.125558957182),
+        (0.064, 0.0371382911785, 0.03898512217205, 1.125558957182),
+        (0.080, 0.0398705626157, 0.03896578035883, 0.270148207674),
+        (0.100, 0.04016469900114, 0.03951337367949, 0.1399941426274),
+        (0.150, 0.04009663037928, 0.03991849974815, 0.01047107217665),
+    ),
+}
+# Of each step, relative and absolute: far below what a figure shows, far above rounding.
+_RELATIVE, _ABSOLUTE = 1e-11, 1e-14
+
 
 @dataclass(frozen=True)
 class PublishedValue:
@@ -164,26 +185,6 @@ def _make_rows() -> Iterator[PublishedValue]:
         )
 
 
-# z [m], y [m], E [J] at times [s] of the switched runs
-_STATES: Final = {
-    INTEGRATED: (
-        (0.006, 0.02411074833512, 0.003495532591536, 140.245749651),
-        (0.012, 0.03179101171863, 0.01117579597504, 140.245749651),
-        (0.064, 0.05211298900326, 0.03149777325967, 140.245749651),
-        (0.080, 0.05301085160684, 0.03239563586326, 140.245749651),
-        (0.100, 0.04127297724204, 0.03895923455904, 1.766623717034),
-        (0.150, 0.04024623325594, 0.03984369830982, 0.05347134633845),
-    ),
-    PUBLISHED: (
-        (0.040, 0.03335536800817, 0.03520219900172, 1.125558957182),
-        (0.064, 0.0371382911785, 0.03898512217205, 1.125558957182),
-        (0.080, 0.0398705626157, 0.03896578035883, 0.270148207674),
-        (0.100, 0.04016469900114, 0.03951337367949, 0.1399941426274),
-        (0.150, 0.04009663037928, 0.03991849974815, 0.01047107217665),
-    ),
-}
-
-
 def _find_matching(td: float) -> float:
     """First time with the deformation of ``td``, sign included [s]."""
     return MODE.crossings(float(MODE.deformation(td)), 0.0, td)[0]
@@ -197,10 +198,6 @@ def switch_replay(pair: tuple[float, float]) -> Replay:
 def compute_deformation(state: State) -> Samples:
     """Deformation of the spring, y - z [m]."""
     return np.asarray(state.y - state.z)
-
-
-# Of each step, relative and absolute: far below what a figure shows, far above rounding.
-_RELATIVE, _ABSOLUTE = 1e-11, 1e-14
 
 
 def integrate_replay(switched: Replay, time: Samples) -> State:
