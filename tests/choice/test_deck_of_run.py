@@ -221,10 +221,7 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     listed = run_json("check", deck, "--history", history, "--select", "D2R408,D2R409")[
         "findings"
     ]
-    assert [
-        f"{listed_message['rule']} {listed_message['severity']}"
-        for listed_message in listed
-    ] == found
+    assert [f"{finding['rule']} {finding['severity']}" for finding in listed] == found
 
 
 ASKED = {
@@ -257,8 +254,8 @@ def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return str(put(tmp_path / "main.k", OTHER[request.param]))
 
 
-def list_messages(message_words: dict[str, Any]) -> dict[str, Any]:
-    return {**message_words, "command": None, "warnings": None}
+def drop_warnings(document: dict[str, Any]) -> dict[str, Any]:
+    return {**document, "command": None, "warnings": None}
 
 
 @pytest.mark.slow
@@ -267,7 +264,7 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     args = command, *ASKED[command], "--deck", foreign, MATSUM
     without = command, *ASKED[command], MATSUM
     document, plain = run_json(*args), run_json(*without)
-    assert list_messages(document) == list_messages(plain)
+    assert drop_warnings(document) == drop_warnings(plain)
     assert list_warning_codes(document) == list_warning_codes(plain) | {
         "deck-of-another-model"
     }
@@ -310,7 +307,7 @@ def test_the_library_leaves_it_out_too(foreign: str) -> None:
         d2.suggest(d2.read(MATSUM), **arguments, deck=foreign),
         d2.suggest(d2.read(MATSUM), **arguments),
     )
-    assert list_messages(suggestion.to_dict()) == list_messages(without.to_dict())
+    assert drop_warnings(suggestion.to_dict()) == drop_warnings(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:

@@ -47,7 +47,7 @@ def check(
 
 def check_unbeaten(exploration: TradeOff) -> None:
     """Compare the Pareto marks with all other offers."""
-    for is_rigid_time_known in (True, False):
+    for is_vibration_known in (True, False):
         pairs = [
             (
                 offer.unbeaten,
@@ -58,7 +58,7 @@ def check_unbeaten(exploration: TradeOff) -> None:
             if offer.best
             and offer.error is not None
             and not offer.best.same_swing
-            and (offer.basis != "energy") == is_rigid_time_known
+            and (offer.basis != "energy") == is_vibration_known
         ]
         for marked, error, rigid in pairs:
             beaten = any(

@@ -37,9 +37,9 @@ def box(tmp_path: Path) -> Path:
     return write_run_folder(tmp_path / "run")
 
 
-def print_card(folder: Path, *extra_keywords: str) -> tuple[str, str]:
+def print_card(folder: Path, *options: str) -> tuple[str, str]:
     """Return the card of a plan, and the messages on stderr."""
-    result = run("plan", str(folder), "--part", "flying", "-f", "card", *extra_keywords)
+    result = run("plan", str(folder), "--part", "flying", "-f", "card", *options)
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
