@@ -1,6 +1,6 @@
-"""What switching saves: the one cost model, held against the published saving and against runs that were measured.
+"""Savings of switching: the cost model compared with the published saving and with measured runs.
 
-The formulas stand in `d2rpick.choice.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
+The formulas are in `d2rpick.choice.cost` (share c of a time step) and `d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CAPPED: Final = 20.00 / 21.54
 
 
 class Run(NamedTuple):
-    """A run whose processor time was measured with and without switching.
+    """Run whose processor time was measured with and without switching.
 
     ``rigid`` are elements by formulation, and their integration points beside those of one layer.
     """
@@ -36,7 +36,7 @@ class Run(NamedTuple):
     measured: float
 
     def predicted(self, share: float) -> float:
-        """Saving when ``share`` of the cost of a step is saved [-]."""
+        """Return the saving if ``share`` of the cost of a time step is saved [-]."""
         return 1 - run_time_share(self.rigid_fraction, share, self.step_ratio)
 
     @property
@@ -46,7 +46,7 @@ class Run(NamedTuple):
 
     @property
     def cost_share(self) -> float:
-        """Share of a step that is saved, by the cost model [-]."""
+        """Share of the cost of a time step that is saved, by the cost model [-]."""
         return saved_share(
             _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
         )
@@ -58,7 +58,7 @@ class Run(NamedTuple):
 
     @property
     def by_count(self) -> float:
-        """Saving when the share of the elements is taken for that of the cost [-]."""
+        """Saving if the cost is proportional to the number of elements [-]."""
         return self.predicted(self.element_share)
 
 
@@ -114,7 +114,7 @@ RUNS: Final = (
 
 
 def find_needed_fraction(share: float) -> float:
-    """Rigid fraction with which the pick-up truck's saving needs this share of the cost [-].
+    """Return the rigid fraction at which the pick-up truck's saving requires this share of the cost [-].
 
     Examples
     --------
@@ -125,7 +125,7 @@ def find_needed_fraction(share: float) -> float:
 
 
 def make_saving_exhibit() -> Exhibit:
-    """Predicted savings beside the measured ones, and what the published saving asks for."""
+    """Return predicted savings beside measured ones, and what the published saving requires."""
     published = 1 - PICK_UP[1] / PICK_UP[0]
     share = np.linspace(published, 1.0, 51)  # with less, no rigid fraction is enough
     number = np.arange(1.0, len(RUNS) + 1)
