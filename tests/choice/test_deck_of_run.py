@@ -78,7 +78,7 @@ def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
         ("plan",),
         ("parts",),
     ):
-        if args[0] != "parts":  # which asks for parts with energies
+        if args[0] != "parts":  # parts requires energies of parts
             assert list_warnings(*args, "--deck", deck, ENERGY)[code] == deck_message
     assert list_doubts(place_example(tmp_path, RULES[rule].passing[0])) == {}
 
@@ -135,7 +135,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
     for rule, expected in (
         ("D2R406", 1),
         ("D2R408", 0),
-    ):  # the latter's deck has a wheel whose main node is 1809
+    ):  # the deck of the other run has a wheel with main node 1809
         example = RULES[rule].failing[0]
         files = {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n"}
         deck = write(tmp_path, example.deck, files, example.name)
@@ -159,7 +159,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
         assert [leg.count("1809") for leg in legs] == [1] * len(legs)
 
 
-# An engine that reports wrong energies.
+# Engine versions that report wrong energies.
 
 
 @pytest.mark.slow
@@ -191,11 +191,13 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(
             "CAR_0002.out: built in 2025" in list_warnings(*args)["engine-wrong-energy"]
         ), args
     codes = [warning["code"] for warning in run_json("plan", history)["warnings"]]
-    assert codes.count("engine-wrong-energy") == 1  # however many flights there are
+    assert (
+        codes.count("engine-wrong-energy") == 1
+    )  # one warning for any number of flights
     assert "engine-wrong-energy" not in list_warnings("suggest", *TD, ENERGY)
 
 
-# Bodies that no leg switches.
+# Bodies that no engine file switches.
 
 
 @pytest.mark.parametrize(
@@ -240,7 +242,7 @@ ASKED = {
     "plan": ("--part", "all", "--no-verify"),
     "parts": ("--part", "all"),
 }
-# Parts with the numbers of the box under other titles; and with its titles under other numbers.
+# Parts with the numbers of the box but other titles, and with its titles but other numbers.
 OTHER = {
     "titles": DECK.read_text("utf-8")
     .replace("\nbox\n", "\nfloor\n")
@@ -416,7 +418,7 @@ def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
     assert find_flight_around(make_falling_momenta(0.0, make_gravity(0.0)), 0.6)
     assert find_flight_around(
         make_falling_momenta(0.0, make_gravity(0.0, 9.81)), 0.6
-    )  # it acts for a time only
+    )  # it acts for a limited time only
     assert (
         find_flight_around(make_falling_momenta(0.0, make_gravity(9.81)), 0.6) is None
     )
@@ -526,7 +528,7 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
         d2.suggest(reference, parts=options[1:] or None, deck=deck, replay=False)
     d2.suggest(
         reference, 0.12, parts=options[1:] or None, replay=False
-    )  # the run that was read is as it was
+    )  # the run that was read is unchanged
 
 
 @pytest.mark.slow

@@ -80,7 +80,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     records = [
         record._replace(window=record.window[:1] * 2)
         for record in draw_records(kind, 1, 2)
-    ]  # one td is cheap
+    ]  # a single td is cheap
     pairs = [pair for record in records if (pair := recommend_pair(record))]
     assert pairs
     assert all(pair.kept is not False for pair in pairs)

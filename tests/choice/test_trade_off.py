@@ -280,4 +280,4 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
         for offer in exploration.offers
         if offer.quality and offer.best and not offer.best.same_swing
     }
-    assert grades == {"poor"}  # nothing tells the deformation
+    assert grades == {"poor"}  # no evidence of the deformation

@@ -297,5 +297,5 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
         )
         < 1e-4
     )
-    # in noise of 1 % a peak is not exact: the middle of what the noise leaves
+    # With 1 % noise a peak is not exact: the middle of the range left by the noise.
     assert 0 < require(require(answer.better_pair).residual) < 1e-3

@@ -239,7 +239,7 @@ def test_it_is_the_same_every_time(paper: Page, folder: Path) -> None:
 
 CHAIN = locate_stored("chain_referenceT01.gz")
 BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
-# Of a command with its arguments: the exit code, what its page says, and what it must not say.
+# For a command with its arguments: the exit code, texts on its page, and texts that must be absent.
 TOLD = {
     "parts, version, flight and health": (
         ("suggest", *BOX), 0,
