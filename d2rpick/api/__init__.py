@@ -1,12 +1,12 @@
-"""The questions that can be asked, and their answers: what ``import d2rpick`` offers and the command line calls.
+"""Offer the questions and answers of d2rpick: what ``import d2rpick`` exports and the command line calls.
 
-What is named here is imported when it is first used.  Type checkers and editors find the names in the stub
+A name is imported when it is first used.  Type checkers and editors find the names in the stub
 ``d2rpick/__init__.pyi``.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # importing typing is left to those who need it
+TYPE_CHECKING = False  # importing typing would slow the start
 if TYPE_CHECKING:
     from typing import Any
 
@@ -30,7 +30,7 @@ names = ["__version__", *sorted(_HOME)]
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for by name."""
+    """Import an exported name when it is first used."""
     if name not in _HOME:
         raise AttributeError(f"module 'd2rpick' has no attribute {name!r}")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""What all answers have in common, JSON, table, page and the line that repeats them."""
+"""Define what all answers have in common: JSON, table, page, and the command line that repeats them."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer:
-    """What all answers have in common; nothing of one changes.
+    """What all answers have in common; an answer is immutable.
 
-    Two answers are equal if they say the same, such as an answer and its copy in another process.
+    Two answers are equal if their content is equal, such as an answer and its copy from another process.
 
-    ``warnings`` are (``code``, ``message``); ``command`` is the command line that gives the same answer, with
-    ``<weights in memory>`` for the file where these were no file.
+    ``warnings`` are (``code``, ``message``).  ``command`` is the command line that gives the same answer; weights that
+    come from no file are written as ``<weights in memory>``.
     """
 
-    if TYPE_CHECKING:  # a field of some answers, and made for others
+    if TYPE_CHECKING:  # a field of some answers, computed from others
 
         @property
         def command(self) -> tuple[str, ...]:
             """The command line that gives the same answer, without the name of the program."""
 
     cautions: tuple[Caution, ...]
-    kind: ClassVar[str]  # as the table of forms calls it
-    said: ClassVar[tuple[str, ...]] = ()  # what a short look shows
+    kind: ClassVar[str]  # name in the table of forms
+    said: ClassVar[tuple[str, ...]] = ()  # attributes that a short form shows
 
     @classmethod
-    def of(cls, found: Any, **more: Any) -> Self:
-        """Add to what was found what is public of an answer; ``cautions`` come after its own."""
-        known = {one.name: getattr(found, one.name) for one in fields(found)}
-        known["cautions"] = (*known["cautions"], *more.pop("cautions", ()))
-        return cls(**known, **more)
+    def of(cls, result: Any, **further_fields: Any) -> Self:
+        """Make the public answer from a result of the core; ``cautions`` are added after those of the result."""
+        values = {field.name: getattr(result, field.name) for field in fields(result)}
+        values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
+        return cls(**values, **further_fields)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Answer) or type(other) is not type(self):
@@ -63,38 +63,38 @@ class Answer:
         return hash((self.kind, *self.command))
 
     def __repr__(self) -> str:
-        shown = ", ".join(
+        contents = ", ".join(
             f"{name}={getattr(self, name)!r}" for name in (*self.said, "warnings")
         )
-        return f"{type(self).__name__}({shown})"
+        return f"{type(self).__name__}({contents})"
 
     @property
     def warnings(self) -> tuple[Caution, ...]:
-        """What to be aware of: ``code`` and ``message``."""
+        """All warnings, each with ``code`` and ``message``."""
         return self.cautions
 
-    def text(self, form: str, shown: Shown) -> str:
-        """Write the answer in a form of the command line."""
+    def text(self, form: str, display: Shown) -> str:
+        """Return the answer in a form of the command line."""
         from d2rpick.report.formats import write
 
-        return write(self.kind, form, self, shown)
+        return write(self.kind, form, self, display)
 
     def to_json(self) -> str:
-        """Give the JSON document of the command line; its schema is named in it."""
+        """Return the JSON document of the command line; it names its schema."""
         from d2rpick.report.formats import Shown
 
         return self.text("json", Shown(self.command))
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary."""
+        """Return the JSON document of the command line as a dictionary."""
         import json
 
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
+        document: dict[str, Any] = json.loads(self.to_json())
+        return document
 
 
 class Paged(Answer):
-    """An answer that has a page and a figure; a notebook shows it in short."""
+    """An answer that has a page, a figure, and a short form for notebooks."""
 
     def __repr__(self) -> str:
         from d2rpick.report.pages import sentence
@@ -107,7 +107,7 @@ class Paged(Answer):
         return glance(self.kind, self, give_if_written(self.plot))
 
     def plot(self) -> Figure:
-        """Draw the answer as a matplotlib Figure: the energy, and what was chosen or judged."""
+        """Draw the energy and the chosen or judged times as a matplotlib Figure."""
         from d2rpick.report import figures_choice
 
         drawn: Figure = getattr(figures_choice, f"draw_{self.kind}")(self)
@@ -119,31 +119,31 @@ class Paged(Answer):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,  # noqa: ARG002
     ) -> str:
-        """Write the page: ``command`` repeats it, ``judging`` are the options that judge a card by the same history."""
+        """Return the page; ``command`` repeats it, ``judging`` are the options with which ``card`` judges alike."""
         from d2rpick.report import pages
 
         written: str = getattr(pages, f"{self.kind}_page")(self, command)
         return written
 
     def report(self, path: arguments.Path) -> Path:
-        """Write everything to one HTML page that needs no network; an existing file is replaced."""
+        """Write the answer to one HTML page that needs no network; an existing file is replaced."""
         return written(path, self.page(("d2rpick", *self.command)))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RunAnswer(Paged):
-    """An answer about one run: how it was asked for, with the times of the command line.
+    """An answer about one run, with the question and the times of the command line.
 
-    ``run`` is what was asked about.
+    ``run`` is the run that was asked about.
     """
 
     question: Asked = field(repr=False)
     times: tuple[str, ...]
-    name: ClassVar[str]  # of the command
+    name: ClassVar[str]  # name of the command
 
     @property
     def run(self) -> Run:
-        """What was asked about."""
+        """The run that was asked about."""
         return self.question.run
 
     @property
@@ -152,10 +152,16 @@ class RunAnswer(Paged):
         return (self.name, *self.times, *self.question.options)
 
     @classmethod
-    def about(cls, asked: Asked, found: Any, *times: str, **more: Any) -> Self:
-        """Answer by what was found, with what the deck left unknown."""
+    def about(
+        cls, question: Asked, result: Any, *times: str, **further_fields: Any
+    ) -> Self:
+        """Make the public answer from a question and the result of the core, with the cautions of the question."""
         return cls.of(
-            found, cautions=asked.cautions, question=asked, times=times, **more
+            result,
+            cautions=question.cautions,
+            question=question,
+            times=times,
+            **further_fields,
         )
 
     def _context(
@@ -166,7 +172,7 @@ class RunAnswer(Paged):
         chosen: tuple[Situation, float] | None,
         explored: TradeOff | None,
     ) -> PageContext:
-        """Give what a page shows beside the answer, with the card of the chosen situation and tr."""
+        """Return what a page shows besides the answer, with the card of the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
         card = self._card(cards, *chosen) if chosen else None
@@ -181,7 +187,7 @@ class RunAnswer(Paged):
     def _card(
         self, cards: Cards | None, situation: Situation, tr: float
     ) -> SolverInput:
-        """Give the card of a tr, or why there is none, with what the deck of the run says of it."""
+        """Return the card of a tr with the notes of the run's deck, or the reason why there is none."""
         from d2rpick.choice.judged_card import SolverInput, input_for
 
         try:
@@ -192,35 +198,33 @@ class RunAnswer(Paged):
             self.question.reference, situation, tr, suited.request(self.question)
         )
 
-    def _explorer(self, found: Iterable[TradeOff | None]) -> Any:
-        """Give what can be explored on a page, and the command line that asks for each td."""
+    def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
+        """Return what can be explored on a page, and the command line that asks for each td."""
         from d2rpick.report.page import Explorer
 
-        trade_offs = tuple(one for one in found if one)
-        return (
-            Explorer(
+        trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
+        if trade_offs:
+            return Explorer(
                 trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)
             )
-            if trade_offs
-            else None
-        )
+        return None
 
 
 def written(path: arguments.Path, page: str) -> Path:
-    """Write a page and give its path."""
-    from pathlib import Path  # not above: a table does without it
+    """Write a page and return its path."""
+    from pathlib import Path  # imported here since a table does not need it
 
     from d2rpick.api import arguments
 
-    place = Path(*arguments.paths("path", path))
-    write_as_a_whole(place, page.encode())
-    return place
+    target = Path(*arguments.paths("path", path))
+    write_as_a_whole(target, page.encode())
+    return target
 
 
 def frame_of(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any
 ) -> pd.DataFrame:
-    """Give a row per mapping; what is not known is NaN, also where nothing of a column is known.
+    """Return a table with one row per mapping; unknown values are NaN, also if the whole column is unknown.
 
     Examples
     --------

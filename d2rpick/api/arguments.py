@@ -1,6 +1,6 @@
-"""Arguments of the library, checked before any file is opened: a wrong one is named in a TypeError or ValueError.
+"""Check the arguments of Python functions before any file is opened; read windows from a file.
 
-And windows as a file gives them.
+A wrong argument raises a TypeError or ValueError that names it.
 """
 
 from __future__ import annotations
@@ -22,28 +22,27 @@ if TYPE_CHECKING:
     Path = str | os.PathLike[str]
     Deck = (
         Path | Literal[False]
-    )  # False: none, also where one lies in the folder of the run
+    )  # False means no deck, even if one lies in the folder of the run
     Parts = str | int | Iterable[str | int]
 
-_LONGEST_SHOWN: Final = 60  # of a wrong value in a message
+_LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut off in a message
 
 
 class Choosing(TypedDict, total=False):
-    """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
+    """How to choose and judge, like the options of ``d2rpick suggest``; times in the unit of the history.
 
     None stands for the default.
 
-    ``after``: the load ends here, ``landing``: the next contact comes here (default: found from the record).
-    ``margin``: kept clear after the load and before the next contact (0; where td is chosen or the landing is given,
-    derived).
-    ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
-    identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
-    is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
-    energy alone shows when the load is over.  ``keep_vibration``: grade the vibration by itself, however little its
-    error is worth in the next contact.  ``min_quality``: "poor", "fair" or "good", the least grade of a pair that
-    `plan` plans and `check` passes ("fair").  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
-    step, and of the step while rigid to that while deformable, 1 or more.
+    ``after``: end of the load, ``landing``: the next contact (default: determined from the record).  ``margin``: time
+    kept free after the load and before the next contact (default 0; if td is chosen or the landing is given, it is
+    derived).  ``tolerance``: largest lock-in error, or level error if no oscillator is known (0.2).
+    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: used instead of
+    the identified one, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the only
+    window in which the oscillator is identified.  ``replay`` False: judge by the energy level alone.  ``strict``:
+    accept no tr if only the energy shows the end of the load.  ``keep_vibration``: grade the vibration by itself, even
+    if its error hardly matters in the next contact.  ``min_quality``: "poor", "fair" or "good", the lowest grade of a
+    pair that `plan` plans and `check` passes ("fair").  ``cost_share``: share of the switched parts in the cost of a
+    step.  ``step_ratio``: time step while rigid over that while deformable, 1 or more.
     """
 
     after: float | None
@@ -64,7 +63,7 @@ class Choosing(TypedDict, total=False):
 
 
 def number(name: str, value: object, limits: Number = TIME) -> float:
-    """Give a finite number within its limits.
+    """Return a finite number within its limits, or raise TypeError or ValueError.
 
     Examples
     --------
@@ -78,16 +77,16 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
         raise TypeError(
             f"{name} is {_shown(value)}, a number was expected{without_unit(value)}"
         )
-    found = float(value)  # type: ignore[arg-type]
-    if not math.isfinite(found):
-        raise ValueError(f"{name} is {found}, a finite number was expected")
-    if limit := limits.missed(found):
-        raise ValueError(f"{name} is {found:g}, a number {limit} was expected")
-    return found
+    converted = float(value)  # type: ignore[arg-type]
+    if not math.isfinite(converted):
+        raise ValueError(f"{name} is {converted}, a finite number was expected")
+    if limit := limits.missed(converted):
+        raise ValueError(f"{name} is {converted:g}, a number {limit} was expected")
+    return converted
 
 
 def is_number(value: object) -> bool:
-    """Return True for a number of Python or numpy, also in an array without axes; not for True, text or complex."""
+    """Return True for a number of Python or numpy, also in a 0-dimensional array; False for True, text or complex."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if (
         isinstance(value, bool | str | bytes)
@@ -99,7 +98,7 @@ def is_number(value: object) -> bool:
 
 
 def is_whole_number(value: object) -> bool:
-    """Return True for a whole number of Python or numpy; not for True, text or a float."""
+    """Return True for a whole number of Python or numpy; False for True, text or a float."""
     return (
         is_number(value)
         and hasattr(value, "__index__")
@@ -108,13 +107,11 @@ def is_whole_number(value: object) -> bool:
 
 
 def _shown(value: object) -> str:
-    """Write a wrong value in one line, cut where it is long."""
+    """Return a wrong value as one line of limited length."""
     text = " ".join(repr(value).split())
-    return (
-        text
-        if len(text) <= _LONGEST_SHOWN
-        else f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
-    )
+    if len(text) <= _LONGEST_SHOWN:
+        return text
+    return f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
 
 
 def flag(name: str, value: object, default: bool) -> bool:
@@ -143,19 +140,19 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
     """
     if value is None:
         return []
-    found = []
+    windows = []
     for number_of_pair, pair in enumerate(_each(name, value, "pairs of times")):
         times = window(f"{name}[{number_of_pair}]", pair)
         if times is None:
             raise TypeError(
                 f"{name}[{number_of_pair}] is None, a pair of times was expected"
             )
-        found.append(times)
-    return found
+        windows.append(times)
+    return windows
 
 
 def with_point(value: object) -> str:
-    """Say how a number with a decimal comma is given, or nothing.
+    """Return a hint how to write a number that has a decimal comma, empty for other texts.
 
     Examples
     --------
@@ -174,24 +171,22 @@ def with_point(value: object) -> str:
 
 
 def without_unit(value: object) -> str:
-    """Say how a time with a unit is given, or nothing."""
+    """Return a hint how to write a time that has a unit, empty for other texts."""
     from d2rpick.histories.names import parse_seconds
 
     seconds = parse_seconds(str(value))
-    return (
-        ""
-        if seconds is None
-        else f": give a number in the unit of the history, {seconds:g} where it is s"
-    )
+    if seconds is None:
+        return ""
+    return f": give a number in the unit of the history, {seconds:g} where it is s"
 
 
 def optional(name: str, value: object, limits: Number = TIME) -> float | None:
-    """Give a finite number within its limits, None where none is given."""
+    """Return a finite number within its limits, or None if none is given."""
     return None if value is None else number(name, value, limits)
 
 
 def window(name: str, value: object) -> tuple[float, float] | None:
-    """Give a window of time, the lower time first; None where none is given.
+    """Return a window of time, the lower time first, or None if none is given.
 
     Examples
     --------
@@ -208,16 +203,16 @@ def window(name: str, value: object) -> tuple[float, float] | None:
     if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
         raise TypeError(f"{name} is {_shown(value)}, a pair of times was expected")
     first, last = list(value)  # type: ignore[call-overload]
-    found = number(f"{name}[0]", first), number(f"{name}[1]", last)
-    if not found[0] < found[1]:
+    times = number(f"{name}[0]", first), number(f"{name}[1]", last)
+    if not times[0] < times[1]:
         raise ValueError(
-            f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first"
+            f"{name} is {times[0]:g} to {times[1]:g}, which is empty; the lower time comes first"
         )
-    return found
+    return times
 
 
 def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
-    """Give parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
+    """Return parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
 
     Examples
     --------
@@ -230,22 +225,23 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
 
     single = isinstance(value, str | int | Part) or is_whole_number(
         value
-    )  # a Part holds its number and its title
-    listed = (
-        [value] if single else list(_each(name, value, "a number, a title or several"))
-    )
-    for one in listed:
-        if not (isinstance(one, str) or is_whole_number(one)):
+    )  # a Part has a number and a title
+    if single:
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "a number, a title or several"))
+    for part in listed:
+        if not (isinstance(part, str) or is_whole_number(part)):
             raise TypeError(
-                f"{name} holds {_shown(one)}; numbers and titles of parts were expected"
+                f"{name} holds {_shown(part)}; numbers and titles of parts were expected"
             )
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
-    return tuple(str(one) for one in listed)
+    return tuple(str(part) for part in listed)
 
 
 def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Give ids of rules or their beginnings; a string is one of them.
+    """Return the ids of rules or their prefixes; a string is a single id.
 
     Examples
     --------
@@ -254,17 +250,18 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = (
-        [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
-    )
-    for one in listed:
-        if not isinstance(one, str):
-            raise TypeError(f"{name} holds {one!r}; ids of rules were expected")
+    if isinstance(value, str):
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "ids of rules"))
+    for rule in listed:
+        if not isinstance(rule, str):
+            raise TypeError(f"{name} holds {rule!r}; ids of rules were expected")
     return tuple(listed)
 
 
 def whole(name: str, value: object, low: int) -> int:
-    """Give a whole number of at least ``low``.
+    """Return a whole number of at least ``low``.
 
     Examples
     --------
@@ -278,86 +275,92 @@ def whole(name: str, value: object, low: int) -> int:
 
 
 def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
-    """Give the names of files; a string is one of them.
+    """Return the names of files; a string is a single name.
 
     Examples
     --------
     >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
     (('run/',), ('glstat', 'matsum'))
     """
-    listed = (
-        [value]
-        if isinstance(value, str | os.PathLike)
-        else list(_each(name, value, "a path or several"))
-    )
-    for one in listed:
-        if not isinstance(one, str | os.PathLike):
-            raise TypeError(f"{name} holds {_shown(one)}; paths were expected")
+    if isinstance(value, str | os.PathLike):
+        listed = [value]
+    else:
+        listed = list(_each(name, value, "a path or several"))
+    for path in listed:
+        if not isinstance(path, str | os.PathLike):
+            raise TypeError(f"{name} holds {_shown(path)}; paths were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a file or folder")
-    found = tuple(os.fsdecode(one) for one in listed)
-    for one in found:
-        if "\0" in one:
+    names = tuple(os.fsdecode(path) for path in listed)
+    for path in names:
+        if "\0" in path:
             raise ValueError(
-                f"{name} holds {one!r} with a NUL byte, which no name of a file has"
+                f"{name} holds {path!r} with a NUL byte, which no name of a file has"
             )
-    return found
+    return names
 
 
 def check_run(name: str, run: object) -> None:
-    """Raise TypeError for what is not a run that was read."""
+    """Raise TypeError unless the argument is a run as `read` returns it."""
     from d2rpick.api.tables import is_table
 
     if not (
         hasattr(run, "files") and hasattr(run, "overview")
-    ):  # its class imports this module
-        found = (
-            repr(run)
-            if isinstance(run, str | os.PathLike)
-            else f"of type {type(run).__name__}"
+    ):  # imported here since its class imports this module
+        if isinstance(run, str | os.PathLike):
+            description = repr(run)
+        else:
+            description = f"of type {type(run).__name__}"
+        function = "from_frame(...)" if is_table(run) else "read(...)"
+        raise TypeError(
+            f"{name} is {description}; give what d2rpick.{function} makes of it"
         )
-        made = "from_frame(...)" if is_table(run) else "read(...)"
-        raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
 
 
 def refuse_unknown(
-    name: str, known: Iterable[str], others: Iterable[str] = ()
+    name: str, known_names: Iterable[str], other_names: Iterable[str] = ()
 ) -> NoReturn:
-    """Raise the TypeError of an argument that does not exist, with the one of all that may be meant."""
+    """Raise the TypeError of an unknown argument, and suggest the most similar of all names."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, {*known, *others} - {name}, 1)
-    meant = f"is {near[0]!r} meant?" if near else f"expected one of {', '.join(known)}"
+    near = get_close_matches(name, {*known_names, *other_names} - {name}, 1)
+    meant = (
+        f"is {near[0]!r} meant?"
+        if near
+        else f"expected one of {', '.join(known_names)}"
+    )
     raise TypeError(f"there is no argument {name!r}; {meant}")
 
 
 def chosen(choosing: Choosing) -> dict[str, Any]:
-    """Give the fields of a request that say how to choose."""
-    known = Choosing.__annotations__
-    if unknown := [name for name in choosing if name not in known]:
+    """Return the fields of a request that contain how to choose."""
+    annotations = Choosing.__annotations__
+    if unknown := [name for name in choosing if name not in annotations]:
         refuse_unknown(
-            unknown[0], known, ("parts", "flying", "deck", "weights", "td_window")
+            unknown[0], annotations, ("parts", "flying", "deck", "weights", "td_window")
         )
-    given: dict[str, Any] = dict(choosing)
-    oscillator = _check_oscillator(given.pop("oscillator", None))
-    if (oscillator is None) != (given.get("v0") is None):
+    arguments: dict[str, Any] = dict(choosing)
+    oscillator = _check_oscillator(arguments.pop("oscillator", None))
+    if (oscillator is None) != (arguments.get("v0") is None):
         raise ValueError(
             "oscillator and v0 go together: the one vibrates because of the other"
         )
-    if given.get("tolerance", 0.0) is None:
-        del given["tolerance"]
-    check_grade(given.get("min_quality"))
+    if arguments.get("tolerance", 0.0) is None:
+        del arguments["tolerance"]
+    check_grade(arguments.get("min_quality"))
     of_other_kinds = {"replay", "strict", "keep_vibration", "fit_window", "min_quality"}
-    for name in given.keys() - of_other_kinds:
+    for name in arguments.keys() - of_other_kinds:
         limits: Any = OPTIONS[name].kind
-        if given[name] is not None:
-            given[name] = number(name, given[name], limits)
-    given["fit_window"] = window("fit_window", given.get("fit_window"))
-    given["no_verify"] = not flag("replay", given.pop("replay", None), True)
-    given["strict"] = flag("strict", given.get("strict"), False)
-    given["keep_vibration"] = flag("keep_vibration", given.get("keep_vibration"), False)
+        if arguments[name] is not None:
+            arguments[name] = number(name, arguments[name], limits)
+    arguments["fit_window"] = window("fit_window", arguments.get("fit_window"))
+    arguments["no_verify"] = not flag("replay", arguments.pop("replay", None), True)
+    arguments["strict"] = flag("strict", arguments.get("strict"), False)
+    arguments["keep_vibration"] = flag(
+        "keep_vibration", arguments.get("keep_vibration"), False
+    )
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
-    return given | {
+    return arguments | {
         name: float(getattr(oscillator, name))
         for name in of_oscillator
         if oscillator is not None
@@ -365,7 +368,7 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
 
 
 def check_grade(value: object) -> None:
-    """Refuse what is no grade of a pair.
+    """Raise ValueError unless the value is a grade of a pair.
 
     Examples
     --------
@@ -385,7 +388,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
         return None
     from d2rpick.vibration.oscillator import (
         Oscillator,
-    )  # not above: mostly none is given
+    )  # imported here since an oscillator is rarely given
 
     if not isinstance(value, Oscillator):
         raise TypeError(
@@ -395,12 +398,14 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
 
 def file_or_weights(value: object) -> Any:
-    """Return weights, or the name of the file that holds them; None where none are given."""
+    """Return weights, or the name of the file that contains them, or None if none are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
         return one_path("weights", value)
-    from d2rpick.choice.cost import Weights  # not above: mostly none are given
+    from d2rpick.choice.cost import (
+        Weights,
+    )  # imported here since weights are rarely given
 
     if not isinstance(value, Weights):
         raise TypeError(
@@ -416,27 +421,27 @@ def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
         or getattr(value, "ndim", 1) == 0
     ):
         raise TypeError(f"{name} is {_shown(value)}; {expected} were expected")
-    found: Iterable[Any] = value
-    return found
+    values: Iterable[Any] = value
+    return values
 
 
 def one_path(name: str, value: Path) -> str:
-    """Give the name of one file."""
-    found = paths(name, value)
-    if len(found) > 1:
-        raise ValueError(f"{name} names {len(found)} files, one was expected")
-    return found[0]
+    """Return the name of a single file."""
+    names = paths(name, value)
+    if len(names) > 1:
+        raise ValueError(f"{name} names {len(names)} files, one was expected")
+    return names[0]
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
-    """Read windows as ``d2rpick plan -f value`` prints them: a line ``tr td`` for each; or the journal of a driven run.
+    """Read windows as ``d2rpick plan -f value`` prints them, a line ``tr td`` for each, or the journal of a driven run.
 
-    Empty lines and those that begin with ``#`` are passed over.
+    Empty lines and lines that begin with ``#`` are skipped.
 
     Raises
     ------
     DeckError
-        For any other line, with its number, and when there is no window at all.
+        For any other line, with its number, and if there is no window at all.
     """
     windows: list[tuple[float, float]] = []
     if text.lstrip().startswith("{"):
@@ -461,12 +466,10 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _of_journal(text: str) -> list[tuple[float, float]]:
-    """Windows of the rigid legs that a run has kept: a leg takes the place of an earlier one of its number."""
-    import json  # not above: start-up
+    """Return the windows of the rigid restart segments in a journal; of segments with one number, the last counts."""
+    import json  # imported here to keep the start fast
 
-    legs: list[
-        tuple[int, bool, float, float]
-    ] = []  # number, whether it is rigid, start, end
+    legs: list[tuple[int, bool, float, float]] = []  # number, True if rigid, start, end
     for line in text.splitlines():
         try:
             record = json.loads(line)
@@ -483,7 +486,7 @@ def _of_journal(text: str) -> list[tuple[float, float]]:
                     )
                 )
         except (ValueError, KeyError, TypeError):
-            continue  # cut, or of another kind
+            continue  # an incomplete line, or one of another kind
     latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
     windows: list[tuple[float, float]] = []
     rigid_before = False

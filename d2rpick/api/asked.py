@@ -1,6 +1,6 @@
-"""The way from a request to what a choice needs: open, let the deck tell, take the energy, cost it.
+"""Turn a request into a question: open the run, complete the settings from the deck, select the energy, add the cost.
 
-The commands of one run and Python go this way; `d2rpick.choice.answers` leads on from there to an answer.
+The commands of one run and the Python functions use this; `d2rpick.choice.answers` computes the answer.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 
 class Asked(NamedTuple):
-    """A run that is open, the energy in it that is meant, and how it is judged.
+    """A question: the opened run, the selected energy, and how it is judged.
 
-    ``cautions`` are what the deck left unknown, ``selection`` the columns and parts, with those that the deck names;
-    ``on_card`` are parts that stand on the card alone.
+    ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
+    deck.  ``on_card`` are parts that only the card contains.
     """
 
     run: Run
@@ -48,20 +48,20 @@ class Asked(NamedTuple):
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
     of_this_run: bool = (
-        True  # whether the deck, where there is one, may be that of the run
+        True  # True if the deck, if there is one, may be that of the run
     )
 
     @property
     def deck(self) -> str | None:
-        """The main deck of the run; None without one, or if it is the deck of another model."""
+        """The main deck of the run; None without a deck, or if it is the deck of another model."""
         return self.request.deck if self.of_this_run else None
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What follows the times in the command line that asks the same."""
+        """Options that follow the times in the command line of the same question."""
         from d2rpick.report.tables import (
             positional,
-        )  # not above: most answers repeat no command
+        )  # imported here since most answers repeat no command
 
         return (*self.request.asking(), *positional(self.request.history))
 
@@ -74,7 +74,7 @@ def request_of(
     weights: Weights | arguments.Path | None,
     choosing: Choosing,
 ) -> Request:
-    """Ask as the arguments say; TypeError for one that is not of its kind or does not exist."""
+    """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument."""
     if run is not None:
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()
@@ -98,7 +98,7 @@ def request_of(
 
 
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
-    """Open the run that is asked about, or other files as its files are opened."""
+    """Open the run of the request, or other files in the same way."""
     from d2rpick.api.runs import Run, folder_of
     from d2rpick.histories import opening
 
@@ -109,21 +109,21 @@ def open_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def on_card_only(request: Request, run: histories.Run) -> bool:
-    """Whether parts can stand on a card alone: a table knows none, and a named energy judges for all."""
+    """Return True if parts may be only on the card: a table has no parts, and a named energy stands for all."""
     return bool(request.energy) or not run.parts
 
 
 def ask(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> Asked:
-    """Take the energy that is asked for of a run, with what its deck tells.
+    """Select the energy of a run that a request asks for, with the data of its deck.
 
     Parameters
     ----------
     run : Run
     request : Request
     card_alone : bool
-        Only a card is asked for: parts that the history has not stand there, and the energy is that of the model.
+        Only a card is requested: it may have parts that the history lacks, and the energy is that of the model.
     merge : int, optional
         Part into which all others are merged on the card: they become one rigid body.
 
@@ -132,9 +132,11 @@ def ask(
     D2RPickError
         If the run has no such parts or energy, or the deck or the weights cannot be read.
     ArgumentError
-        If the recommended set is asked for beside other parts, or without a deck.
+        If the recommended set is requested together with other parts, or without a deck.
     """
-    settings, model, files = request.settings, model_of(request), run.files
+    settings = request.settings
+    model = model_of(request)
+    files = run.files
     selection = request.selection(parts=False)._replace(parts=request.part)
     if request.part:
         _check_recommended(request, files)
@@ -149,7 +151,7 @@ def ask(
     if card_alone and on_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # refuses a named energy beside them
+        request.selection()  # refuses a named energy together with parts
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
@@ -157,7 +159,7 @@ def ask(
 
         settings, cautions = with_deck(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
-    asked = Asked(
+    question = Asked(
         run,
         request,
         reference,
@@ -168,11 +170,11 @@ def ask(
         cautions,
         of_this_run=not foreign,
     )
-    return asked if merge is None else _merged(asked, merge)
+    return question if merge is None else _merged(question, merge)
 
 
 def model_of(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or the file of these; None without one.
+    """Read the deck with its weights, or the weights alone; return None without either.
 
     Raises
     ------
@@ -194,7 +196,7 @@ def model_of(request: Request) -> CostModel | None:
 def selected(
     run: histories.Run, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection: the parts of the recommended set for that word, and the springs of deck and energies.
+    """Complete a selection: add the parts of the recommended set, and the springs of the deck that have energies.
 
     Raises
     ------
@@ -222,7 +224,7 @@ def selected(
 
 
 def _check_recommended(request: Request, run: histories.Run) -> None:
-    """Refuse the word for the recommended set beside other parts, or without a deck."""
+    """Refuse the recommended set together with other parts, or without a deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
@@ -234,22 +236,23 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
             )
 
 
-def _merged(asked: Asked, merge: int) -> Asked:
-    """Let the parts become one rigid body, with a caution where nothing joins them."""
+def _merged(question: Asked, merge: int) -> Asked:
+    """Make the parts one rigid body, with a caution if nothing connects them."""
     from d2rpick.choice.deck_of_run import merged
 
-    parts = asked.reference.history.parts
+    parts = question.reference.history.parts
     if not parts:
-        return asked
-    cautions, bodies = asked.cautions, asked.settings.bodies or ()
+        return question
+    cautions = question.cautions
+    bodies = question.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
-        found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        message = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
         cautions = (
             *cautions,
-            Caution("merged-apart", f"{found}; leave it out to keep them apart"),
+            Caution("merged-apart", f"{message}; leave it out to keep them apart"),
         )
     body = merged({part.id for part in parts} | {merge}, bodies)
-    return asked._replace(
-        settings=replace(asked.settings, bodies=(body,)), cautions=cautions
+    return question._replace(
+        settings=replace(question.settings, bodies=(body,)), cautions=cautions
     )

@@ -1,4 +1,4 @@
-"""What ``check`` says of a card in the deck of its run, before anybody pastes it."""
+"""Check a card in the deck of its run before the user pastes it there."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ UNJOINED: Final = "parts-not-joined"
 
 
 def collect_objections(
-    card: PrintedCard, asked: Asked, parts: int
+    card: PrintedCard, question: Asked, parts: int
 ) -> Iterator[Caution]:
-    """Say what ``check`` has against a deck with the card in it; without a deck, what nobody knows of its parts.
+    """Yield the findings of ``check`` in a deck with the card; without a deck, what is unknown about its parts.
 
-    ``parts`` is how many the card switches by their ids.
+    ``parts`` is the number of parts that the card switches by their ids.
     """
-    if asked.deck is None:
+    if question.deck is None:
         if parts > 1:
             message = "no deck of the run was read, so nobody knows whether these parts share nodes"
             yield Caution(
@@ -39,15 +39,15 @@ def collect_objections(
 
     with TemporaryDirectory() as folder:
         try:
-            checked = check_deck(write_deck(asked.deck, card, folder)[0])
+            checked = check_deck(write_deck(question.deck, card, folder)[0])
         except DeckError as error:
             yield Caution(OBJECTION, f"the card does not go into the deck: {error}")
             return
         for finding in checked.findings:
             if finding.severity is not INFO:
-                place = finding.file.removeprefix(f"{folder}/")
+                location = finding.file.removeprefix(f"{folder}/")
                 message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
                 yield Caution(
                     OBJECTION,
-                    f"check of the deck with this card, {place}:{finding.line}: {message}",
+                    f"check of the deck with this card, {location}:{finding.line}: {message}",
                 )

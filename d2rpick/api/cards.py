@@ -1,4 +1,4 @@
-"""What is asked of a card beside its times, and the card of an answer."""
+"""Define the options of a card, and print the card of an answer."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ _ONLY_JUDGED: Final = (
 
 
 class CardOptions(TypedDict, total=False):
-    """How a card is printed.
+    """Options of a card.
 
-    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history); with
-    ``contact`` or ``wall``, the number of what pushes, ``"ls-dyna-contact"`` or ``"radioss-contact"``.
-    ``step_cap``: the largest time step while rigid.  LS-DYNA: ``merge``, the lead part that all others are merged into,
-    ``swset``, ids of the two switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies,
-    ``end`` of the run and its ``name``.
+    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the solver that wrote the history); with
+    the id of a ``contact`` or ``wall``, ``"ls-dyna-contact"`` or ``"radioss-contact"``.  ``step_cap``: the largest time
+    step while rigid.  LS-DYNA: ``merge``, the lead part into which all others are merged, ``swset``, the ids of the two
+    switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies, ``end`` of the run and its
+    ``name``.
     """
 
     solver: str | None
@@ -63,7 +63,7 @@ class CardOptions(TypedDict, total=False):
 
 
 class Judging(CardOptions, total=False):
-    """The same, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
+    """Options of a card, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
 
     after: float | None
     landing: float | None
@@ -72,7 +72,7 @@ class Judging(CardOptions, total=False):
 
 
 def _checked(name: str, value: Any, option: Option) -> Any:
-    """Give a value in its kind."""
+    """Return a value converted to the kind of its option."""
     from d2rpick.api import arguments
 
     kind = option.kind
@@ -86,7 +86,7 @@ def _checked(name: str, value: Any, option: Option) -> Any:
         )
         if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
             raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
-        return tuple(arguments.whole(name, one, _IDS.start) for one in value)
+        return tuple(arguments.whole(name, number, _IDS.start) for number in value)
     if isinstance(kind, range):
         return arguments.whole(name, value, kind.start)
     if isinstance(kind, Number):
@@ -101,15 +101,15 @@ def _checked(name: str, value: Any, option: Option) -> Any:
 
 
 def solvers() -> Sequence[str]:
-    """Names of the solvers whose input can be printed."""
-    from d2rpick.deck.printing import SOLVERS  # not above: start-up
+    """Return the names of the solvers whose input can be printed."""
+    from d2rpick.deck.printing import SOLVERS  # imported here to keep the start fast
 
     return tuple(SOLVERS)
 
 
 @dataclass(eq=False, repr=False)
 class Cards:
-    """How a card is printed: the options of every command that prints one."""
+    """Options of a card, shared by all commands that print one."""
 
     solver: str | None = option(
         "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
@@ -144,31 +144,33 @@ class Cards:
     wall: int | None = option(
         "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
     )
-    starter: str = ""  # cards that the starter deck lacks
-    sensor: int = 901  # first id of sensors that is free
-    delete_nodal_bodies: bool = False  # as those of Printing
+    starter: str = ""  # cards to be added to the starter deck
+    sensor: int = 901  # first free id of sensors
+    delete_nodal_bodies: bool = False  # see Printing
     delete_node_sets: bool = False
-    replaced: tuple[int, ...] = ()  # main nodes of bodies that leave the starter deck
+    replaced: tuple[
+        int, ...
+    ] = ()  # main nodes of bodies to be removed from the starter deck
 
     @classmethod
-    def of(cls, given: CardOptions) -> Cards:
-        """Take the arguments of Python; TypeError or ValueError for one that is not of its kind."""
+    def of(cls, arguments_of_card: CardOptions) -> Cards:
+        """Check the arguments of Python; raise TypeError or ValueError for a wrong one."""
         from d2rpick.api import arguments
 
-        known = options_of(Cards)
-        if unknown := [name for name in given if name not in known]:
-            arguments.refuse_unknown(unknown[0], known)
+        known_options = options_of(Cards)
+        if unknown := [name for name in arguments_of_card if name not in known_options]:
+            arguments.refuse_unknown(unknown[0], known_options)
         return cls(
             **{
-                name: _checked(name, one, known[name])
-                for name, one in given.items()
-                if one is not None
+                name: _checked(name, option_value, known_options[name])
+                for name, option_value in arguments_of_card.items()
+                if option_value is not None
             }
         )
 
     @property
     def given(self) -> list[str]:
-        """Names of the options that were given, the solver aside."""
+        """Names of the given options, without the solver."""
         return [
             name
             for name in options_of(Cards)
@@ -176,12 +178,12 @@ class Cards:
         ]
 
     def printing(self, parts: Sequence[int] = ()) -> Printing:
-        """Say what a card says besides its times and its solver."""
+        """Return the content of a card besides its times and its solver."""
         from d2rpick.deck.printed_card import Printing
 
-        given = {name: getattr(self, name) for name in self.given}
+        values = {name: getattr(self, name) for name in self.given}
         if self.node:
-            given["node"] = tuple(numbers("--node", self.node))
+            values["node"] = tuple(numbers("--node", self.node))
         return Printing(
             part=tuple(parts),
             starter=self.starter,
@@ -189,26 +191,32 @@ class Cards:
             replaced=self.replaced,
             delete_nodal_bodies=self.delete_nodal_bodies,
             delete_node_sets=self.delete_node_sets,
-            **given,
+            **values,
         )
 
     def check_solver(self, solver: str) -> None:
-        """Refuse an option that says what the input of ``solver`` has no place for."""
+        """Refuse options that have no place in the input of ``solver``."""
         from d2rpick.deck.printing import SOLVERS
 
-        places = {name: {one.switches, *one.takes} for name, one in SOLVERS.items()}
+        options_by_solver = {
+            name: {solver_or_input.switches, *solver_or_input.takes}
+            for name, solver_or_input in SOLVERS.items()
+        }
         for name in self.given:
-            if name not in places[solver]:
-                owner = next(one for one, takes in places.items() if name in takes)
-                hint = (
-                    ""
-                    if self.solver
-                    else f"; without `solver` the card is one for {SOLVERS[solver].title}"
+            if name not in options_by_solver[solver]:
+                owner = next(
+                    solver_or_input
+                    for solver_or_input, takes in options_by_solver.items()
+                    if name in takes
                 )
+                if self.solver:
+                    hint = ""
+                else:
+                    hint = f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
-    def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
-        """Complete a card by the deck of the run, unless its options say otherwise.
+    def by_deck(self, question: Asked) -> tuple[Cards, tuple[str, ...]]:
+        """Complete the options of a card from the deck of the run, unless they are given.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.  Notes say which bodies it lacks.
@@ -218,30 +226,28 @@ class Cards:
         DeckError
             If the deck cannot be read, or rigid bodies of it cannot switch the parts.
         """
-        deck, parts = (
-            asked.deck,
-            [part.id for part in asked.reference.history.parts or ()],
-        )
+        deck = question.deck
+        parts = [part.id for part in question.reference.history.parts or ()]
         if deck is None:
             return self, ()
         from d2rpick.deck.suiting import find_suiting
 
-        found = find_suiting(deck, parts)
-        cards = replace(self, solver=self.solver or found.solver)
-        if found.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
+        suiting = find_suiting(deck, parts)
+        cards = replace(self, solver=self.solver or suiting.solver)
+        if suiting.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
             cards = replace(
                 cards,
-                swset=cards.swset or found.swset,
-                delete_nodal_bodies=found.delete_nodal_bodies,
-                delete_node_sets=found.delete_node_sets,
+                swset=cards.swset or suiting.swset,
+                delete_nodal_bodies=suiting.delete_nodal_bodies,
+                delete_node_sets=suiting.delete_node_sets,
             )
             return cards, ()
         from d2rpick.deck.printing import SOLVERS
 
-        if SOLVERS[cards.solver or ""].title != SOLVERS[found.solver].title:
+        if SOLVERS[cards.solver or ""].title != SOLVERS[suiting.solver].title:
             return cards, ()
-        end = found.end if cards.end is None else cards.end
-        cards = replace(cards, name=cards.name or found.name, end=end)
+        end = suiting.end if cards.end is None else cards.end
+        cards = replace(cards, name=cards.name or suiting.name, end=end)
         if not parts or cards.node:
             return cards, ()
         from d2rpick.deck.radioss_bodies import find_bodies
@@ -252,43 +258,45 @@ class Cards:
         )
         return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
-    def request(self, asked: Asked) -> CardRequest:
-        """Say how the card of a run is printed."""
+    def request(self, question: Asked) -> CardRequest:
+        """Return how the card of a run is printed."""
         from d2rpick.choice.judged_card import CardRequest
 
         request = CardRequest(
-            self.solver, self.printing(numbers("--part", asked.on_card))
+            self.solver, self.printing(numbers("--part", question.on_card))
         )
-        self.check_solver(request.of(asked.reference.history)[0])
+        self.check_solver(request.of(question.reference.history)[0])
         return request
 
 
-# Keys of the settings that are for all commands; further ones are for the rules of check, or for one command.
+# Keys in the settings that apply to all commands; other keys apply to the rules of check, or to one command.
 SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 
 def needed(solver: Module) -> str:
-    """Say which argument names whom the card of ``solver`` switches."""
-    what = {
+    """Return the argument that names what the card of ``solver`` switches."""
+    arguments_by_kind = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
     }
-    return f"a card for {solver.title} needs {what[solver.switches]}"
+    return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
 def numbers(name: str, texts: Sequence[str]) -> list[int]:
-    """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
+    """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
-        found = re.fullmatch(_RANGE, piece, re.ASCII)
-        if not found:
-            hint = (
-                "; titles need a --history that has parts" if name == "--part" else ""
-            )
+        match = re.fullmatch(_RANGE, piece, re.ASCII)
+        if not match:
+            if name == "--part":
+                hint = "; titles need a --history that has parts"
+            else:
+                hint = ""
             raise ArgumentError(
                 f"{name}: {piece!r} is not a number (7) or range (10-19){hint}"
             )
-        low, high = int(found[1]), int(found[2] or found[1])
+        low = int(match[1])
+        high = int(match[2] or match[1])
         if not low <= high < low + _MOST_IDS:
             raise ArgumentError(
                 f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
@@ -298,10 +306,10 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, with what was found of each of its new windows as printed; ``str`` gives its text.
+    """A card with the verdict on each of its new windows as printed; ``str`` returns its text.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
-    ``cautions`` are what `check` has against the card in the deck of the run, and what is not known without a deck.
+    ``cautions`` are the findings of `check` with the card in the deck of the run, and without a deck what is unknown.
     """
 
     card: PrintedCard
@@ -313,12 +321,12 @@ class JudgedCard(NamedTuple):
 
     @property
     def verified(self) -> bool:
-        """Whether all windows are."""
+        """True if all windows are verified."""
         return all(verdict.verified for verdict in self.verdicts)
 
     @property
     def passed(self) -> bool:
-        """Whether all windows are admissible, and as good as ``min_quality`` asks for."""
+        """True if all windows are admissible and have at least the grade ``min_quality``."""
         return all(
             verdict.decision.reaches(verdict.situation.settings.min_quality)
             for verdict in self.verdicts
@@ -326,13 +334,13 @@ class JudgedCard(NamedTuple):
 
 
 def judged(
-    asked: Asked,
+    question: Asked,
     cards: Cards,
     windows: Sequence[Times],
     judge: Callable[[float, float], Verdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card of windows that are judged as printed, as `verify` does it or by ``judge``.
+    """Print the card of windows, judged as printed like in `verify`, or by ``judge``.
 
     Raises
     ------
@@ -344,25 +352,25 @@ def judged(
     from d2rpick.choice.judged_card import judged_card
     from d2rpick.deck.printing import SOLVERS
 
-    cards, notes = cards.by_deck(asked)
-    reference, request = asked.reference, cards.request(asked).by(asked.settings)
-    judge = judge or partial(verify_of, reference, settings=asked.settings)
-    found = judged_card(windows, reference.history, judge, request, done)
+    cards, notes = cards.by_deck(question)
+    reference = question.reference
+    request = cards.request(question).by(question.settings)
+    judge = judge or partial(verify_of, reference, settings=question.settings)
+    result = judged_card(windows, reference.history, judge, request, done)
     solver, printing = request.of(reference.history)
-    if found is None:
+    if result is None:
         raise ArgumentError(needed(SOLVERS[solver]))
-    card, verdicts = found
+    card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
-    apart = (
-        0
-        if printing.merge or SOLVERS[solver].switches != "part"
-        else len(printing.part)
-    )
-    return JudgedCard(card, verdicts, tuple(collect_objections(card, asked, apart)))
+    if printing.merge or SOLVERS[solver].switches != "part":
+        apart = 0
+    else:
+        apart = len(printing.part)
+    return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
 
 
 def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Cautions of a card and of its verdicts, each once, and the verdicts themselves where they are objections."""
+    """Return the cautions of a card and of its verdicts, each once, and a caution for each failed verdict."""
     of_verdicts = (
         caution for verdict in card.verdicts for caution in _cautions(verdict)
     )
@@ -373,8 +381,10 @@ def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
     decision = verdict.decision
     if not decision.reaches(verdict.situation.settings.min_quality):
-        told = f"{decision.verdict}: {decision.reason}"
-        yield Caution("not-verified", f"the times as printed: {told}; {decision.cure}")
+        message = f"{decision.verdict}: {decision.reason}"
+        yield Caution(
+            "not-verified", f"the times as printed: {message}; {decision.cure}"
+        )
 
 
 def card(
@@ -384,7 +394,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; where there is a run they are judged by it.
+    """Print solver input for switching windows, as ``d2rpick card`` does; with a run they are judged by it.
 
     Parameters
     ----------
@@ -419,42 +429,44 @@ def card(
     from d2rpick.api.asked import request_of
 
     times = arguments.pairs("windows", windows)
-    given: dict[str, Any] = dict(options)
+    arguments_of_card: dict[str, Any] = dict(options)
     judging: Any = {
-        name: given.pop(name)
+        name: arguments_of_card.pop(name)
         for name in ("after", "landing", "margin", "tolerance")
-        if name in given
+        if name in arguments_of_card
     }
     return card_of(
         times,
         run,
         request_of(run, parts, None, None, None, judging),
-        Cards.of(given),  # type: ignore[arg-type]
+        Cards.of(arguments_of_card),  # type: ignore[arg-type]
     )
 
 
 def card_of(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card of windows, judged as printed where there is a run."""
+    """Print the card of windows, judged as printed if there is a run."""
     from d2rpick.deck.printing import DEFAULT, SOLVERS, print_cards
 
     if run is None:
         request.without_history()
         solver = cards.solver or DEFAULT
         return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
-    from d2rpick.api.asked import ask  # not above: a card alone does without numpy
+    from d2rpick.api.asked import (
+        ask,
+    )  # imported here since a card alone does not need numpy
 
-    asked = ask(run, request, card_alone=True)
-    wanted = cards.request(asked)
-    module = SOLVERS[wanted.of(asked.reference.history)[0]]
+    question = ask(run, request, card_alone=True)
+    wanted = cards.request(question)
+    module = SOLVERS[wanted.of(question.reference.history)[0]]
     if wanted.printing.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
-    return judged(asked, cards, windows)
+    return judged(question, cards, windows)
 
 
 def _alone(request: Request, cards: Cards, solver: str) -> Printing:
-    """Say what the card needs where no history says anything; ArgumentError where something is missing."""
+    """Return the content of a card without a history; raise ArgumentError if something is missing."""
     from d2rpick.deck.printing import SOLVERS
 
     cards.check_solver(solver)

@@ -1,4 +1,4 @@
-"""The deck check."""
+"""Check decks by the rules and, with a history, by the verdict on their windows."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Findings(Answer, Checks):
-    """Answer of `check`; nothing of it changes.
+    """Answer of `check`; it is immutable.
 
-    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
-    which parts are rigid; ``notes`` say what the readers of the history left out or assumed, and which settings are
-    not used.
+    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``.  ``windows`` are the
+    windows in which parts are rigid.  ``notes`` report what the readers of the history left out or assumed, and unused
+    settings.
     """
 
     command: tuple[str, ...] = ()
@@ -50,28 +50,28 @@ class Findings(Answer, Checks):
 
     @property
     def passed(self) -> bool:
-        """Whether all decks were checked, and nothing weighs as much as ``fail_on``."""
+        """True if all decks were checked, and no finding is as severe as ``fail_on``."""
         return not self.failed and all(
-            one.severity.rank > self.fail_on.rank for one in self.findings
+            finding.severity.rank > self.fail_on.rank for finding in self.findings
         )
 
     @property
     def decks(self) -> tuple[str, ...]:
         """Names of the main decks."""
-        return tuple(one.deck for one in self.results)
+        return tuple(result.deck for result in self.results)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the rules have against the cards of all decks."""
-        return tuple(finding for one in self.results for finding in one.findings)
+        """Findings of the rules in all decks."""
+        return tuple(finding for result in self.results for finding in result.findings)
 
     @property
     def windows(self) -> tuple[CheckedWindow, ...]:
-        """Windows in which parts are rigid, of all decks."""
-        return tuple(window for one in self.results for window in one.windows)
+        """Windows of all decks in which parts are rigid."""
+        return tuple(window for result in self.results for window in result.windows)
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per finding, a column per key of ``findings`` in the JSON.
+        """Return a table with a row per finding and a column per key of ``findings`` in the JSON.
 
         Examples
         --------
@@ -128,7 +128,7 @@ def check(
     """
     from d2rpick.api.asked import (
         request_of,
-    )  # not above: without a history nothing is computed
+    )  # imported here since nothing is computed without a history
 
     names = arguments.paths("decks", decks)
     if history is not None:
@@ -137,18 +137,16 @@ def check(
     rules = Configuration(
         arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore)
     )
-    named = [
-        text
-        for name in ("select", "ignore")
-        for one in getattr(rules, name)
-        for text in (f"--{name}", one)
-    ]
+    rule_options: list[str] = []
+    for name in ("select", "ignore"):
+        for rule in getattr(rules, name):
+            rule_options += [f"--{name}", rule]
     files = [text for name in request.history for text in ("--history", name)]
-    command = ("check", *files, *request.asking(), *named, *positional(names))
-    found = findings_of(names, history, request, *rules[:2], command=command)
-    for one in found.failed:
-        raise one.error
-    return found
+    command = ("check", *files, *request.asking(), *rule_options, *positional(names))
+    findings = findings_of(names, history, request, *rules[:2], command=command)
+    for failed_deck in findings.failed:
+        raise failed_deck.error
+    return findings
 
 
 def findings_of(
@@ -161,23 +159,27 @@ def findings_of(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check decks as they are named, by a run where there is one."""
+    """Check the named decks, by a run if there is one."""
     judge = None
     if run is None:
         request.without_history()
     else:
-        from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
+        from d2rpick.rules.judgement import (
+            HistoryJudge,
+        )  # imported here since it loads numpy
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
     rules.verify(RULES)
-    found = list(_each(decks, rules, judge))
-    results = tuple(one for one in found if isinstance(one, Checked))
+    outcomes = list(_each(decks, rules, judge))
+    results = tuple(outcome for outcome in outcomes if isinstance(outcome, Checked))
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     unused_settings = dict.fromkeys(note for result in results for note in result.notes)
     return Findings(
         results=results,
-        failed=tuple(one for one in found if isinstance(one, Unreadable)),
+        failed=tuple(
+            outcome for outcome in outcomes if isinstance(outcome, Unreadable)
+        ),
         cautions=(
             *(judge.cautions if judge else ()),
             *(Caution("unknown-rule", remark) for remark in remarks),
@@ -190,7 +192,7 @@ def findings_of(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that was written here by the configuration nearest to it."""
+    """Check a deck that d2rpick wrote, by the configuration nearest to it."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -200,15 +202,17 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 
 
 def _each(
-    named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
+    deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
-    seen: set[str] = set()
-    real_folder = cache(os.path.realpath)  # which asks the system for each folder above
+    """Yield the result of each deck once, for a run by its first file; a folder stands for its main decks."""
+    visited: set[str] = set()
+    real_folder = cache(
+        os.path.realpath
+    )  # cached since it asks the system for each parent folder
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
-    found_by_name = {name: _decks(name) for name in dict.fromkeys(named)}
+    found_by_name = {name: _decks(name) for name in dict.fromkeys(deck_names)}
     listed = [
         deck
         for decks in found_by_name.values()
@@ -227,19 +231,22 @@ def _each(
                 if os.path.islink(deck)  # noqa: PTH114
                 else os.path.join(real_folder(folder), file)  # noqa: PTH118
             )
-            if real not in seen and not any(deck in legs for legs in restarts.values()):
-                found = _found(deck, configured, judge, folder, restarts.get(deck, ()))
-                others = (
-                    []
-                    if isinstance(found, Checked) and found.solver == LS_DYNA
-                    else list_run_files(deck)
+            if real not in visited and not any(
+                deck in legs for legs in restarts.values()
+            ):
+                outcome = _found(
+                    deck, configured, judge, folder, restarts.get(deck, ())
                 )
-                seen.update([real, *map(os.path.realpath, others)])
-                yield found
+                if isinstance(outcome, Checked) and outcome.solver == LS_DYNA:
+                    other_files = []
+                else:
+                    other_files = list_run_files(deck)
+                visited.update([real, *map(os.path.realpath, other_files)])
+                yield outcome
 
 
 def _decks(name: str) -> list[str] | DeckError:
-    """Give the main decks in a folder, or the deck itself; an error for a folder without any."""
+    """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
     try:
         return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
     except DeckError as error:
@@ -247,18 +254,18 @@ def _decks(name: str) -> list[str] | DeckError:
 
 
 def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
-    """Give the small restarts that go on with the run of a deck of LS-DYNA, the only other deck in their folder."""
+    """Return for each deck of LS-DYNA its small restarts: the only other decks in its folder."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
         folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
-        beside = [
+        neighbours = [
             deck
             for deck in decks
             if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
         ]
-        if len(beside) == 1 and not list_run_files(beside[0]):
-            legs.setdefault(beside[0], []).append(restart)
+        if len(neighbours) == 1 and not list_run_files(neighbours[0]):
+            legs.setdefault(neighbours[0], []).append(restart)
     return legs
 
 
@@ -269,7 +276,7 @@ def _found(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
+    """Check a deck by the configuration nearest to it; return an error in either, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)
@@ -277,11 +284,11 @@ def _found(
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:
             judge.beside(name)
-        found = check_deck(name, configuration, judge, content, restarts)
-        return found._replace(files=(source, *found.files), notes=configuration.notes)
+        result = check_deck(name, configuration, judge, content, restarts)
+        return result._replace(files=(source, *result.files), notes=configuration.notes)
     except Exception as error:
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # about the history, by which all are judged
+            raise  # the error concerns the history, by which all decks are judged
         return Unreadable(name, error, (source,))

@@ -1,4 +1,4 @@
-"""What parts cost: which may be switched, what sets of them save, and the cost of elements fitted to runs of a site."""
+"""Determine which parts may be switched and what sets of them save; fit the cost of elements to runs of a site."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PartTable(Paged, sets_of_parts.Parts):
-    """Answer of `parts`; nothing of it changes.
+    """Answer of `parts`; it is immutable.
 
-    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` what is worth comparing, ``recommended`` the
-    set to take, None where there is none; its ``parts`` and ``cost_share`` are what `suggest` and `plan` take.
+    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` the sets that are compared, ``recommended``
+    the set to use, None without one; its ``parts`` and ``cost_share`` are arguments of `suggest` and `plan`.
     """
 
     run: Run
@@ -40,7 +40,7 @@ class PartTable(Paged, sets_of_parts.Parts):
     kind = "parts"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per part.
+        """Return a table with a row per part.
 
         The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
 
@@ -57,7 +57,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def sets_frame(self) -> pd.DataFrame:
-        """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
+        """Return a table with a row per set; the columns are the keys of ``sets`` in the JSON."""
         from d2rpick.report.parts import SET
 
         return frame_of(
@@ -65,7 +65,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def plot(self) -> Figure:
-        """Draw the energies of the parts that have most, and the flights."""
+        """Draw the energies of the parts with the largest energy, and the flights."""
         from d2rpick.report.figures_choice import draw_parts
 
         return draw_parts(self)
@@ -81,7 +81,7 @@ def parts(
     td: float | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Say which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
 
     Parameters
     ----------
@@ -123,12 +123,18 @@ def parts(
 
 
 def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
-    """Say which parts may be switched, by sets that are compared from tr to td, or up to td."""
+    """Determine which parts may be switched; compare sets of them from tr to td, or up to td."""
     times = check_times(tr, td)
-    model, beside = model_of(request), [request.deck] if request.deck else []
+    model = model_of(request)
+    deck_names = [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
-    found = sets_of_parts.parts_of(
-        run.files, request.settings, model, given=ids, times=times, beside=beside
+    table = sets_of_parts.parts_of(
+        run.files,
+        request.settings,
+        model,
+        given_ids=ids,
+        times=times,
+        deck_files=deck_names,
     )
     window = [
         text
@@ -137,11 +143,11 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
         for text in (f"--{name}", repr(time))
     ]
     command = ("parts", *window, *request.asking(), *positional(request.history))
-    return PartTable.of(found, run=run, command=command, cautions=name_deck(request))
+    return PartTable.of(table, run=run, command=command, cautions=name_deck(request))
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
-    """Give the window to compare sets in, or its end; ArgumentError where there is none."""
+    """Return the window in which sets are compared, or its end; raise ArgumentError if there is none."""
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
@@ -151,11 +157,11 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Calibration(Answer, calibration.Calibration):
-    """Answer of `calibrate`; nothing of it changes.
+    """Answer of `calibrate`; it is immutable.
 
-    ``weights`` are what `parts`, `suggest`, `plan`, `explore` and `verify` take; ``told`` names what the runs decide,
-    the others keep the measured ratio.  ``misfit`` is relative to the time of a leg [-]; ``legs`` have what each took
-    per cycle [us], and what it computed.
+    ``weights`` are an argument of `parts`, `suggest`, `plan`, `explore` and `verify`.  ``told`` names the formulations
+    that the runs determine; the others keep the measured ratio.  ``misfit`` is relative to the time of a run segment
+    [-].  ``legs`` has the time of each segment per cycle [us], and what it computed.
     """
 
     command: tuple[str, ...]
@@ -163,7 +169,7 @@ class Calibration(Answer, calibration.Calibration):
     said = ("weights", "told", "misfit")
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per formulation: its weight, what was measured with OpenRadioss, whether the runs tell it.
+        """Return a row per formulation: its weight, that measured with OpenRadioss, and whether the runs determine it.
 
         Examples
         --------
@@ -174,7 +180,7 @@ class Calibration(Answer, calibration.Calibration):
         from d2rpick.report.calibration import COLUMNS, plain_rows
 
         rows = [dict(zip(COLUMNS, row, strict=True)) for row in plain_rows(self)]
-        return frame_of(rows, COLUMNS, source=[one.name for one in self.legs])
+        return frame_of(rows, COLUMNS, source=[leg.name for leg in self.legs])
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
@@ -182,7 +188,7 @@ class Calibration(Answer, calibration.Calibration):
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
-    """Fit the cost of elements to what runs of a site took, as ``d2rpick calibrate`` does.
+    """Fit the cost of elements to the CPU times of runs of a site, as ``d2rpick calibrate`` does.
 
     Parameters
     ----------

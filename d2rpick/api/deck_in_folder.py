@@ -1,4 +1,4 @@
-"""The main deck in the folder of a run: with it a folder alone tells which parts become one rigid body."""
+"""Find the main deck in the folder of a run: with it, a folder alone shows which parts become one rigid body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FOUND: Final = "deck-in-folder"
 
 
 def find_deck_in_folder(request: Request) -> Request:
-    """Take the main deck in the folder of the run, unless a deck is named or none is wanted.
+    """Use the main deck in the folder of the run, unless a deck is named or excluded.
 
     Raises
     ------
@@ -24,7 +24,9 @@ def find_deck_in_folder(request: Request) -> Request:
     folder = request.folder
     if folder is None:
         return request
-    from d2rpick.deck import find_decks_of_run  # not above: most runs are files
+    from d2rpick.deck import (
+        find_decks_of_run,
+    )  # imported here since most runs are files
 
     decks = find_decks_of_run(folder)
     if len(decks) > 1:
@@ -39,7 +41,7 @@ def find_deck_in_folder(request: Request) -> Request:
 
 
 def name_deck(request: Request) -> tuple[Caution, ...]:
-    """Name the deck that was found in the folder of the run."""
+    """Return a caution that names the deck found in the folder of the run."""
     if not request.deck_in_folder:
         return ()
     message = f"{request.deck} is the main deck in the folder of the run and was read; `no_deck` does without it"

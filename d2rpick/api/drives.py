@@ -1,4 +1,4 @@
-"""A Radioss run that switches itself while it is computed, in its first run."""
+"""Drive a Radioss run that switches itself in its first computation."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import Caution
     from d2rpick.running.sequence import Leg
 
-# Of a second: so long before a contact td lies at least.
+# shortest time between td and a contact [s]
 _SHORTEST = 2e-3
-# What a cycle of rigid parts costs, of a deformable one, where the deck does not tell.
+# cost of a cycle with rigid parts over one with deformable parts, if the deck does not determine it
 _UNKNOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Drive(Paged, Driven):
-    """Answer of ``d2rpick drive``; nothing of it changes."""
+    """Answer of ``d2rpick drive``; it is immutable."""
 
     command: tuple[str, ...]
     kind = "drive"
@@ -49,19 +49,19 @@ class Drive(Paged, Driven):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,  # noqa: ARG002
     ) -> str:
-        """Write the page."""
+        """Return the page."""
         from d2rpick.report.pages import drive_page
 
         return drive_page(self, command)
 
 
 class Driving:
-    """A run that is about to be driven, or to go on, as ``d2rpick drive`` is told; times in the unit of the deck.
+    """A run that is started or resumed by ``d2rpick drive``; times in the unit of the deck.
 
     Raises
     ------
     D2RPickError
-        If the deck cannot be driven, or the wait contradicts what it says of its springs.
+        If the deck cannot be driven, or the wait contradicts the springs of the deck.
     """
 
     def __init__(
@@ -81,9 +81,9 @@ class Driving:
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(deck, numbers("--part", part) if part else ())
         self.inventory = read_inventory(deck)
-        known = wait_of_deck(self.inventory)
+        deck_wait = wait_of_deck(self.inventory)
         if wait is not None:
-            check_wait(wait, known, deck)
+            check_wait(wait, deck_wait, deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         share = CostModel(self.inventory).saved(self.deck.parts).value
         self.limits = Limits(
@@ -94,7 +94,7 @@ class Driving:
             _UNKNOWN if share is None else 1 - share,
         )
         check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
-        self.observer = Observer(self.deck.parts, self.inventory, wait, known)
+        self.observer = Observer(self.deck.parts, self.inventory, wait, deck_wait)
         self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(
             doubts_of_solver(self.deck.parts, self.inventory)
@@ -102,10 +102,10 @@ class Driving:
 
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
-        """Give the driver of the run in its folder, and keep others out.
+        """Yield the driver of the run in its folder, and lock the folder against other drivers.
 
-        D2RPickError where one is at work there, the folder holds something else, or the run has begun and is not to
-        be resumed, or the disk is full.
+        Raises D2RPickError if another driver is at work there, if the folder contains something else, if the run has
+        begun and is not to be resumed, or if the disk is full.
         """
         folder = self.folder
         if missing := self.commands.missing():
@@ -116,7 +116,8 @@ class Driving:
         with alone(folder):
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
-            begun, computed = journal.all("begun"), journal.all("ended")
+            begun = journal.all("begun")
+            computed = journal.all("ended")
             if computed and not resume:
                 raise D2RPickError(
                     f"{folder}: this run has begun; --resume goes on with it, or choose another folder"
@@ -126,14 +127,12 @@ class Driving:
                     f"{folder}: begun with another deck than {self.name} is now; name that one"
                 )
             if not begun and any(
-                not one.name.startswith(".") for one in folder.iterdir()
+                not file.name.startswith(".") for file in folder.iterdir()
             ):
                 raise D2RPickError(
                     f"{folder}: the folder is not empty; choose another one"
                 )
-            if (
-                not computed
-            ):  # a deck, or a command, that has been corrected may be another one
+            if not computed:  # a corrected deck or command may be different
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)
                 journal.add("begun", deck=digest)
@@ -155,7 +154,7 @@ class Driving:
                 ) from None
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
-        """Say what has come of the run so far."""
+        """Return the result of the run so far."""
         legs = driver.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
@@ -179,9 +178,9 @@ class Driving:
         share = CostModel(self.inventory).saved(self.deck.parts).value
         steps = [
             [
-                one.length / one.cycles
-                for one in legs
-                if one.cycles and one.length > 0 and one.order.rigid is rigid
+                leg.length / leg.cycles
+                for leg in legs
+                if leg.cycles and leg.length > 0 and leg.order.rigid is rigid
             ]
             for rigid in (False, True)
         ]
@@ -189,20 +188,20 @@ class Driving:
             return None
         ratio = max(steps[1]) / min(steps[0])
         took = sum(
-            one.length * ((1 - share) / ratio if one.order.rigid else 1.0)
-            for one in legs
+            leg.length * ((1 - share) / ratio if leg.order.rigid else 1.0)
+            for leg in legs
         )
         return 1 - took / self.deck.end
 
 
 def _by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Share that is saved where a deformable run takes as long as the deformable legs do on the whole."""
-    if any(one.cpu is None for one in legs):
+    """Return the saved share if a deformable run takes as long per time as the deformable segments do on average."""
+    if any(leg.cpu is None for leg in legs):
         return None
-    deformable = [one for one in legs if not one.order.rigid]
+    deformable = [leg for leg in legs if not leg.order.rigid]
     whole = (
-        sum(one.cpu or 0.0 for one in deformable)
-        / sum(one.length for one in deformable)
+        sum(leg.cpu or 0.0 for leg in deformable)
+        / sum(leg.length for leg in deformable)
         * end
     )
-    return 1 - sum(one.cpu or 0.0 for one in legs) / whole if whole else None
+    return 1 - sum(leg.cpu or 0.0 for leg in legs) / whole if whole else None

@@ -1,4 +1,4 @@
-"""Runs that are computed here: what is asked of the floating oscillator and of the rollover box, and their answers."""
+"""Compute the sample models: the requests for the floating oscillator and the rollover box, and their answers."""
 
 from __future__ import annotations
 
@@ -31,17 +31,36 @@ HISTORIES = (
     "hdf5",
     "glstat",
     "matsum",
-)  # of d2rpick.report.history_files, which --help does without
+)  # formats of d2rpick.report.history_files, which --help does not import
+
+MOST_STATES = 1_000_000
+PARAMETERS = (
+    "speed",
+    "stiffness",
+    "yield_strain",
+    "damping",
+    "mesh",
+    "drop",
+    "tilt",
+    "ground_stiffness",
+)
+TD = 0.37  # td of the published study, 10 ms before the ground contact [s]
+TILT = 30.0  # a falling box lands on an edge, so that it tumbles [degrees]
+T_END = {
+    False: 0.42,
+    True: 1.2,
+}  # by whether the box is dropped: time for some bounces [s]
+BALANCED = 0.01  # largest imbalance of the energy of a run [-]
 
 
 def _same(name: str, **changes: Any) -> Any:
-    """Take an option of a request."""
+    """Return an option of a request, changed for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is computed: the oscillator, its start, and when it is rigid."""
+    """Request for a motion of the oscillator: its parameters, its start, and when it is rigid."""
 
     stiffness: float = _same("stiffness")
     mass: float = _same("mass")
@@ -76,17 +95,17 @@ class Motion:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
-        given = [
+        """Refuse contradictory arguments."""
+        given_names = [
             name
             for name in ("z0", "y0", "v0", "vz0", "vy0")
             if getattr(self, name) is not None
         ]
-        if {"v0", "vz0"} <= {*given}:
+        if {"v0", "vz0"} <= {*given_names}:
             raise ArgumentError(
                 "--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0"
             )
-        if not given:
+        if not given_names:
             raise ArgumentError(
                 "the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0"
             )
@@ -105,25 +124,27 @@ class Motion:
         """The state at time 0."""
         from d2rpick.vibration.oscillator import State
 
-        given = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
-        return State.of(*(value or 0.0 for value in given))
+        values = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
+        return State.of(*(value or 0.0 for value in values))
 
     @property
     def oscillator(self) -> Oscillator:
-        """The oscillator that moves; ArgumentError for half of one."""
-        named = {
+        """The oscillator that moves; raise ArgumentError if it is incomplete."""
+        parameters = {
             name: getattr(self, name)
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
-        oscillator = Request(**named, v0=0.0).oscillator
-        assert oscillator is not None  # its options are required
+        oscillator = Request(**parameters, v0=0.0).oscillator
+        assert oscillator is not None  # the options that define it are required
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
-        """Give the motion, and how it is switched where it is."""
+        """Return the motion, and its replay with switching if windows are given."""
         from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
-        start, oscillator, switched = self.start, self.oscillator, None
+        start = self.start
+        oscillator = self.oscillator
+        switched = None
         if self.tr is not None and self.td is not None:
             switched = Replay(oscillator, start, 0.0, self.tr, self.td)
         return compute_trajectory(
@@ -131,26 +152,9 @@ class Motion:
         ), switched
 
 
-MOST_STATES = 1_000_000
-PARAMETERS = (
-    "speed",
-    "stiffness",
-    "yield_strain",
-    "damping",
-    "mesh",
-    "drop",
-    "tilt",
-    "ground_stiffness",
-)
-TD = 0.37  # of the published study, 10 ms before the ground comes
-TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
-T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
-BALANCED = 0.01  # so well the energy of a run must be balanced [-]
-
-
 @dataclass(frozen=True)
 class Box:
-    """What is computed, in SI units: the box, its windows and the scan."""
+    """Request for the rollover box in SI units: the box, its windows and the scan."""
 
     tr: tuple[float, ...] = option(
         "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
@@ -202,7 +206,7 @@ class Box:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
+        """Refuse contradictory arguments."""
         if self.scan:
             lost = [name for name in ("tr", "write_as") if getattr(self, name)] + [
                 "drop"
@@ -228,30 +232,30 @@ class Box:
 
     @property
     def end(self) -> float:
-        """Last time [s]."""
+        """End of the simulation [s]."""
         return self.t_end or T_END[self.drop is not None]
 
     @property
     def parameters(self) -> Parameters:
-        """The model that is meant."""
+        """The parameters of the model."""
         from d2rpick.models.box_model import Parameters
 
-        given = {
+        values = {
             name: getattr(self, name)
             for name in PARAMETERS
             if getattr(self, name) is not None
         }
         return Parameters(
             **(
-                {"speed": 0.0, "tilt": TILT, **given}
+                {"speed": 0.0, "tilt": TILT, **values}
                 if self.drop is not None
-                else given
+                else values
             )
         )
 
     @property
     def windows(self) -> tuple[RigidWindow, ...]:
-        """In which it is rigid."""
+        """The windows in which the box is rigid."""
         from d2rpick.models.box_run import RigidWindow
 
         return tuple(map(RigidWindow, self.tr, self.td))
@@ -266,28 +270,28 @@ class Box:
 def _check_windows(
     starts: Sequence[float], ends: Sequence[float], t_end: float
 ) -> None:
-    """ArgumentError unless the times are pairs in order, within the run."""
+    """Raise ArgumentError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
         raise ArgumentError(
             "--tr and --td need each other, as many of the one as of the other"
         )
-    before = None
+    previous_end = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:
             raise ArgumentError(f"--tr {tr:g} is not before --td {td:g}")
-        if before is not None and not before < tr:
+        if previous_end is not None and not previous_end < tr:
             raise ArgumentError(
-                f"--tr {tr:g} is not after --td {before:g} of the window before it"
+                f"--tr {tr:g} is not after --td {previous_end:g} of the window before it"
             )
         if td > t_end:
             raise ArgumentError(
                 f"--td {td:g} lies after the end of the run, --t-end {t_end:g}"
             )
-        before = td
+        previous_end = td
 
 
 class Scanning:
-    """A scan that is about to be computed: the run without switching, what is recommended from it, and other tr."""
+    """A scan to be computed: the reference run, the recommendation from it, and the other tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -302,14 +306,13 @@ class Scanning:
         times = scan_times(self.reference.released or self.td / 3, self.td)
         self.answer = suggest(make_history(self.reference), self.td, Settings())
         self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
-        self.times = (
-            sorted({*times, self.answer.recommended.tr})
-            if self.answer.recommended
-            else times
-        )
+        if self.answer.recommended:
+            self.times = sorted({*times, self.answer.recommended.tr})
+        else:
+            self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs; ``told`` is called with the number of those that are there."""
+        """Compute the runs; ``told`` is called with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 
@@ -324,14 +327,14 @@ class Scanning:
 
 
 def unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
-    off = float(abs(record.imbalance).max())
-    if off <= BALANCED:
+    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
+    imbalance = float(abs(record.imbalance).max())
+    if imbalance <= BALANCED:
         return ()
-    found = f"the energy is balanced within {off:.2g} of the largest total, {BALANCED} was expected"
+    message = f"the energy is balanced within {imbalance:.2g} of the largest total, {BALANCED} was expected"
     return (
         Caution(
             "energy-balance",
-            f"{found}; these parameters are beyond what the model can do",
+            f"{message}; these parameters are beyond what the model can do",
         ),
     )

@@ -1,4 +1,4 @@
-"""What each td of a flight costs, and the plan of the rigid windows of all flights."""
+"""Find what each td of a flight costs, and plan the rigid windows of all flights."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
 
-_STEPS: Final = 200  # td that are explored
+_STEPS: Final = 200  # number of td that are explored
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Exploration(RunAnswer, trade_off.TradeOff):
-    """Answer of `explore`; nothing of it changes.
+    """Answer of `explore`; it is immutable.
 
-    ``offers`` are by ascending td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its
-    measures in ``best``; ``recommended`` is the one that `suggest` chooses, ``step`` the nearest unbeaten td with
-    half the error of ``start``, the td asked for or else the one that saves most.  ``answer`` says it in a sentence.
+    ``offers`` are sorted by td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its measures
+    in ``best``.  ``recommended`` is the offer that `suggest` chooses.  ``step`` is the nearest unbeaten td with half
+    the error of ``start``; ``start`` is the requested td or else the one that saves most.  ``answer`` is the result in
+    a sentence.
     """
 
     kind = "trade_off"
@@ -41,13 +42,13 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
     @property
     def answer(self) -> str:
-        """The shortest sensible answer."""
+        """The result in one sentence."""
         from d2rpick.report.trade_off import answer
 
         return answer(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per td, a column per single value of ``offers`` in the JSON; what is not known is NaN.
+        """Return a row per td and a column per single value of ``offers`` in the JSON; unknown values are NaN.
 
         Examples
         --------
@@ -70,11 +71,15 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the recommended pair."""
+        """Return the page, with the card of the recommended pair."""
         from d2rpick.report.pages import trade_off_page
 
-        found = self.suggestion
-        chosen = (found.situation, found.recommended.tr) if found.recommended else None
+        suggestion = self.suggestion
+        chosen = (
+            (suggestion.situation, suggestion.recommended.tr)
+            if suggestion.recommended
+            else None
+        )
         return trade_off_page(
             self, self._context(command, judging, cards, chosen, self)
         )
@@ -126,42 +131,40 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    wanted, window = (
-        arguments.optional("td", td),
-        arguments.window("td_window", td_window),
-    )
+    wanted = arguments.optional("td", td)
+    window = arguments.window("td_window", td_window)
     count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return explored(asked, wanted, window, count)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return explored(question, wanted, window, count)
 
 
 def explored(
-    asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
+    question: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
 ) -> Exploration:
-    """Find what each td in a window costs, or in the longest flight."""
+    """Find what each td costs in a window, or in the longest flight."""
     check_window("td_window", td_window)
-    found = trade_off.explore_of(
-        asked.reference, asked.settings, td_window, td=td, steps=steps
+    result = trade_off.explore_of(
+        question.reference, question.settings, td_window, td=td, steps=steps
     )
     times = [] if td is None else ["--td", repr(td)]
     times += ["--td-window", *map(repr, td_window)] if td_window else []
-    return Exploration.about(asked, found, *times, "--steps", str(steps))
+    return Exploration.about(question, result, *times, "--steps", str(steps))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Plan(RunAnswer, planning.Plan):
-    """Answer of `plan`; nothing of it changes.
+    """Answer of `plan`; it is immutable.
 
-    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
-    run supports, ``all_windows`` also those that wait for a switched run, ``next_run`` those that are done and
-    ``windows``: what the next run is switched in, none where no window is new; ``rigid_fraction`` is the share of the
-    record in which the parts are rigid by ``windows``.  Times in the unit of the run.
+    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``.  ``windows`` are the (tr, td) that this
+    run supports, ``all_windows`` also those that need a switched run first.  ``next_run`` are the windows of the next
+    run: those that are done and ``windows``, none if no window is new.  ``rigid_fraction`` is the share of the record
+    in which ``windows`` make the parts rigid.  Times in the unit of the run.
     """
 
     kind = name = "plan"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
+        """Return a row per flight and a column per key of ``windows`` in the JSON; unknown values are NaN.
 
         Examples
         --------
@@ -178,16 +181,19 @@ class Plan(RunAnswer, planning.Plan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""
+        """Print the card of the next run, judged as printed, with ``every`` new window or only the supported ones."""
         return self.printed(
             Cards.of(options), every=arguments.flag("every", every, False)
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card of the next run, its new windows judged; None where none is new."""
-        new, asked = self.all_windows if every else self.windows, self.question
-        asked = asked._replace(reference=asked.reference._replace(history=self.history))
-        return judged(asked, cards, new, done=self.done) if new else None
+        """Print the card of the next run, with its new windows judged; return None if no window is new."""
+        new = self.all_windows if every else self.windows
+        question = self.question
+        question = question._replace(
+            reference=question.reference._replace(history=self.history)
+        )
+        return judged(question, cards, new, done=self.done) if new else None
 
     def page(
         self,
@@ -195,7 +201,7 @@ class Plan(RunAnswer, planning.Plan):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the cards of the next run."""
+        """Return the page, with the cards of the next run."""
         from d2rpick.report.pages import plan_page
 
         card = self._card_of_windows(cards or Cards())
@@ -211,16 +217,14 @@ class Plan(RunAnswer, planning.Plan):
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
-        """Give the card of the next run; None if nobody says whom it switches, or the bodies of the deck cannot."""
+        """Return the card of the next run; None if no parts are named, or the bodies of the deck cannot be switched."""
         try:
             suited, _ = cards.by_deck(self.question)
         except DeckError:
             return None
-        return (
-            self.printed(cards)
-            if suited.request(self.question).whom(self.history)
-            else None
-        )
+        if suited.request(self.question).whom(self.history):
+            return self.printed(cards)
+        return None
 
 
 def plan(
@@ -273,12 +277,12 @@ def plan(
     windows = arguments.pairs("done", done)
     if before is not None:
         arguments.check_run("before", before)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return planned(asked, shortest, windows, before)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return planned(question, shortest, windows, before)
 
 
 def planned(
-    asked: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
+    question: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
 ) -> Plan:
     """Plan the rigid windows of a run, or those after the windows that are ``done``."""
     if before is not None and not done:
@@ -289,13 +293,15 @@ def planned(
     if done:
         from d2rpick.deck.printed_card import (
             check_windows,
-        )  # a plan alone does without decks
+        )  # imported here since a plan alone needs no decks
 
         windows = check_windows(done)
-    earlier = asked.reference.like(before.files, asked.selection) if before else None
-    found = planning.plan_of(
-        asked.reference,
-        asked.settings,
+    earlier = (
+        question.reference.like(before.files, question.selection) if before else None
+    )
+    result = planning.plan_of(
+        question.reference,
+        question.settings,
         min_rigid=min_rigid,
         done=windows,
         before=earlier,
@@ -303,29 +309,35 @@ def planned(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # on its standard input, a line for each
+    )  # as on its standard input, a line for each
     times += [
         text
         for name in (before.sources if before else ())
         for text in ("--before", name)
     ]
-    return Plan.about(asked, found, *times)
+    return Plan.about(question, result, *times)
 
 
 def written(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
-    """Write a copy of the deck of a plan with a card of it, and check the copy by the history.
+    """Write a copy of a plan's deck with the card of the plan, and check the copy by the history.
 
-    Gives the names of the files, the main one first, and what is found in it.
+    Returns the names of the files, the main one first, and the findings in it.
     """
     from d2rpick.api.checking import check_written
     from d2rpick.deck.writing import write_deck
     from d2rpick.rules.judgement import HistoryJudge
 
-    asked, done = plan.question, card.card.windows[: len(plan.done)]  # as printed
-    names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
+    question = plan.question
+    done = card.card.windows[: len(plan.done)]  # the times as printed
+    names = write_deck(
+        question.request.deck or "", card.card, folder, overwrite=overwrite
+    )
     judge = HistoryJudge(
-        asked.reference.run, asked.request.selection(parts=False), plan.settings, done
+        question.reference.run,
+        question.request.selection(parts=False),
+        plan.settings,
+        done,
     )
     return names, check_written(names[0], judge)

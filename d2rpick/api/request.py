@@ -1,7 +1,7 @@
-"""What can be asked about a run: one table.
+"""Define everything that can be asked about a run in one table.
 
-From the fields of `Request` follow the options of the command line with their environment variables, the keywords of
-Python, and the command line that asks the same again.
+The fields of `Request` determine the options of the command line with their environment variables, the keyword
+arguments of Python, and the command line that repeats an answer.
 """
 
 from __future__ import annotations
@@ -24,79 +24,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
 
-
-class Number(NamedTuple):
-    """A finite number from ``low`` (or above it, when ``above``) to ``high``."""
-
-    low: float = -inf
-    high: float = inf
-    above: bool = False
-
-    def missed(self, value: float) -> str:
-        """Say which limit a value is beyond, nothing where it is within."""
-        if value < self.low or (self.above and value == self.low):
-            return f"{'above' if self.above else 'of at least'} {self.low:g}"
-        return f"of at most {self.high:g}" if value > self.high else ""
-
-
-TIME, POSITIVE, NOT_NEGATIVE, FRACTION = (
-    Number(),
-    Number(0.0, above=True),
-    Number(0.0),
-    Number(0.0, 1.0),
-)
-MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
-AT_LEAST_ONE: Final = Number(
-    1.0
-)  # elements that are rigid no longer limit the step: it cannot become smaller
-UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
-
-
-class Option(NamedTuple):
-    """What an option is: its ``kind`` of value, what the help says, and which others it takes the place of.
-
-    ``kind`` is a `Number`, a range of whole numbers, names to choose from, or what the command line calls it: "flag",
-    "file", "names", ...  ``many``: it can be repeated; ``pair``: two values.
-    """
-
-    help: str
-    kind: Number | range | tuple[str, ...] | str = "text"
-    metavar: str | None = None
-    many: bool = False
-    pair: bool = False
-    instead_of: tuple[str, ...] = ()
-    short: tuple[str, ...] = ()
-
-
-def option(
-    text: str,
-    kind: Any = "text",
-    metavar: str | None = None,
-    *,
-    default: Any = None,
-    **more: Any,
-) -> Any:
-    """Describe the field of a table of options; what can be repeated is an empty tuple where it is not given."""
-    default = () if more.get("many") else default
-    return field(
-        default=default, metadata={"option": Option(text, kind, metavar, **more)}
-    )
-
-
-def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
-    return option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
-
-
-@cache
-def options_of(table: Any) -> dict[str, Option]:
-    """Give the options of a table by the names of their fields."""
-    return {
-        one.name: one.metadata["option"]
-        for one in fields(table)
-        if "option" in one.metadata
-    }
-
-
+MIN_MEAN_ENERGY: Final = 0.7  # relative to the reference run; in well switched computed runs it was 0.77 or more
+UNLIMITED: Final = 2**63  # end of a range of whole numbers without upper limit
 # Groups of options: how to read a history, how to judge by it, and how to judge a tr.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 JUDGING: Final = (
@@ -126,16 +55,88 @@ LIMITS: Final = (
 )
 CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
+# Placeholder for weights that are no file: typed as it is, the command line is refused, so that it never uses other
+# weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
-# Nobody changes it, nor other tables of options: frozen ones take every command a fiftieth of its start.
+class Number(NamedTuple):
+    """A finite number from ``low`` (or above it, if ``above``) to ``high``."""
+
+    low: float = -inf
+    high: float = inf
+    above: bool = False
+
+    def missed(self, value: float) -> str:
+        """Return the limit that a value violates as text, empty if the value is allowed."""
+        if value < self.low or (self.above and value == self.low):
+            return f"{'above' if self.above else 'of at least'} {self.low:g}"
+        return f"of at most {self.high:g}" if value > self.high else ""
+
+
+TIME, POSITIVE, NOT_NEGATIVE, FRACTION = (
+    Number(),
+    Number(0.0, above=True),
+    Number(0.0),
+    Number(0.0, 1.0),
+)
+AT_LEAST_ONE: Final = Number(
+    1.0
+)  # elements that are rigid no longer limit the time step, which cannot become smaller
+
+
+class Option(NamedTuple):
+    """An option: the ``kind`` of its value, its help text, and the options that it replaces.
+
+    ``kind`` is a `Number`, a range of whole numbers, a list of names, or a kind of the command line: "flag", "file",
+    "names", ...  ``many``: it can be repeated; ``pair``: two values.
+    """
+
+    help: str
+    kind: Number | range | tuple[str, ...] | str = "text"
+    metavar: str | None = None
+    many: bool = False
+    pair: bool = False
+    instead_of: tuple[str, ...] = ()
+    short: tuple[str, ...] = ()
+
+
+def option(
+    text: str,
+    kind: Any = "text",
+    metavar: str | None = None,
+    *,
+    default: Any = None,
+    **keywords: Any,
+) -> Any:
+    """Return a field of a table of options; one that can be repeated is an empty tuple by default."""
+    default = () if keywords.get("many") else default
+    return field(
+        default=default, metadata={"option": Option(text, kind, metavar, **keywords)}
+    )
+
+
+def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
+    return option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
+
+
+@cache
+def options_of(table: Any) -> dict[str, Option]:
+    """Return the options of a table by the names of their fields."""
+    return {
+        field.name: field.metadata["option"]
+        for field in fields(table)
+        if "option" in field.metadata
+    }
+
+
+# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
+# start.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request:
-    """What is asked about a run, times in the unit of the history; ArgumentError where it contradicts itself.
+    """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
 
-    ``given`` names the options that were given, where values that are the default count as well.
+    ``given`` names the options that were given, also those given with their default value.
     """
 
     deck: str | None = option(
@@ -249,12 +250,12 @@ class Request:
         AT_LEAST_ONE,
         "N",
     )
-    run_folder: str | None = None  # that of a run whose files are named in `history`
-    deck_in_folder: bool = False  # whether `deck` was found in the folder of the run
+    run_folder: str | None = None  # folder of a run whose files are named in `history`
+    deck_in_folder: bool = False  # True if `deck` was found in the folder of the run
     given: Collection[str] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense together."""
+        """Refuse contradictory options."""
         if self.no_deck and self.deck:
             raise ArgumentError("`deck` and `no_deck` exclude each other")
         if self.folder is None:
@@ -279,16 +280,16 @@ class Request:
 
     @property
     def folder(self) -> str | None:
-        """The folder of the run, in which its main deck is looked for; None if a deck is named, or none is wanted."""
+        """The folder of the run, searched for its main deck; None if a deck is named or excluded."""
         import os
 
         if self.deck is not None or self.no_deck:
             return None
-        named = self.history[0] if len(self.history) == 1 else ""
-        return self.run_folder or (named if os.path.isdir(named) else None)  # noqa: PTH112  odd names
+        name = self.history[0] if len(self.history) == 1 else ""
+        return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  odd names
 
     def check_deck(self) -> None:
-        """Refuse what needs a deck if there is none."""
+        """Refuse options that need a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
                 "`step_ratio` needs `cost_share` or `deck` too: the run time needs both"
@@ -300,26 +301,26 @@ class Request:
 
     @property
     def _oscillator_given(self) -> bool:
-        """Whether an oscillator is given; ArgumentError for half of one."""
+        """Return True if an oscillator is given; raise ArgumentError if it is incomplete."""
         names = ("stiffness", "mass", "alpha", "v0")
-        given = [
+        given_names = [
             name
             for name in (*names, "frame_mass", "beta")
             if getattr(self, name) is not None
         ]
-        if given and (
+        if given_names and (
             missing := [name for name in names if getattr(self, name) is None]
         ):
             raise ArgumentError(
-                f"`{given[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
+                f"`{given_names[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
             )
-        if given and (self.frame_mass is None) == (self.beta is None):
+        if given_names and (self.frame_mass is None) == (self.beta is None):
             raise ArgumentError("the oscillator needs either `frame_mass` or `beta`")
-        return bool(given)
+        return bool(given_names)
 
     @property
     def oscillator(self) -> Oscillator | None:
-        """The oscillator that is given."""
+        """The given oscillator."""
         if self.stiffness is None or self.mass is None or self.alpha is None:
             return None
         from d2rpick.vibration.oscillator import Oscillator
@@ -333,20 +334,21 @@ class Request:
 
     @property
     def settings(self) -> Settings:
-        """How to choose and judge."""
+        """The settings for choosing and judging."""
         from d2rpick.choice.question import Settings
 
-        mode, oscillator = None, self.oscillator
+        mode = None
+        oscillator = self.oscillator
         if oscillator is not None and self.v0 is not None:
             from d2rpick.vibration.oscillator import (
                 to_mode,
-            )  # not above: mostly none is given
+            )  # imported here since it is rarely given
 
             mode = to_mode(oscillator, self.v0)
         same = {
-            one.name: getattr(self, one.name)
-            for one in fields(Settings)
-            if one.name in OPTIONS
+            field.name: getattr(self, field.name)
+            for field in fields(Settings)
+            if field.name in OPTIONS
         }
         return Settings(
             **{
@@ -359,7 +361,7 @@ class Request:
         )
 
     def selection(self, *, parts: bool = True) -> Selection:
-        """What of a run is meant, without ``parts`` the columns alone; ArgumentError for energies in two ways."""
+        """Return the selected columns and, with ``parts``, parts; raise ArgumentError if energies are given twice."""
         from d2rpick.histories.names import Selection
 
         if parts and self.energy and self.part:
@@ -372,12 +374,10 @@ class Request:
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
-        """Give the options that were given, or those of ``names``, as they are typed behind a td."""
-        chosen = (
-            self._given()
-            if names is None
-            else [name for name in self._given() if name in names]
-        )
+        """Return the given options, or those in ``names``, as they are typed after a td."""
+        chosen = list(self._given())
+        if names is not None:
+            chosen = [name for name in chosen if name in names]
         return tuple(
             text
             for name in chosen
@@ -385,12 +385,14 @@ class Request:
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Give the options of ``card`` and ``check`` that judge by the same history."""
-        named = [text for name in self.history for text in ("--history", name)]
-        return (*named, *self.asking(JUDGING), *self.asking(("part",)))
+        """Return the options with which ``card`` and ``check`` judge by the same history."""
+        history_options = [
+            text for name in self.history for text in ("--history", name)
+        ]
+        return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def without_history(self) -> None:
-        """Refuse to be told how to judge, but not by what."""
+        """Refuse options for judging if there is no history to judge by."""
         if lost := [
             name
             for name in self._given()
@@ -401,23 +403,22 @@ class Request:
             )
 
     def _given(self) -> Iterator[str]:
-        for one in fields(self):
-            given = (
-                getattr(self, one.name) != one.default
-                if self.given is None
-                else one.name in self.given
-            )
-            if given and one.name not in _NOT_TYPED:
-                yield one.name
+        for entry in fields(self):
+            if self.given is None:
+                is_given = getattr(self, entry.name) != entry.default
+            else:
+                is_given = entry.name in self.given
+            if is_given and entry.name not in _NOT_TYPED:
+                yield entry.name
 
 
 def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
-    """Write an option with its value, or ``many``, as it is typed."""
+    """Yield the words of an option with its value, or its ``many`` values, as typed."""
     if isinstance(value, bool):
         yield from (f"--{dashed(name)}",) * value
         return
-    for one in value if many else [value]:
-        words = one if isinstance(one, tuple) else (one,)
+    for single_value in value if many else [value]:
+        words = single_value if isinstance(single_value, tuple) else (single_value,)
         yield from (
             f"--{dashed(name)}",
             *(word if isinstance(word, str) else _word(word) for word in words),
@@ -428,17 +429,17 @@ def _word(value: Any) -> str:
     return repr(value) if isinstance(value, int | float) else _IN_MEMORY
 
 
-def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
-    """Read ``QUANTITY=NAME``; ArgumentError for a quantity that is none, or one that is given twice."""
+def channels_of(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
+    """Read ``QUANTITY=NAME``; raise ArgumentError for an unknown quantity, or one that is given twice."""
     from d2rpick.histories.names import QUANTITIES
 
-    split = (text.partition("=") for text in given)
+    split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
         if quantity not in QUANTITIES or not name:
-            known = ", ".join(QUANTITIES)
+            quantities = ", ".join(QUANTITIES)
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {known}"
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {quantities}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")
@@ -446,7 +447,7 @@ def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
 
 
 def check_window(name: str, window: tuple[float, float] | None) -> None:
-    """Refuse a window of time that is empty."""
+    """Refuse an empty window of time."""
     if window and not window[0] < window[1]:
         raise ArgumentError(
             f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first"
@@ -456,7 +457,7 @@ def check_window(name: str, window: tuple[float, float] | None) -> None:
 def time_or_window(
     td: float | None, window: tuple[float, float] | None
 ) -> float | tuple[float, float] | None:
-    """Give what is asked for, a td or a window for it; ArgumentError for both."""
+    """Return the given td or the window for it; raise ArgumentError for both."""
     if td is not None and window is not None:
         raise ArgumentError("`td` and `td_window` exclude each other")
     check_window("td_window", window)
@@ -464,7 +465,7 @@ def time_or_window(
 
 
 def dashed(name: str) -> str:
-    """Give the name of an option as it is typed."""
+    """Return the name of an option as it is typed."""
     return name.replace("_", "-")
 
 

@@ -1,4 +1,4 @@
-"""Runs while they are computed: a deck whose first run switches itself, and what happens in a run, as events."""
+"""Support runs while they are computed: decks that switch themselves, and events of a run in progress."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class FirstRun(NamedTuple):
-    """What `first` wrote: the names of the ``files``, the main deck first, and ``notes`` on what the run cannot know.
+    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what the run cannot know.
 
-    ``wait`` is the time without force that counts as flight [time of the deck], ``reason`` where it comes from.
+    ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """
 
     files: tuple[str, ...]
@@ -84,18 +84,16 @@ def first(
         arguments.optional("wait", wait, NOT_NEGATIVE),
         arguments.optional("after", after, NOT_NEGATIVE),
     )
-    main, folder = (
-        arguments.one_path("deck", deck),
-        arguments.one_path("output_dir", output_dir),
-    )
-    found = first_card(main, numbers("parts", names), *times)
+    main = arguments.one_path("deck", deck)
+    folder = arguments.one_path("output_dir", output_dir)
+    copies = first_card(main, numbers("parts", names), *times)
     files = write_deck(
         main,
-        found.card,
+        copies.card,
         folder,
         overwrite=arguments.flag("overwrite", overwrite, False),
     )
-    return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
+    return FirstRun(tuple(files), copies.wait.time, copies.wait.reason, copies.notes)
 
 
 def follow(
@@ -137,18 +135,18 @@ def follow(
     >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
-    from d2rpick.running import watch  # not above: first does without it
+    from d2rpick.running import watch  # imported here since `first` does not need it
 
     selection = Selection(parts=arguments.part_names("parts", parts))
     inventory = None
     if deck is not None:
-        from d2rpick.deck import read_inventory  # not above: few name a deck
+        from d2rpick.deck import (
+            read_inventory,
+        )  # imported here since a deck is rarely named
 
         inventory = read_inventory(arguments.one_path("deck", deck))
-    time, seconds = (
-        arguments.optional("wait", wait),
-        arguments.optional("lasting", lasting),
-    )
+    time = arguments.optional("wait", wait)
+    seconds = arguments.optional("lasting", lasting)
     return watch.follow(
         [arguments.one_path("run", run)], selection, time, inventory, lasting=seconds
     )

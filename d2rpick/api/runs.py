@@ -1,4 +1,4 @@
-"""A run in the hands of a script: read from files, from memory, or taken from a table in pandas."""
+"""Give scripts a run: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """One run: its files, opened, and which columns of a table were named; nothing of it changes.
+    """One run: its opened files, and the named columns of a table; it is immutable.
 
-    It can be pickled: a copy, also in another process, holds the same bytes, or opens the same big files again.  Two
+    It can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.  Two
     runs are equal if the same bytes were read under the same names, in the same way.
 
-    ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
-    their content decided.  ``folder`` is the one that was named, in which the main deck is looked for.  Energies are
-    read when they are asked for.
+    ``files`` are the opened files, ``chosen`` the columns, ``input_format`` the format as which the files were read,
+    ``"auto"`` if their content decided.  ``folder`` is the folder that was named; the main deck is searched there.
+    Energies are read only when they are needed.
     """
 
     files: histories.Run
@@ -79,30 +79,32 @@ class Run:
     def channels(self) -> tuple[str, ...]:
         """Names of the histories of the whole model."""
         return tuple(
-            dict.fromkeys(name for one in self.files.databases for name in one.channels)
+            dict.fromkeys(
+                name for database in self.files.databases for name in database.channels
+            )
         )
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that have histories of their own: ``id`` and ``title``."""
+        """Parts with their own histories: ``id`` and ``title``."""
         return self.files.parts
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out or assumed in reading."""
+        """What was left out or assumed while reading."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
-        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
+        """Return what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
 
         The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
         folder that was read; False for none.
         """
         from d2rpick.choice.overview import survey
 
-        named = arguments.one_path("deck", deck) if deck else None
+        deck_name = arguments.one_path("deck", deck) if deck else None
         return survey(
-            self.files, self.chosen, self._deck_in_folder if deck is None else named
+            self.files, self.chosen, self._deck_in_folder if deck is None else deck_name
         )
 
     @property
@@ -116,7 +118,7 @@ class Run:
         return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
-        """Give energies over time as a table, at full precision.
+        """Return energies over time as a table, at full precision.
 
         Parameters
         ----------
@@ -146,8 +148,8 @@ class Run:
         """
         import pandas as pd
 
-        every = isinstance(parts, str) and parts == "all"
-        names = ("0-4294967295",) if every else arguments.part_names("parts", parts)
+        is_all = isinstance(parts, str) and parts == "all"
+        names = ("0-4294967295",) if is_all else arguments.part_names("parts", parts)
         history = self.files.history(
             self.chosen._replace(energy=(), parts=names) if names else self.chosen
         )
@@ -158,7 +160,7 @@ class Run:
             columns = {
                 part.name: energies[:, at] for at, part in enumerate(history.parts)
             }
-            # parts and the energy of their sum stand at the same times
+            # the parts and the energy of their sum have the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
             "source": list(history.source),
@@ -220,12 +222,13 @@ def read(
     names = arguments.paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen, kind = selection_of(time, energy, channels), known_format(input_format)
+    chosen = selection_of(time, energy, channels)
+    kind = known_format(input_format)
     return Run(open_run(names, chosen, kind), chosen, kind, folder_of(names))
 
 
 def folder_of(names: Sequence[str]) -> str | None:
-    """Give the folder that names a run; None if files name it."""
+    """Return the folder that names a run; None if files name it."""
     import os
 
     return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
@@ -241,7 +244,8 @@ def from_frame(
 ) -> Run:
     """Take the energies of a run from a table of pandas, polars, pyarrow, xarray or numpy.
 
-    It is checked as the csv file is that ``frame.to_csv()`` writes: its times must rise, its values be finite numbers.
+    The table is checked like the CSV file that ``frame.to_csv()`` writes: times must rise, values must be finite
+    numbers.
 
     Parameters
     ----------
@@ -277,7 +281,8 @@ def from_frame(
 
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}, a text was expected")
-    table, chosen = frame_of_table(frame), selection_of(time, energy, channels)
+    table = frame_of_table(frame)
+    chosen = selection_of(time, energy, channels)
     is_named = not is_plain_array(frame)
     if is_named:
         table = _timed(table, chosen.time)
@@ -286,15 +291,15 @@ def from_frame(
 
 
 def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Make the index a column where it is the time; ValueError where nothing is."""
+    """Make the index a column if it is the time; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
-    known = list(map(str, frame.columns))
+    column_names = list(map(str, frame.columns))
     if (
-        time in known
+        time in column_names
         or (time is not None and time.isdecimal())
-        or any(map(is_time, known))
+        or any(map(is_time, column_names))
     ):
         return frame
     if (
@@ -303,15 +308,15 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
         or is_time(str(index.name))
     ):
         return frame.reset_index(names=time or "time")
-    named = "no name" if index.name is None else f"the name {index.name!r}"
+    index_name = "no name" if index.name is None else f"the name {index.name!r}"
     raise ValueError(
-        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {named}, its columns are "
-        f"{', '.join(map(repr, known))}; name it by frame.rename_axis('time'), or a column of these as `time`"
+        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {index_name}, its columns are "
+        f"{', '.join(map(repr, column_names))}; name it by frame.rename_axis('time'), or a column of these as `time`"
     )
 
 
 def _seconds(column: pd.Series[Any]) -> pd.Series[Any]:
-    """Give timedeltas in seconds, other values as they are."""
+    """Convert timedeltas to seconds, and return other values unchanged."""
     return column.dt.total_seconds() if column.dtype.kind == "m" else column
 
 
@@ -334,7 +339,7 @@ def _opened(sources: list[Source], chosen: Selection, input_format: str | None) 
 
 
 def known_format(input_format: str | None) -> str:
-    """Give the name of a format, or ``"auto"``; ValueError for any other."""
+    """Return the name of a format, or ``"auto"``; raise ValueError for any other name."""
     from d2rpick.histories.formats import READERS
 
     if input_format is None:
@@ -353,7 +358,7 @@ def selection_of(
     energy: str | int | Iterable[str | int] | None,
     channels: Mapping[str, str | int] | None = None,
 ) -> Selection:
-    """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
+    """Return the selected columns; raise TypeError for other types, ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
     single = (
@@ -367,11 +372,11 @@ def selection_of(
         raise TypeError(
             f"channels is {channels!r}, a mapping of quantities to columns was expected"
         )
-    named = dict(channels or {})
+    channel_names = dict(channels or {})
     for name, value in [
         ("time", time),
-        *(("energy", one) for one in listed),
-        *named.items(),
+        *(("energy", energy_name) for energy_name in listed),
+        *channel_names.items(),
     ]:
         if (
             value is not None
@@ -381,24 +386,24 @@ def selection_of(
             raise TypeError(
                 f"{name} is {value!r}, the name or number of a column was expected"
             )
-    if unknown := [name for name in named if name not in QUANTITIES]:
+    if unknown := [name for name in channel_names if name not in QUANTITIES]:
         raise ValueError(
             f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected"
         )
     return Selection(
         time=None if time is None else str(time),
-        energy=tuple(str(one) for one in listed),
-        channels=tuple((name, str(channel)) for name, channel in named.items()),
+        energy=tuple(str(energy_name) for energy_name in listed),
+        channels=tuple((name, str(channel)) for name, channel in channel_names.items()),
     )
 
 
 def extracted(
     run: histories.Run, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Give the columns of what is selected of a run, with all that is known at its times, and the notes on it.
+    """Return the selected columns of a run with all that is known at its times, and the notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
-    the momentum by which the flight is seen, each of shape (n,).
+    the momentum that shows the flight, each of shape (n,).
     """
     from d2rpick.choice.flights import momentum_of_flight
     from d2rpick.choice.question import Reference
@@ -417,9 +422,9 @@ def extracted(
 
 
 def _of_model(history: History) -> dict[str, Samples]:
-    """Columns of the whole model as its balance takes them, where they are written at the times of the energy.
+    """Return the columns of the whole model's energy balance that are written at the times of the energy.
 
-    The kinetic energy is that with rotation; the internal one is there where the chosen one is that of some parts.
+    The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The same question for many runs, and the file from which a study goes on: a line for each run that was judged."""
+"""Ask many runs the same question, and keep a file from which a study can be resumed: a line for each judged run."""
 
 from __future__ import annotations
 
@@ -33,21 +33,24 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
 
+_FIRST: Final = b'{"source": '
+_LAST: Final = b'{"schema": '  # beginning of the summary after the rows
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Study(Paged, core.Study):
-    """Answer of `study`; nothing of it changes.
+    """Answer of `study`; it is immutable.
 
-    ``runs`` has a row per run; ``agree`` is whether the intervals of tr intersect, None without a tr; ``common`` is one
-    tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the reason.
-    Times are in the unit of the runs; ``td`` is None where each run has its own.
+    ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None without a tr.  ``common`` is
+    one tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the
+    reason.  Times are in the unit of the runs; ``td`` is None if each run has its own.
     """
 
     command: tuple[str, ...]
     kind = "study"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give a row per run, a column per key of ``runs`` in the JSON; what is not known is NaN.
+        """Return a row per run and a column per key of ``runs`` in the JSON; unknown values are NaN.
 
         Examples
         --------
@@ -72,7 +75,7 @@ def study(
     jobs: int | None = 1,
     **choosing: Unpack[Choosing],
 ) -> Study:
-    """Ask the same question of many runs, as ``d2rpick study`` does.
+    """Ask many runs the same question, as ``d2rpick study`` does.
 
     Parameters
     ----------
@@ -108,7 +111,7 @@ def study(
     """
     from d2rpick.api.runs import known_format, selection_of
 
-    asked = time_or_window(
+    td_or_window = time_or_window(
         arguments.optional("td", td), arguments.window("td_window", td_window)
     )
     processes = arguments.whole("jobs", 1 if jobs is None else jobs, 1)
@@ -118,27 +121,27 @@ def study(
     request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
     request = replace(
-        request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(one) for one in chosen.channels),
+        request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(pair) for pair in chosen.channels),
         input_format=known_format(input_format),
     )  # fmt: skip
-    question = question_of(request, asked, curve=True)
+    question = question_of(request, td_or_window, curve=True)
     with choose_farm(min(processes, len(names)), "d2rpick.choice.study") as farm:
         return summary(request, question, names, list(rows_of(question, names, farm)))
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:
-    """Replace patterns by the files and folders they match, each a run; what matches nothing stays."""
+    """Replace patterns by the files and folders that they match, each a run; a name that matches nothing is kept."""
     from glob import glob
 
-    found: list[str] = []
+    runs: list[str] = []
     for name in names:
         pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        found += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
-    return tuple(found)
+        runs += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+    return tuple(runs)
 
 
 def _once(names: Iterable[str]) -> list[str]:
-    """Give each file or folder by its shortest name only: links that lead in a circle give it many."""
+    """Return each file or folder once, by its shortest name: circular links give it many names."""
     shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
@@ -146,7 +149,7 @@ def _once(names: Iterable[str]) -> list[str]:
 def question_of(
     request: Request, td: float | tuple[float, float] | None, *, curve: bool
 ) -> Question:
-    """Say what every run is asked; with its ``curve`` where the energies of all are drawn."""
+    """Return the question to every run; with its ``curve`` if the energies of all runs are drawn."""
     return Question(
         td, request.settings, request.selection(), request.input_format, curve=curve
     )
@@ -155,12 +158,12 @@ def question_of(
 def summary(
     request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]
 ) -> Study:
-    """Hold the rows of all runs against each other."""
+    """Compare the rows of all runs."""
     td = question.td
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
-    # of the run time neither the study nor its command says anything
+    # neither the study nor its command mentions the CPU time
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
         core.summarise(td, rows),
@@ -177,7 +180,7 @@ def rows_of(
     absolute: bool = False,
     told: Callable[[int], None] | None = None,
 ) -> Iterator[StudyRow]:
-    """Rows in the order of the runs, each as soon as those before it are there.
+    """Yield the rows in the order of the runs, each as soon as all rows before it are computed.
 
     Parameters
     ----------
@@ -185,51 +188,47 @@ def rows_of(
     sources : sequence of str
         Files or folders of the runs.
     farm : Farm
-        Computes the rows that are not known.
+        Computes the rows that are not in the ledger.
     ledger : Ledger, optional
-        Knows rows already, and gets new ones.
+        Contains rows already, and gets the new ones.
     absolute : bool
-        The processes of the farm work in other folders.
+        True if the processes of the farm work in other folders.
     told : function, optional
-        Is called with the number of rows that are there, first with those that were known.
+        Called with the number of finished rows, first with those from the ledger.
     """
-    known = dict(ledger.known) if ledger else {}
-    new = [number for number in range(len(sources)) if number not in known]
-    done, following = len(known), 0
+    known_rows = dict(ledger.known) if ledger else {}
+    new = [number for number in range(len(sources)) if number not in known_rows]
+    done = len(known_rows)
+    following = 0
     names = [sources[number] for number in new]
     if absolute:
         names = [abspath(name) for name in names]  # noqa: PTH100
     for answer in chain((None,), farm.answers(partial(core.ask, question), names)):
         if answer:
             number = new[answer.number]
-            row = (
-                core.failed(sources[number], answer.error)
-                if answer.error
-                else answer.result
-            )
-            known[number] = replace(row, source=sources[number])
+            if answer.error:
+                row = core.failed(sources[number], answer.error)
+            else:
+                row = answer.result
+            known_rows[number] = replace(row, source=sources[number])
             done += 1
             if ledger:
-                ledger.add(known[number])
+                ledger.add(known_rows[number])
         if told:
             told(done)
-        while following in known:
-            yield known.pop(following)
+        while following in known_rows:
+            yield known_rows.pop(following)
             following += 1
 
 
-_FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # of the summary behind the rows
-
-
 def fingerprint(question: Question) -> str:
-    """Stand for all that a row depends on beside its files: options and version, not whether its curve is drawn."""
-    asked = {**asdict(question), "curve": None}
-    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+    """Return a digest of all that a row depends on besides its files: options and version, not the drawn curves."""
+    values = {**asdict(question), "curve": None}
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def line(row: StudyRow, asked: str) -> str:
-    """Write a row as one line: its values, and what is needed to take it from there later.
+def line(row: StudyRow, question_digest: str) -> str:
+    """Return a row as one line: its values, and what is needed to read it back later.
 
     ``asked`` is the ``fingerprint`` of the question.
     """
@@ -237,7 +236,7 @@ def line(row: StudyRow, asked: str) -> str:
         "acceptable": [windows.tolist() for windows in (row.acceptable, row.alike)],
         "profile": None if row.profile is None else row.profile.tolist(),
         "files": [stamp._asdict() for stamp in row.files],
-        "asked": asked,
+        "asked": question_digest,
     }
     if row.curve is not None:
         record["curve"] = row.curve.tolist()
@@ -245,14 +244,14 @@ def line(row: StudyRow, asked: str) -> str:
 
 
 class Ledger:
-    """Rows that a file of such lines holds; it need not exist yet.
+    """A file of finished rows, one a line; it need not exist yet.
 
-    Damaged lines are passed over, among them what a killed study left of its last one.
+    Damaged lines are skipped, among them an incomplete last line of a killed study.
 
     Raises
     ------
     FormatError
-        If the file holds something else.
+        If the file contains something else.
     """
 
     def __init__(self, name: str, question: Question) -> None:
@@ -269,10 +268,10 @@ class Ledger:
         try:
             with Path(name).open(
                 "a+b"
-            ) as file:  # sure to be writable before the work begins
+            ) as file:  # checks that the file is writable before the work begins
                 file.seek(0)
                 content = file.read()
-            if new:  # the first row makes it
+            if new:  # the first row creates the file
                 Path(name).unlink()
         except OSError as error:
             raise FormatError(
@@ -288,7 +287,7 @@ class Ledger:
             else:
                 cut = text.startswith(_FIRST) and not text.endswith(
                     b"}"
-                )  # by the end of a killed study
+                )  # at the end of a killed study
                 self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
@@ -310,7 +309,7 @@ class Ledger:
             )
 
     def find(self, source: str) -> StudyRow | None:
-        """Give the row of a run whose files are as they were, None where there is none."""
+        """Return the row of a run whose files are unchanged, None if there is none."""
         files = stamps(source)
         row = self._rows.get(files)
         if row:
@@ -320,7 +319,7 @@ class Ledger:
         return None
 
     def taking(self, sources: Sequence[str]) -> int:
-        """Count the runs that are known."""
+        """Count the runs that are already known."""
         self.known = {
             number: row
             for number, source in enumerate(sources)
@@ -329,22 +328,26 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Say how many of so many runs were taken, and why others that the file holds were not."""
-        outdated = (
-            f"; {self.outdated} have changed, or were computed with other options"
-            if self.outdated
-            else ""
-        )
-        damaged = (
-            f"; lines skipped, damaged or without a checksum: {self.damaged}"
-            if self.damaged
-            else ""
-        )
+        """Return how many of ``runs`` runs were taken from the file, and why other rows of it were not."""
+        if self.outdated:
+            outdated = (
+                f"; {self.outdated} have changed, or were computed with other options"
+            )
+        else:
+            outdated = ""
+        if self.damaged:
+            damaged = f"; lines skipped, damaged or without a checksum: {self.damaged}"
+        else:
+            damaged = ""
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:
-        """Append the row of a run that was judged; it is in the file when this returns."""
-        if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
+        """Append the row of a judged run; it is in the file when this method returns."""
+        if row.status in (
+            FAILED,
+            UNREADABLE,
+            INTERNAL_ERROR,
+        ):  # computed again next time
             return
         try:
             append_as_a_whole(

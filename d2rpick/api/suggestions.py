@@ -1,4 +1,4 @@
-"""The choice of switch times, and the verdict on a pair."""
+"""Choose switch times, and judge a pair of them."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Suggestion(RunAnswer, answers.Suggestion):
-    """Answer of `suggest`; nothing of it changes.
+    """Answer of `suggest`; it is immutable.
 
-    ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
-    are None, with the reason in ``warnings``; a better pair also where it is the recommended one; ``quality`` of the
+    ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
+    are None, with the reason in ``warnings``; the better pair may be the recommended pair.  ``quality`` of the
     recommended pair has ``grade`` good, fair or poor and ``reasons``.
     """
 
@@ -39,7 +39,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
     name = "suggest"
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the candidates as a table at full precision.
+        """Return the candidates as a table at full precision.
 
         Returns
         -------
@@ -56,25 +56,29 @@ class Suggestion(RunAnswer, answers.Suggestion):
         """
         from d2rpick.report.suggestion import CANDIDATE
 
-        source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
+        source = list(self.situation.history.source)
+        rows = self.to_dict()["candidates"]
         return frame_of(
             rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
         return self.printed(Cards.of(options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None without one."""
-        pair, asked = self.recommended, self.question
+        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
+        pair = self.recommended
+        question = self.question
         judge = partial(
             answers.verify_of,
-            asked.reference,
+            question.reference,
             settings=self.situation.settings,
-            known=self.situation,
+            earlier=self.situation,
         )
-        return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
+        return (
+            card_judged(question, cards, [(pair.tr, pair.td)], judge) if pair else None
+        )
 
     def page(
         self,
@@ -82,7 +86,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the recommended pair."""
+        """Return the page, with the card of the recommended pair."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import suggestion_page
 
@@ -97,10 +101,11 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verdict(RunAnswer, answers.Verdict):
-    """Answer of `verify`; nothing of it changes.
+    """Answer of `verify`; it is immutable.
 
-    ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where
-    the record does not tell; ``candidate`` has the measures of the pair; ``quality`` is None where it does not verify.
+    ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
+    None if the record does not show it.  ``candidate`` has the measures of the pair; ``quality`` is None if the pair is
+    not verified.
     """
 
     compared: Run | None = None
@@ -113,7 +118,7 @@ class Verdict(RunAnswer, answers.Verdict):
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
+        """Return the measures of the pair as a table of one row with the columns of the CSV; unknown values are NaN.
 
         Examples
         --------
@@ -124,10 +129,10 @@ class Verdict(RunAnswer, answers.Verdict):
         """
         from d2rpick.report.verdict import measures
 
-        found = measures(self)
+        values = measures(self)
         return frame_of(
-            [found],
-            list(found),
+            [values],
+            list(values),
             basis=self.basis,
             source=list(self.situation.history.source),
         )
@@ -138,7 +143,7 @@ class Verdict(RunAnswer, answers.Verdict):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Write the page, with the card of the pair where it is good."""
+        """Return the page, with the card of the pair if it is good."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import verdict_page
 
@@ -215,23 +220,20 @@ def suggest(
     )
 
 
-def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
+def suggested(question: Asked, td: float | tuple[float, float] | None) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
-    found = answers.suggest_of(asked.reference, td, asked.settings)
+    result = answers.suggest_of(question.reference, td, question.settings)
     if (
-        found.better_pair
-        and found.recommended
-        and _read(found.better_pair) == _read(found.recommended)
+        result.better_pair
+        and result.recommended
+        and _read(result.better_pair) == _read(result.recommended)
     ):
-        found = replace(found, better_pair=None)
-    times = (
-        ("--td-window", *map(repr, td))
-        if isinstance(td, tuple)
-        else ()
-        if td is None
-        else ("--td", repr(td))
-    )
-    return Suggestion.about(asked, found, *times)
+        result = replace(result, better_pair=None)
+    if isinstance(td, tuple):
+        times = ("--td-window", *map(repr, td))
+    else:
+        times = () if td is None else ("--td", repr(td))
+    return Suggestion.about(question, result, *times)
 
 
 def _read(pair: Pair) -> tuple[float, float]:
@@ -285,19 +287,19 @@ def verify(
     True
     """
     pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    least = arguments.number(
+    min_ratio = arguments.number(
         "min_mean_energy",
         MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,
         FRACTION,
     )
     if switched is not None:
         arguments.check_run("switched", switched)
-    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return judged(asked, *pair, switched, least)
+    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
+    return judged(question, *pair, switched, min_ratio)
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse to judge no pair: without a switched run both times are needed."""
+    """Refuse an incomplete pair: without a switched run both times are needed."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
@@ -305,30 +307,33 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
 
 
 def judged(
-    asked: Asked,
+    question: Asked,
     tr: float | None,
     td: float | None,
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, of which its times are read where they are not given."""
+    """Judge a pair, also by a finished switched run, from which times that are not given are read."""
     check_pair(tr, td, switched)
-    other = switched and asked.reference.like(switched.files, asked.selection)
-    if other and (tr is None or td is None):
+    switched_reference = switched and question.reference.like(
+        switched.files, question.selection
+    )
+    if switched_reference and (tr is None or td is None):
         from d2rpick.choice.comparison import times_of
 
-        read = times_of(other.history, asked.reference.history)
-        tr, td = read[0] if tr is None else tr, read[1] if td is None else td
+        switch_times = times_of(switched_reference.history, question.reference.history)
+        tr = switch_times[0] if tr is None else tr
+        td = switch_times[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found, times = (
-        answers.verify_of(asked.reference, tr, td, asked.settings),
-        ["--tr", repr(tr), "--td", repr(td)],
-    )
-    if switched is not None and other:
-        found = answers.compare_with(found, asked.reference, other, min_mean_energy)
+    result = answers.verify_of(question.reference, tr, td, question.settings)
+    times = ["--tr", repr(tr), "--td", repr(td)]
+    if switched is not None and switched_reference:
+        result = answers.compare_with(
+            result, question.reference, switched_reference, min_mean_energy
+        )
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (
             min_mean_energy != MIN_MEAN_ENERGY
         )
-    return Verdict.about(asked, found, *times, compared=switched)
+    return Verdict.about(question, result, *times, compared=switched)

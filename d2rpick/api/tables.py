@@ -1,4 +1,4 @@
-"""Tables of other libraries, made frames of pandas without importing any of these libraries."""
+"""Convert tables of other libraries to frames of pandas, without importing these libraries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _METHODS_OF_TABLES: Final = (
 
 
 def is_table(value: Any) -> bool:
-    """Return True if a value is a table of some library, or an array of numbers, and no name of a file.
+    """Return True if a value is a table of some library or an array of numbers, and not the name of a file.
 
     Examples
     --------
@@ -30,14 +30,14 @@ def is_table(value: Any) -> bool:
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if kind:
         return hasattr(value, "ndim") and kind not in "OUST"
-    # of its type: to look at the columns of a lazy frame would compute them
+    # by the attributes of its type: asking for the columns of a lazy frame would compute them
     return isinstance(value, Mapping) or any(
         hasattr(type(value), name) for name in _METHODS_OF_TABLES
     )
 
 
 def is_plain_array(table: Any) -> bool:
-    """Return True for an array of numpy whose columns have no names."""
+    """Return True for a numpy array whose columns have no names."""
     return hasattr(table, "__array_interface__") and table.dtype.names is None
 
 
@@ -61,36 +61,33 @@ def frame_of_table(table: Any) -> pd.DataFrame:
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
     if hasattr(table, "to_dataframe"):  # xarray; only an array has a name
-        frame = (
-            table.to_dataframe(name=_SERIES_NAME)
-            if hasattr(table, "name")
-            else table.to_dataframe()
-        )
+        if hasattr(table, "name"):
+            frame = table.to_dataframe(name=_SERIES_NAME)
+        else:
+            frame = table.to_dataframe()
         return pd.DataFrame(frame)
-    if hasattr(table, "collect"):  # a frame of polars that is not computed yet
+    if hasattr(table, "collect"):  # a lazy frame of polars
         table = table.collect()
     if hasattr(table, "columns") and hasattr(
         table, "get_column"
-    ):  # polars, whose own way needs pyarrow
+    ):  # polars, whose own conversion needs pyarrow
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}
         )
     if hasattr(table, "to_pandas"):  # pyarrow and others
         frame = table.to_pandas()
-        return (
-            frame.to_frame(_SERIES_NAME)
-            if isinstance(frame, pd.Series)
-            else pd.DataFrame(frame)
-        )
+        if isinstance(frame, pd.Series):
+            return frame.to_frame(_SERIES_NAME)
+        return pd.DataFrame(frame)
     if isinstance(table, Mapping):
         return pd.DataFrame({str(name): values for name, values in table.items()})
     kind = getattr(getattr(table, "dtype", None), "kind", "")
     if kind == "V" or (kind and kind in "iuf" and table.ndim == 2):
         return pd.DataFrame(table)
-    found = f"frame is of type {type(table).__name__}"
+    description = f"frame is of type {type(table).__name__}"
     if kind:
-        found = f"frame is an array of shape {table.shape}"
+        description = f"frame is an array of shape {table.shape}"
     raise TypeError(
-        f"{found}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
+        f"{description}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
         "or a mapping of columns"
     )

@@ -1,6 +1,6 @@
-"""The command line: a thin shell around the library, and the only place that prints or exits.
+"""Provide the command line: a thin shell around the library, and the only place that prints or exits.
 
-Commands are imported when they are called, and what they compute with inside of them: ``--help`` stays quick.
+Commands are imported when they are called, and heavy modules inside the commands, so that ``--help`` stays fast.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from d2rpick.base.errors import format_in_one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-# Each command with its module and in a line, for the help, which does without the modules behind them: those of a run,
-# of many runs and of decks; and what computes runs of its own.
+# Module and one-line summary of each command, for the help, which does not import these modules: commands for one run,
+# for many runs and for decks, and commands that compute runs.
 _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
     "drive": ("running", "Compute a Radioss run that switches itself."),
@@ -49,13 +49,19 @@ _EXPERIMENTS: Final = {
 }
 COMMANDS: Final = _WORK | _EXPERIMENTS
 COULD_NOT_RUN: Final = 2
-BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
+BROKEN_PIPE: Final = (
+    141  # exit code that a shell reports for a program ended by SIGPIPE
+)
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 
+_VERSIONS: Final = (
+    "Show the version, and those of the libraries it stands on, and exit."
+)
+
 
 class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe has seen enough
-    """Carries BrokenPipeError past click, which would exit with 1: an objection."""
+    """Carries BrokenPipeError past click, which would exit with 1, the code of an objection."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -68,7 +74,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click's signature
-        """Give our own: click looks for the words of its own in other languages, in the folders of the system."""
+        """Return our help option: click would translate its own, with files from the folders of the system."""
         return self._help
 
     @cached_property
@@ -87,10 +93,10 @@ class Documented(click.Command):
         )
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """Write the examples no wider than the help."""
+        """Write the examples, no wider than the help."""
         from d2rpick.report.tables import (
             continued,
-        )  # not above: most of what is typed does without it
+        )  # imported here since most commands do not need it
 
         lines = [
             continued(f"  {line}", formatter.width)
@@ -100,7 +106,7 @@ class Documented(click.Command):
 
 
 class _Group(Documented, click.Group):
-    """Loads commands on demand; the one place where errors become messages and exit codes."""
+    """Loads commands on demand, and turns errors into messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
         return list(COMMANDS)
@@ -131,11 +137,10 @@ class _Group(Documented, click.Group):
             import difflib
 
             close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = (
-                f"Did you mean {close[0]!r}?"
-                if close
-                else f"The commands are {', '.join(COMMANDS)}."
-            )
+            if close:
+                hint = f"Did you mean {close[0]!r}?"
+            else:
+                hint = f"The commands are {', '.join(COMMANDS)}."
             raise click.UsageError(f"No such command {args[0]!r}. {hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -153,7 +158,7 @@ class _Group(Documented, click.Group):
             raise _PipeClosed from error
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
-        except Exception as error:  # a user gets a line, whatever it is
+        except Exception as error:  # the user gets one line for any error
             if _is_interrupt(error):
                 raise click.Abort from None
             from d2rpick.cli.output import explained
@@ -176,20 +181,20 @@ class _Group(Documented, click.Group):
             _fail(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             _fail(error.format_message())
-        except OSError as error:  # from a help or a version that cannot be written
+        except OSError as error:  # raised if a help or version text cannot be written
             _fail(format_in_one_line(error))
-        except click.Abort:  # which click makes of an interrupt
+        except click.Abort:  # click turns an interrupt into this
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # python must not complain when it closes the stream at exit
+            # keeps Python from complaining when it closes the stream at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return whether an error was raised because of an interrupt, as Python does while it makes a class."""
+    """Return True if an interrupt caused the error, as Python reports one during the creation of a class."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -204,11 +209,6 @@ def _tell_error(message: str) -> None:
     from d2rpick.cli.output import tell
 
     tell(f"d2rpick: {message}")
-
-
-_VERSIONS: Final = (
-    "Show the version, and those of the libraries it stands on, and exit."
-)
 
 
 def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -229,16 +229,16 @@ def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
-    """Make a command of a function, whose docstring is the help, with the examples at its end."""
+    """Make a command from a function; its docstring is the help text, with the examples at its end."""
 
     def made(function: Any) -> _Made:
-        told, _, examples = cleandoc(function.__doc__).partition(
+        help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
         lines = examples.replace("\\\n    ", "").split("\n")  # each command in one line
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(
-            function.__name__, cls=cls, help=told, epilog=epilog, **settings
+            function.__name__, cls=cls, help=help_text, epilog=epilog, **settings
         )(function)
 
     return made

@@ -1,4 +1,4 @@
-"""The commands ``card``, ``check`` and ``rule``: what stands in decks about the switches."""
+"""Define the commands ``card``, ``check`` and ``rule`` for the switching cards in decks."""
 
 from __future__ import annotations
 
@@ -58,18 +58,20 @@ def card(
     times = _windows(tr, td, windows)
     run = options.judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    found = card_of(times, run, request, cards)
-    read = found.verdicts[0].situation.history.notes if found.verdicts else ()
-    output.notes(read, all_cautions(found))
-    output.notes(found.card.notes, ())
-    output.content(text_bytes(found.card.text))
-    output.finish(objection=not found.passed)
+    judged_card = card_of(times, run, request, cards)
+    history_notes = (
+        judged_card.verdicts[0].situation.history.notes if judged_card.verdicts else ()
+    )
+    output.notes(history_notes, all_cautions(judged_card))
+    output.notes(judged_card.card.notes, ())
+    output.content(text_bytes(judged_card.card.text))
+    output.finish(objection=not judged_card.passed)
 
 
 def _windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
-    """Pair the times, or read them from the file; UsageError where they do not say windows."""
+    """Return the windows from pairs of times or from the file; raise UsageError if neither gives windows."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
@@ -130,25 +132,29 @@ def check(
 
     run = options.judging_run(request)
     output = output.beside(*deck, *(run.sources if run else ()))
-    found = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
+    findings = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
     output.spare(
         file
-        for many in (found.results, found.failed)
-        for one in many
-        for file in one.files
+        for results in (findings.results, findings.failed)
+        for result in results
+        for file in result.files
     )
     notes_before = click.get_current_context().meta["d2rpick.unused"]
     output.notes(
-        [note for note in found.notes if note not in notes_before], found.cautions
+        [note for note in findings.notes if note not in notes_before], findings.cautions
     )
-    for one in found.failed:
-        tell(f"d2rpick: {explained(one.error, [one.deck])}")
+    for result in findings.failed:
+        tell(f"d2rpick: {explained(result.error, [result.deck])}")
     form = output.output_format
-    if found.results or form != "table":
-        output.result(in_words(found.text(form, output.shown()), form, output.columns))
-    if not found.results or any(one.code == INTERNAL_ERROR for one in found.failed):
+    if findings.results or form != "table":
+        output.result(
+            in_words(findings.text(form, output.shown()), form, output.columns)
+        )
+    if not findings.results or any(
+        result.code == INTERNAL_ERROR for result in findings.failed
+    ):
         click.get_current_context().exit(2)
-    output.finish(objection=not found.passed)
+    output.finish(objection=not findings.passed)
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:

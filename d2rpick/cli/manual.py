@@ -1,4 +1,4 @@
-"""The manual page d2rpick(1), built from the help: ``python -m d2rpick.cli.manual > d2rpick.1``."""
+"""Build the manual page d2rpick(1) from the help: ``python -m d2rpick.cli.manual > d2rpick.1``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def manual() -> str:
-    """Write the page of the whole program in roff, with a section for each command."""
+    """Return the page of the whole program in roff, with a section for each command."""
     context = click.Context(d2rpick, info_name="d2rpick", **d2rpick.context_settings)
     assert isinstance(d2rpick, click.Group)
     lines = [
@@ -51,18 +51,17 @@ def manual() -> str:
 
 
 def _described(command: click.Command, context: click.Context) -> Iterator[str]:
-    """Give usage, help, options and examples of a command."""
+    """Yield usage, help, options and examples of a command."""
     if context.parent:
         usage = " ".join(command.collect_usage_pieces(context))
         yield from (".PP", rf"\fBd2rpick {command.name}\fR {_text(usage)}")
     for paragraph in (command.help or "").split("\n\n"):
         yield from (".PP", _text(" ".join(paragraph.split())))
     for option in command.get_params(context):
-        record = (
-            option.get_help_record(context)
-            if isinstance(option, click.Option)
-            else None
-        )
+        if isinstance(option, click.Option):
+            record = option.get_help_record(context)
+        else:
+            record = None
         if record:
             yield from _item(*record)
     if command.epilog:
@@ -82,7 +81,7 @@ def _item(name: str, text: str) -> tuple[str, ...]:
 
 
 def _text(text: str) -> str:
-    r"""Write a line in roff: backslashes and hyphens as they are typed, and no letter that begins a request.
+    r"""Escape a line for roff: backslashes and hyphens appear as typed, and no line is mistaken for a request.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The commands ``replay``, ``rollover`` and ``reproduce``: runs that are computed here."""
+"""Define the commands ``replay``, ``rollover`` and ``reproduce``, which compute sample runs."""
 
 from __future__ import annotations
 
@@ -21,6 +21,17 @@ if TYPE_CHECKING:
 
 
 _NEEDED: Final = {"required": True}
+
+# Columns of a solver's table beside time_s, by what it is.
+SOLVER = {
+    "pairs": ("reference_m", "published_m", "better_m"),
+    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
+}
+SECTIONS = ("1", "2", "3", "4", "5")
+_ABSENT = (
+    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
+    "repository and call d2rpick from there: pip install -e ."
+)
 
 
 @options.command
@@ -49,16 +60,18 @@ def replay(motion: Motion, output: Output) -> None:
 
     form = motion.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()
-    found, switched = motion.computed()
+    trajectory, switched = motion.computed()
     if output.plot:
         from d2rpick.report import figures, figures_models
 
         output.write(
             output.plot,
-            figures.render(figures_models.draw_replay(found, switched), output.plot),
+            figures.render(
+                figures_models.draw_replay(trajectory, switched), output.plot
+            ),
         )
     if output.output_file or not output.plot:
-        output.content(OSCILLATOR_WRITERS[form](found, motion.oscillator))
+        output.content(OSCILLATOR_WRITERS[form](trajectory, motion.oscillator))
 
 
 @options.command
@@ -92,12 +105,13 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """One run; for a plot also the one without switching."""
+    """Compute one run; for a plot also the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, format_of
 
     form = box.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()
-    windows, plot = box.windows, output.plot
+    windows = box.windows
+    plot = output.plot
     record = box.simulated(*windows)
     output.notes((), unbalanced(record))
     if plot:
@@ -113,32 +127,21 @@ def _run(box: Box, output: Output) -> None:
 
 
 def _scan(box: Box, output: Output) -> None:
-    """Many switched runs, the tr that the tool recommends among them."""
+    """Compute many switched runs, among them that with the recommended tr."""
     output = output.beside()
-    scanning, plot = Scanning(box), output.plot
+    scanning = Scanning(box)
+    plot = output.plot
     output.notes((), scanning.cautions)
     with counting(len(scanning.times), quiet=output.quiet) as count:
-        found = scanning.run(count.tell)
+        scan = scanning.run(count.tell)
     if plot:
         from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures_models.draw_scan(*found[:3]), plot))
+        output.write(plot, figures.render(figures_models.draw_scan(*scan[:3]), plot))
     output.result(
-        write("rollover", output.output_format or "table", found, output.shown())
+        write("rollover", output.output_format or "table", scan, output.shown())
     )
-    output.finish(objection=found.answer.recommended is None)
-
-
-# Columns of a solver's table beside time_s, by what it is.
-SOLVER = {
-    "pairs": ("reference_m", "published_m", "better_m"),
-    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
-}
-SECTIONS = ("1", "2", "3", "4", "5")
-_ABSENT = (
-    "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
-    "repository and call d2rpick from there: pip install -e ."
-)
+    output.finish(objection=scan.answer.recommended is None)
 
 
 @options.command

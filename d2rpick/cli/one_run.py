@@ -1,4 +1,4 @@
-"""The commands about one run: ``info``, ``extract``, ``suggest``, ``explore``, ``verify``, ``parts`` and ``plan``."""
+"""Define the commands for one run: ``info``, ``extract``, ``suggest``, ``explore``, ``verify``, ``parts``, ``plan``."""
 
 from __future__ import annotations
 
@@ -63,8 +63,10 @@ def info(request: Request, output: Output) -> None:
         overview = replace(run, chosen=selection).overview(request.deck or False)
     output.notes((), (*name_deck(request), *overview.cautions))
     form = output.output_format
-    shown = output.shown()
-    output.result(in_words(write("overview", form, overview, shown), form, shown.width))
+    display = output.shown()
+    output.result(
+        in_words(write("overview", form, overview, display), form, display.width)
+    )
 
 
 @options.command
@@ -138,34 +140,38 @@ def suggest(
     from d2rpick.api.asked import ask
     from d2rpick.api.suggestions import suggested
 
-    wanted, card = time_or_window(td, td_window), output.output_format == "card"
+    wanted = time_or_window(td, td_window)
+    card = output.output_format == "card"
     if card:
         check_switched("-f card", request, cards)
     output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, merge=cards.merge)
-    answer = suggested(asked, wanted)
-    # a td that was given is answered, however poor it is
-    least = request.min_quality or ("poor" if td is not None else "fair")
-    passed = answer.decision is not None and answer.decision.reaches(least)
-    told = [
-        one
-        for one in answer.cautions
-        if one.code != "no-candidate" or output.output_format not in IN_WORDS
+        question = ask(run, request, merge=cards.merge)
+    answer = suggested(question, wanted)
+    # a given td is answered, however poor it is
+    min_grade = request.min_quality or ("poor" if td is not None else "fair")
+    passed = answer.decision is not None and answer.decision.reaches(min_grade)
+    new_cautions = [
+        caution
+        for caution in answer.cautions
+        if caution.code != "no-candidate" or output.output_format not in IN_WORDS
     ]
-    output.notes(asked.reference.history.notes, told)
+    output.notes(question.reference.history.notes, new_cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     if card:
-        found = answer.printed(cards)
-        told = (
-            []
-            if found is None
-            else [one for one in all_cautions(found) if one not in answer.cautions]
-        )
+        judged_card = answer.printed(cards)
+        if judged_card is None:
+            new_cautions = []
+        else:
+            new_cautions = [
+                caution
+                for caution in all_cautions(judged_card)
+                if caution not in answer.cautions
+            ]
         return output.finish(
-            objection=not (output.card(found, told) and passed),
+            objection=not (output.card(judged_card, new_cautions) and passed),
         )
     output.answer(answer)
     return output.finish(objection=not passed)
@@ -222,15 +228,16 @@ def explore(
     check_window("td_window", td_window)
     output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, merge=cards.merge)
-    answer = explored(asked, td, td_window, steps)
-    output.notes(asked.reference.history.notes, answer.cautions)
+        question = ask(run, request, merge=cards.merge)
+    answer = explored(question, td, td_window, steps)
+    output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     output.answer(answer)
-    chosen, least = answer.recommended, asked.settings.min_quality
-    passed = chosen and chosen.decision and chosen.decision.reaches(least)
+    chosen = answer.recommended
+    min_grade = question.settings.min_quality
+    passed = chosen and chosen.decision and chosen.decision.reaches(min_grade)
     output.finish(objection=not passed)
 
 
@@ -280,19 +287,19 @@ def verify(
     check_pair(tr, td, switched)
     output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, merge=cards.merge)
-    other = None
+        question = ask(run, request, merge=cards.merge)
+    switched_run = None
     if switched:
         with reading(switched, quiet=output.quiet):
-            other = open_run(request, switched)
-        output.spare(other.sources)
-    answer = judged(asked, tr, td, other, min_mean_energy)
-    output.notes(asked.reference.history.notes, answer.cautions)
+            switched_run = open_run(request, switched)
+        output.spare(switched_run.sources)
+    answer = judged(question, tr, td, switched_run, min_mean_energy)
+    output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish(objection=not answer.decision.reaches(asked.settings.min_quality))
+    output.finish(objection=not answer.decision.reaches(question.settings.min_quality))
 
 
 @options.command
@@ -420,39 +427,44 @@ def plan(
     _check_deck(request, cards, form, write_deck)
     output.check(cards, by_itself=bool(write_deck))
     with opened(request, output, done, *before) as (run, output):
-        asked = ask(run, request, merge=cards.merge)
+        question = ask(run, request, merge=cards.merge)
         if write_deck and (
             foreign := [
-                one for one in asked.cautions if one.code == "deck-of-another-model"
+                caution
+                for caution in question.cautions
+                if caution.code == "deck-of-another-model"
             ]
         ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
         earlier = open_run(request, before) if before else None
     answer = planned(
-        asked, min_rigid, options.windows_in(done) if done else (), earlier
+        question, min_rigid, options.windows_in(done) if done else (), earlier
     )
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
-    found = answer.printed(cards, every=every) if form == "card" or write_deck else None
-    checked, passed = (
-        _write_and_check(found, answer, write_deck, output)
-        if found and write_deck
-        else ("", True)
+    judged_card = (
+        answer.printed(cards, every=every) if form == "card" or write_deck else None
     )
+    if judged_card and write_deck:
+        checked, passed = _write_and_check(judged_card, answer, write_deck, output)
+    else:
+        checked, passed = ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
         return output.finish(
-            objection=not (output.card(found, _untold(found, answer)) and passed)
+            objection=not (
+                output.card(judged_card, _untold(judged_card, answer)) and passed
+            )
         )
-    if found:
-        output.notes(found.card.notes, ())
+    if judged_card:
+        output.notes(judged_card.card.notes, ())
     output.answer(answer, checked if form == "table" else "", every=every)
     return output.finish(objection=not (answer.supported and passed))
 
 
 def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Cautions of the card that the plan has not: those of windows that do not verify, and those of the card itself."""
+    """Return the cautions of the card that the plan lacks: of unverified windows, and of the card itself."""
     if card is None:
         return []
     failed = tuple(
@@ -468,7 +480,7 @@ def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Refuse to copy no deck, and a card that switches nobody, before a file is opened."""
+    """Refuse to copy a deck that is not given, or to write a card without parts, before a file is opened."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -480,14 +492,14 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy, and check it by the history.
+    """Write the copy of the deck, and check it by the history.
 
     Returns
     -------
     text : str
-        The files written, and below them what ``check --history`` prints of the deck.
+        The written files, and below them the output of ``check --history`` for the deck.
     passed : bool
-        Whether no finding is an error.
+        True if no finding is an error.
     """
     from d2rpick.api.plans import written
 

@@ -1,4 +1,4 @@
-"""Options of the commands, made from the tables of what can be asked; ``--show-settings``, and the line to repeat."""
+"""Make the options of the commands from the tables of requests; write ``--show-settings`` and the line to repeat."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # a command function; click's decorators do not say more
+Decorated = Any  # a command function; click's decorators have no closer type
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
-HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
+HISTORY: Final = "HISTORY"  # stands for the argument, not for the option of that name
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
@@ -48,7 +48,7 @@ DECK: Final = (
 DECK_OF_PARTS: Final = (
     f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
 )
-# Sections of the help, behind the options of a command that are in none.
+# Sections of the help, after the options of a command that belong to no section.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
         *(
@@ -88,7 +88,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
 }
-# Options that write files, which the same command would find the next time.
+# Options that write files, which would already exist when the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -98,10 +98,10 @@ _SOURCES: Final = {
 
 
 class Command(Documented):
-    """A command that can show its settings instead of running, and names options where arguments make no sense."""
+    """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line; what neither it nor the environment gives, the settings may."""
+        """Read the command line; the settings file fills in what neither it nor the environment gives."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
@@ -112,22 +112,27 @@ class Command(Documented):
             )
             super().parse_args(without, list(args))
             ctx.default_map = settings_of(ctx, without, table, source)
-        rest = super().parse_args(ctx, args)
+        remaining = super().parse_args(ctx, args)
         if words := words_of(ctx):
             ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)
-        return rest
+        return remaining
 
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the options in groups, each where it is looked for."""
-        shown = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
+        """Write the options in groups by their subject."""
+        shown_options = (
+            parameter
+            for parameter in self.get_params(ctx)
+            if isinstance(parameter, click.Option)
+        )
         records = {
-            spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown
+            spelled(parameter).replace("-", "_"): parameter.get_help_record(ctx)
+            for parameter in shown_options
         }
         grouped = {name for names in GROUPS.values() for name in names}
         for title, names in {
-            "Options": [one for one in records if one not in grouped],
+            "Options": [parameter for parameter in records if parameter not in grouped],
             **GROUPS,
         }.items():
             if rows := [record for name in names if (record := records.get(name))]:
@@ -135,18 +140,18 @@ class Command(Documented):
                     formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; UsageError for what makes no sense together."""
+        """Run the command; raise UsageError for contradictory options."""
         if not ctx.params.get("quiet"):
             for note in ctx.meta["d2rpick.unused"]:
                 tell(f"note: {note}")
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(text_bytes("\n".join(_settings(ctx))))
         if (words := words_of(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # not above: start-up
+            import shlex  # imported here to keep the start fast
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
-        # Numpy before the modules of a run: its import makes many calls, and as deep as theirs each may meet the end of
-        # a piece of the stack of Python 3.11, which maps memory for it and unmaps it again.
+        # Import numpy before the modules of a run: its import makes many nested calls, and each may meet the end of a
+        # piece of the stack of Python 3.11, which then maps memory for it and unmaps it again.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401
         try:
@@ -156,7 +161,7 @@ class Command(Documented):
 
 
 class Either(click.Option):
-    """An option that excludes others: what the environment says of it gives way to those on the command line."""
+    """An option that excludes others: its environment variable is ignored if the command line has one of those."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -165,7 +170,7 @@ class Either(click.Option):
     def consume_value(
         self, ctx: click.Context, opts: Any
     ) -> tuple[Any, ParameterSource]:
-        """Find the value and its source; click has done so before for all that is on the command line."""
+        """Return the value and its source; click has already done so for all options on the command line."""
         value, source = super().consume_value(ctx, opts)
         typed = (
             ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
@@ -182,22 +187,27 @@ def command(function: Decorated) -> click.Command:
 
 
 def takes(
-    *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **other: Any
+    *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command options of tables, passed on as one object for each, by the name of its class in small letters.
+    """Give a command the options of tables; it gets one object per table, named like its class in lower case.
 
     Parameters
     ----------
     *names : str
-        Of options, in the order of the help.
+        Names of options, in the order of the help.
     of : sequence of classes
         The tables.
     forms : str
         Forms of the result, the first by default.
     **other : str or dict
-        Of an option by its name: the help of this command, or what click is told otherwise.
+        For an option by its name: the help text for this command, or other arguments of click.
     """
-    tables = {table: [one for one in names if one in options_of(table)] for table in of}
+    tables = {
+        table: [
+            option_name for option_name in names if option_name in options_of(table)
+        ]
+        for table in of
+    }
     if HISTORY in names:
         tables[Request].append("history")
     if choices := list(forms):
@@ -206,7 +216,7 @@ def takes(
             "default": choices[0],
             "show_default": True,
         }
-        other["output_format"] = about
+        overrides["output_format"] = about
 
     def decorate(function: Decorated) -> Decorated:
         @wraps(function)
@@ -214,16 +224,18 @@ def takes(
             ctx = click.get_current_context()
             if "history" in values:
                 ctx.meta["d2rpick.history"] = values["history"]
-            given = {
+            given_names = {
                 name
                 for name in values
                 if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
             }
             for table, taken in tables.items():
                 if taken:
-                    more = {"given": given & {*taken}} if table is Request else {}
+                    given_field = (
+                        {"given": given_names & {*taken}} if table is Request else {}
+                    )
                     values[table.__name__.lower()] = table(
-                        **{name: values.pop(name) for name in taken}, **more
+                        **{name: values.pop(name) for name in taken}, **given_field
                     )
             if "no_deck" in names:
                 from d2rpick.api.deck_in_folder import find_deck_in_folder
@@ -235,11 +247,11 @@ def takes(
             for flag in _FLAGS:
                 run = flag(run)
         for name in reversed(names):
-            as_in_table = of is TABLES and name not in other
+            as_in_table = of is TABLES and name not in overrides
             run = (
                 _as_in_table(name)
                 if as_in_table
-                else _decorator(of, name, other.get(name, {}))
+                else _decorator(of, name, overrides.get(name, {}))
             )(run)
         return run
 
@@ -249,9 +261,9 @@ def takes(
 def _shared(
     decorate: Callable[[Decorated], Decorated],
 ) -> Callable[[Decorated], Decorated]:
-    """Give all commands the same object of an option: a module has commands, of which one is called."""
-    made = decorate(lambda: None).__click_params__[0]
-    again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
+    """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
+    shared_option = decorate(lambda: None).__click_params__[0]
+    again: Any = lambda *_, **__: shared_option  # noqa: E731  click takes what makes an option for its class
     return click.option(cls=again)
 
 
@@ -261,7 +273,7 @@ def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
 
 
 def _decorator(
-    tables: Sequence[Any], name: str, other: Any
+    tables: Sequence[Any], name: str, override: Any
 ) -> Callable[[Decorated], Decorated]:
     if name == HISTORY:
         return click.argument(
@@ -271,24 +283,30 @@ def _decorator(
             required=True,
             type=click_type("file"),
         )
-    table = next(one for one in tables if name in options_of(one))
-    more = {"help": other} if isinstance(other, str) else other
+    table = next(
+        table_of_option
+        for table_of_option in tables
+        if name in options_of(table_of_option)
+    )
+    arguments = {"help": override} if isinstance(override, str) else override
     return option(
         name,
         options_of(table)[name],
-        **{"default": table.__dataclass_fields__[name].default, **more},
+        **{"default": table.__dataclass_fields__[name].default, **arguments},
     )
 
 
-def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
-    """Make click's option of an entry of a table."""
-    about: dict[str, Any] = {"help": one.help, "metavar": one.metavar}
-    if one.kind == "flag":
+def option(
+    name: str, entry: Option, **arguments: Any
+) -> Callable[[Decorated], Decorated]:
+    """Make click's option from an entry of a table."""
+    about: dict[str, Any] = {"help": entry.help, "metavar": entry.metavar}
+    if entry.kind == "flag":
         about["is_flag"] = True
     else:
-        kind = click_type(one.kind)
-        about |= {"type": kind, "nargs": 2 if one.pair else 1, "multiple": one.many}
-    about |= {"instead_of": one.instead_of} | other
+        kind = click_type(entry.kind)
+        about |= {"type": kind, "nargs": 2 if entry.pair else 1, "multiple": entry.many}
+    about |= {"instead_of": entry.instead_of} | arguments
     if about["instead_of"]:
         about["cls"] = Either
     else:
@@ -301,30 +319,32 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
         about.pop("default", None)
     else:
         about.setdefault("show_default", True)
-    return click.option(*one.short, f"--{dashed(name)}", name, **about)
+    return click.option(*entry.short, f"--{dashed(name)}", name, **about)
 
 
-def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
+def time(name: str, text: str, **arguments: Any) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that is a time, or a window of time."""
-    pair, required = more.get("pair", False), more.pop("required", False)
+    pair = arguments.get("pair", False)
+    required = arguments.pop("required", False)
     return option(
         name[2:].replace("-", "_"),
-        Option(text, TIME, "LO HI" if pair else "T", **more),
+        Option(text, TIME, "LO HI" if pair else "T", **arguments),
         required=required,
     )
 
 
 def file(
-    name: str, text: str, metavar: str = "FILE", **more: Any
+    name: str, text: str, metavar: str = "FILE", **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file, or ``many`` of them, one each time.
+    """Make an option of one command that names a file, or ``many`` files, by repeating the option.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
-    required, kind = more.pop("required", False), more.pop("kind", "file")
+    required = arguments.pop("required", False)
+    kind = arguments.pop("kind", "file")
     return option(
         name[2:].replace("-", "_"),
-        Option(text, kind, metavar, **more),
+        Option(text, kind, metavar, **arguments),
         required=required,
     )
 
@@ -338,12 +358,12 @@ def windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; None without one."""
+    """Open the history by which cards are judged; return None without one."""
     if not request.history:
         return None
     from d2rpick.api.asked import (
         open_run,
-    )  # not above: without a history nothing is computed
+    )  # imported here since nothing is computed without a history
 
     return open_run(request)
 
@@ -352,7 +372,7 @@ def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
     ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
 
 
-# What every command can be told and none asks for itself: it is kept in the context.
+# Options that every command accepts but none uses itself: they are kept in the context.
 _FLAGS: Final = [
     _shared(
         click.option(
@@ -374,9 +394,9 @@ _FLAGS: Final = [
 
 
 def repeat() -> list[str]:
-    """Give the command line that was typed, and before it the environment variables that set options.
+    """Return the typed command line, preceded by the environment variables that set options.
 
-    It may replace the files that it has written, so that it can be typed again.
+    The line may overwrite the files that it has written, so that it can be run again.
     """
     context = click.get_current_context()
     names = [
@@ -394,31 +414,36 @@ def repeat() -> list[str]:
 
 
 def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
-    """Add options to a command line, before the names that are behind ``--``.
+    """Add options to a command line, before the names that follow ``--``.
 
     Examples
     --------
     >>> inserted(["info", "--", "-x.csv"], ["--quiet"])
     ('info', '--quiet', '--', '-x.csv')
     """
-    place = command.index("--") if "--" in command else len(command)
-    return (*command[:place], *words, *command[place:])
+    position = command.index("--") if "--" in command else len(command)
+    return (*command[:position], *words, *command[position:])
 
 
 def _settings(ctx: click.Context) -> Iterator[str]:
-    """Write every option with its value, and where that comes from."""
+    """Yield a line for every option with its value and the source of the value."""
     from d2rpick.report.tables import as_json
 
-    for one in ctx.command.get_params(ctx):
-        if one.expose_value and one.name:
-            value, source = ctx.params[one.name], _source(ctx, one.name)
-            named = {
-                "environment": f", {_variable(ctx, one.name)}",
+    for parameter in ctx.command.get_params(ctx):
+        if parameter.expose_value and parameter.name:
+            value = ctx.params[parameter.name]
+            source = _source(ctx, parameter.name)
+            origin_details = {
+                "environment": f", {_variable(ctx, parameter.name)}",
                 "settings": f", {ctx.meta['d2rpick.settings']}",
             }
-            name = spelled(one) if isinstance(one, click.Option) else one.name
-            shown = "none" if value in (None, ()) else as_json(value, None)
-            yield f"{name} = {shown}  # {source}{named.get(source, '')}"
+            name = (
+                spelled(parameter)
+                if isinstance(parameter, click.Option)
+                else parameter.name
+            )
+            written_value = "none" if value in (None, ()) else as_json(value, None)
+            yield f"{name} = {written_value}  # {source}{origin_details.get(source, '')}"
 
 
 def _source(ctx: click.Context, name: str) -> str:
@@ -427,5 +452,5 @@ def _source(ctx: click.Context, name: str) -> str:
 
 
 def _variable(ctx: click.Context, name: str) -> str:
-    """Name of the environment variable that sets an option."""
+    """Return the name of the environment variable that sets an option."""
     return f"{ctx.auto_envvar_prefix}_{name.upper()}"

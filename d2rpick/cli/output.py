@@ -1,4 +1,4 @@
-"""Where a command's results, notes and files go."""
+"""Send results, notes and files of a command where they belong."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# A terminal of fewer columns is none that tables are read on.
+# a narrower terminal is treated as if tables were never read there [columns]
 _NARROWEST: Final = 40
-# Formats that names of files promise.
+# formats implied by file names
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
-# What a report is often expected to be, and is not.
+# formats often expected of a report, but not supported
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Lines of a result that stand out: what is recommended or judged, and what a deck is to be changed for.
+# Lines of a result that are bold: what is recommended or judged, and what is to be changed in a deck.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 
 
-# Arguments that messages name in backticks, and which options set them where these have other names.
+# Arguments that messages name in backticks, with the options that set them if these have other names.
 ARGUMENTS: Final = (
     *OPTIONS,
     *options_of(Cards),
@@ -72,12 +72,12 @@ _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {
     "table",
     "markdown",
-}  # forms in which the answer says itself why nothing is recommended
+}  # forms whose answer itself says why nothing is recommended
 
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Results to stdout or a file, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
+    """Writes results to stdout or a file, and all else to stderr unless ``quiet``; ``inputs`` are never overwritten."""
 
     plot: str | None = option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -110,16 +110,16 @@ class Output:
 
     @property
     def file(self) -> str | None:
-        """Where the result goes; None for stdout."""
+        """Name of the file for the result; None for stdout."""
         return None if self.output_file == "-" else self.output_file
 
     @property
     def columns(self) -> int:
-        """Columns of the terminal that the result goes to; 0 where it goes to none."""
+        """Width of the terminal that shows the result [columns]; 0 if no terminal does."""
         return 0 if self.file else columns_of(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Give what writes beside these inputs; D2RPickError when a file to be written may not be."""
+        """Return an output that protects these inputs; raise D2RPickError if a file must not be written."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -130,13 +130,14 @@ class Output:
         _check_report(self.report)
         claimed: dict[str, str] = {}
         for name in ("output_file", "plot", "report"):
-            file, named = getattr(self, name), f"--{dashed(name)}"
+            file = getattr(self, name)
+            option_name = f"--{dashed(name)}"
             if file is not None:
                 output.claim(file)
-                other = claimed.setdefault(os.path.realpath(file), named)
-                if other != named:
+                other_option = claimed.setdefault(os.path.realpath(file), option_name)
+                if other_option != option_name:
                     raise D2RPickError(
-                        f"{file}: {named} and {other} are the same file; give two"
+                        f"{file}: {option_name} and {other_option} are the same file; give two"
                     )
         if self.file is not None and not self.quiet and (form := _meant(self.file)):
             tell(
@@ -145,7 +146,7 @@ class Output:
         return output
 
     def check(self, cards: Cards, *, by_itself: bool = False) -> None:
-        """Refuse options of a card where none is asked for, ``by_itself`` or in a page."""
+        """Refuse options of a card if none is requested, ``by_itself`` or in a page."""
         if cards.given and not (
             by_itself or self.output_format == "card" or self.report is not None
         ):
@@ -153,29 +154,29 @@ class Output:
                 f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
             )
 
-    def shown(self, **more: Any) -> Shown:
-        """Give what a form may show beside the answer."""
+    def shown(self, **further: Any) -> Shown:
+        """Return what a form shows besides the answer."""
         from d2rpick.report.formats import Shown
 
         meta = click.get_current_context().meta
-        shown = Shown(
+        display = Shown(
             meta["d2rpick.command"],
             self.limit,
             verbose=meta.get("d2rpick.verbose", False),
-            **more,
+            **further,
         )
-        return shown._replace(width=self.columns or shown.width)
+        return display._replace(width=self.columns or display.width)
 
-    def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
-        """Give out an answer in the form that is asked for."""
-        now = self.shown(**shown)
+    def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
+        """Write an answer in the requested form."""
+        now = self.shown(**display_options)
         text = in_words(
             answer.text(self.output_format, now), self.output_format, now.width
         )
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
-        """Write the figure and the page, as far as they are asked for."""
+        """Write the figure and the page if they are requested."""
         if self.plot:
             from d2rpick.report import figures
 
@@ -184,20 +185,20 @@ class Output:
             self.write(self.report, text_bytes(with_options(page())))
 
     def finish(self, *, objection: bool) -> None:
-        """Exit with 1 if the answer is an objection, unless told otherwise."""
+        """Exit with 1 if the answer is an objection, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def spare(self, inputs: Iterable[str]) -> None:
-        """Raise D2RPickError when a file would replace one of further inputs, known only since they were read."""
+        """Raise D2RPickError if a file would replace one of further inputs, which are known only after reading."""
         further = replace(self, inputs=tuple(inputs))
         for name in (self.file, self.plot, self.report):
             if name is not None:
                 further.claim(name)
 
     def claim(self, name: str) -> None:
-        """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
-        from pathlib import Path  # not above: --help does without it
+        """Raise D2RPickError if ``name`` cannot be written, is an input, or exists and must not be replaced."""
+        from pathlib import Path  # imported here since --help does not need it
 
         path = Path(name)
         if path.is_dir():
@@ -222,40 +223,38 @@ class Output:
             )
 
     def result(self, text: str) -> None:
-        """Give out the result; on a terminal the lines of the answer stand out."""
+        """Write the result; on a terminal, the lines with the answer are bold."""
         content = text_bytes(text and f"{text}\n")
         if self.file is not None:
             self.write(self.file, content)
             return
         text = content.decode()
-        colour = (
-            False
-            if os.environ.get("NO_COLOR")
-            else True
-            if os.environ.get("FORCE_COLOR")
-            else None
-        )
+        colour: bool | None = None
+        if os.environ.get("NO_COLOR"):
+            colour = False
+        elif os.environ.get("FORCE_COLOR"):
+            colour = True
         bold = re.sub(_ANSWER, lambda line: click.style(line[0], bold=True), text)
         click.echo(bold, nl=False, color=colour)
 
     def content(self, content: bytes) -> None:
-        """Give out a result that is the content of a file."""
+        """Write a result that is the content of a file."""
         if self.file is not None:
             self.write(self.file, content)
         else:
             click.echo(content, nl=False)
 
-    def card(self, found: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Give out the card of an answer with what is to be told of it; False where there is none or one fails."""
-        if found is None:
+    def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
+        """Write the card of an answer with its cautions; return False if there is none or a window fails."""
+        if judged_card is None:
             self.content(b"")
             return False
-        self.notes(found.card.notes, cautions)
-        self.content(found.card.text.encode())
-        return found.passed
+        self.notes(judged_card.card.notes, cautions)
+        self.content(judged_card.card.text.encode())
+        return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Say what a reader left out, and what the user should know."""
+        """Print what a reader left out, and the warnings."""
         if self.quiet:
             return
         for note in notes:
@@ -264,7 +263,7 @@ class Output:
             tell(f"warning: {caution.code}: {caution.message}")
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file whole or not at all; D2RPickError where it cannot be written."""
+        """Write a file completely or not at all; raise D2RPickError if it cannot be written."""
         from pathlib import Path
 
         try:
@@ -278,7 +277,7 @@ class Output:
 
 
 def _check_report(name: str | None) -> None:
-    """Raise D2RPickError where a report would not be what its name says: it is an HTML page in a file."""
+    """Raise D2RPickError if the file name of a report promises another format than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
@@ -288,30 +287,33 @@ def _check_report(name: str | None) -> None:
 
 
 def _meant(name: str) -> str | None:
-    """Give the format that the name of a result promises, where the command has it and none was asked for."""
+    """Return the format that the file name of a result implies, if the command has it and no format was given."""
     ctx = click.get_current_context()
-    given = (
+    is_given = (
         ctx.get_parameter_source("output_format")
         is not click.core.ParameterSource.DEFAULT
     )
-    if given or "write_as" in ctx.params:  # of a history the name itself decides
+    if is_given or "write_as" in ctx.params:  # the name of a history decides itself
         return None
     form = next(
         (form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None
     )
-    (choice,) = [one.type for one in ctx.command.params if one.name == "output_format"]
+    (choice,) = [
+        format_type.type
+        for format_type in ctx.command.params
+        if format_type.name == "output_format"
+    ]
     return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
 
 def columns_of(stream: TextIO) -> int | None:
-    """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
-    given = os.environ.get("COLUMNS", "")
+    """Return the width of the terminal behind a stream, limited to a readable width; None without a terminal."""
+    columns_set = os.environ.get("COLUMNS", "")
     try:
-        columns = (
-            int(given)
-            if given.isdecimal()
-            else os.get_terminal_size(stream.fileno()).columns
-        )
+        if columns_set.isdecimal():
+            columns = int(columns_set)
+        else:
+            columns = os.get_terminal_size(stream.fileno()).columns
     except OSError:
         return None
     from d2rpick.report.formats import WIDEST
@@ -322,20 +324,22 @@ def columns_of(stream: TextIO) -> int | None:
 def tell(message: str) -> None:
     """Print a message to stderr, with the options of the command line and without control codes.
 
-    It is one line, on a terminal broken where that ends; never in a log, where ``COLUMNS`` may be set as well.
+    The message is one line; on a terminal it is wrapped, but never in a log, where ``COLUMNS`` may be set as well.
     """
     text = make_printable(with_options(message))
     if on_terminal() and (width := columns_of(sys.stderr)):
-        from d2rpick.report.tables import wrapped  # not above: --help does without it
+        from d2rpick.report.tables import (
+            wrapped,
+        )  # imported here since --help does not need it
 
         text = wrapped(text, width)
     click.echo(text, err=True)
 
 
 def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
-    """Say any error in one line, with the options of the command line; ``--debug`` shows its traceback before.
+    """Return any error as one line with the options of the command line; ``--debug`` prints its traceback first.
 
-    ``inputs`` are named where nobody foresaw it, since it names none.
+    An unforeseen error names no input, so that ``inputs`` are added.
     """
     if click.get_current_context().meta.get("d2rpick.debug"):
         import traceback
@@ -347,34 +351,34 @@ def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
 
 def text_bytes(text: str) -> bytes:
-    """Encode a text; bytes of file names that are none come as lone surrogates, which no encoding can write."""
+    """Encode a text; undecodable bytes of file names are lone surrogates, which no encoding can write."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
 def with_options(message: str) -> str:
-    """Replace the arguments that a message names by the options that set them.
+    """Replace the arguments in a message by the options that set them.
 
     Examples
     --------
     >>> with_options("give it as `after` where it is known")
     'give it as --after where it is known'
     """
-    named = "`" in message
-    return (
-        re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message)
-        if named
-        else message
-    )
+    has_names = "`" in message
+    if has_names:
+        return re.sub(
+            r"`(\w+)`", lambda match: option_of(match[1]) or match[0], message
+        )
+    return message
 
 
 def option_of(argument: str) -> str:
-    """Spell the option that sets an argument; nothing where there is none."""
+    """Return the option that sets an argument, empty if there is none."""
     name = _OTHERS.get(argument, argument)
     return f"--{dashed(name)}" if name in ARGUMENTS else ""
 
 
 def in_words(text: str, form: str, width: int = 0) -> str:
-    """Name the options in a result that people read, with lines of ``width`` columns; other programs get the arguments.
+    """Replace arguments by options in a result for people, wrapped to ``width`` columns; others keep the arguments.
 
     Examples
     --------
@@ -386,30 +390,32 @@ def in_words(text: str, form: str, width: int = 0) -> str:
     text = with_options(text)
     if form != "table" or not width:
         return text
-    from d2rpick.report.tables import wrapped  # not above: --help does without it
+    from d2rpick.report.tables import (
+        wrapped,
+    )  # imported here since --help does not need it
 
     return wrapped(text, width)
 
 
-def check_switched(what: str, request: Request, cards: Cards) -> None:
-    """Refuse a card that switches nobody, before a file is opened."""
+def check_switched(purpose: str, request: Request, cards: Cards) -> None:
+    """Refuse a card that switches no parts, before a file is opened."""
     if not (request.part or cards.node):
-        found = f"{what} needs --part, the parts to switch (Radioss: --node, their main nodes)"
-        way = "d2rpick card --tr T --td T --part IDS --history FILE"
-        raise ArgumentError(f"{found}; where the history has no parts: {way}")
+        problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
+        way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"
+        raise ArgumentError(f"{problem}; where the history has no parts: {way_to_pass}")
 
 
 @contextmanager
 def opened(
     request: Request, output: Output, *inputs: str | None
 ) -> Iterator[tuple[Run, Output]]:
-    """Open the run that is asked about and give it with what writes beside it and further ``inputs``.
+    """Open the requested run, and yield it with an output that protects it and further ``inputs``.
 
-    What reads of it belongs inside.
+    Everything that reads from the run belongs inside this context.
     """
     from d2rpick.api.asked import open_run
 
-    request.selection()  # refuses what makes no sense together, before a file is opened
+    request.selection()  # refuses contradictory options before a file is opened
     with reading(request.history, quiet=output.quiet):
         run = open_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

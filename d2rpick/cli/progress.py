@@ -1,4 +1,4 @@
-"""How far a command has come, on stderr where that is a terminal."""
+"""Show the progress of a command on stderr if it is a terminal."""
 
 from __future__ import annotations
 
@@ -15,76 +15,83 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
-_PERIOD: Final = 1.0  # [s] before the first line, and between two
+_PERIOD: Final = 1.0  # time before the first line, and between two lines [s]
 
 
 @contextmanager
 def reading(
     names: Sequence[str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Tell on stderr for how many seconds ``names`` have been read, unless ``quiet`` or where no terminal is.
+    """Show on a terminal for how many seconds ``names`` have been read, unless ``quiet``.
 
-    ``period``: before the first line, and between two [s].  Nobody knows how long it will take: how much of a file has
-    to be read depends on what is asked of it.
+    ``period`` is the time before the first line, and between two lines [s].  The remaining time is unknown: how much of
+    a file must be read depends on the question.
     """
-    what = "standard input" if names[0] == "-" else make_printable(names[0])
-    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    input_name = "standard input" if names[0] == "-" else make_printable(names[0])
+    rest_text = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
     with telling(
-        lambda seconds: f"reading {what}{more} ... {seconds:.0f} s",
+        lambda seconds: f"reading {input_name}{rest_text} ... {seconds:.0f} s",
         quiet=quiet,
         period=period,
     ):
         yield
     context = click.get_current_context(silent=True)
     if context and context.meta.get("d2rpick.verbose"):
-        click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
+        click.echo(
+            f"read {input_name}{rest_text} in {perf_counter() - start:.2f} s", err=True
+        )
 
 
 class Count:
-    """How many of ``total`` runs are done; ``taken`` of them cost nothing."""
+    """The number of finished runs out of ``total``; ``taken`` of them needed no computation."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Be told how many are done, first how many cost nothing."""
+        """Set the number of finished runs; the first call gives the number that needed no computation."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
-        """Say how far it is after so many seconds, and how long the rest will take at this pace."""
+        """Return the progress after ``seconds``, and the remaining time at this pace."""
         computed = self.done - max(self.taken, 0)
-        left = (
-            f", {_clock(seconds / computed * (self.total - self.done))} left"
-            if computed
-            else ""
-        )
-        return f"{self.done} of {self.total} runs{left}"
+        if computed:
+            remaining = (
+                f", {_clock(seconds / computed * (self.total - self.done))} left"
+            )
+        else:
+            remaining = ""
+        return f"{self.done} of {self.total} runs{remaining}"
 
 
 @contextmanager
 def counting(total: int, *, quiet: bool, period: float = _PERIOD) -> Iterator[Count]:
-    """Tell on stderr how many runs are done and how long the rest will take; the caller counts."""
+    """Show on a terminal how many runs are finished and the remaining time; the caller counts."""
     count = Count(total)
     with telling(count.told, quiet=quiet, period=period):
         yield count
 
 
 def _clock(seconds: float) -> str:
-    """Write a duration as people read it.
+    """Return a duration as hours, minutes and seconds.
 
     Examples
     --------
     >>> _clock(7), _clock(3725)
     ('0:07', '1:02:05')
     """
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, seconds_left = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    return (
+        f"{hours}:{minutes:02}:{seconds_left:02}"
+        if hours
+        else f"{minutes}:{seconds_left:02}"
+    )
 
 
 def on_terminal() -> bool:
-    """Whether somebody at a terminal reads what is told."""
+    """Return True if stderr is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
@@ -92,11 +99,11 @@ def on_terminal() -> bool:
 def telling(
     say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
+    """Show on a terminal the text that ``say`` returns for the elapsed seconds, unless ``quiet``."""
     if quiet or not on_terminal():
         yield
         return
-    from threading import Event, Thread  # --help does without
+    from threading import Event, Thread  # imported here since --help does not need it
 
     done = Event()
     thread = Thread(target=_tell, args=(say, done, period), daemon=True)
@@ -117,8 +124,9 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
         room = (
             shutil.get_terminal_size().columns - 1
         )  # a line that wraps could not be erased
-        before, line = line, say(seconds)[-room:]
-        sys.stderr.write(f"\r{line.ljust(len(before))}")
+        previous_line = line
+        line = say(seconds)[-room:]
+        sys.stderr.write(f"\r{line.ljust(len(previous_line))}")
         sys.stderr.flush()
     if line:
         sys.stderr.write(f"\r{' ' * len(line)}\r")

@@ -1,4 +1,4 @@
-"""The commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
+"""Define the commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ CMD = ("program", "CMD")
     forms=FORMATS["drive"],
 )
 def drive(
-    deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any
+    deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **driving_options: Any
 ) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
@@ -101,8 +101,8 @@ def drive(
     from d2rpick.api.drives import Driving
 
     output = output.beside(deck)
-    told = (lambda _: None) if output.quiet else tell
-    driving = Driving(deck, Path(folder), told, **asked)
+    report = (lambda _: None) if output.quiet else tell
+    driving = Driving(deck, Path(folder), report, **driving_options)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
         return click.echo("\n".join(_plan(driving)))
@@ -123,7 +123,8 @@ def drive(
 def _plan(driving: Driving) -> list[str]:
     import shlex
 
-    deck, commands = driving.deck, driving.commands
+    deck = driving.deck
+    commands = driving.commands
     bodies = ", ".join(map(str, deck.nodes))
     return [
         f"copies    {', '.join(deck.files)} to {driving.folder}",
@@ -184,15 +185,16 @@ def follow(
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
     failed, since = False, None
-    for one in events(
+    for event in events(
         run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
     ):
-        failed, since = failed or one.event == "failed", one.time
+        failed = failed or event.event == "failed"
+        since = event.time
         if output.output_format == "ndjson":
-            text = json.dumps(one._asdict(), allow_nan=False)
+            text = json.dumps(event._asdict(), allow_nan=False)
         else:
-            seen = "-" if one.seen is None else f"{one.seen:.6g}"
-            text = f"{seen:>10}  {one.event:<10}  {one.message}"
+            seen_text = "-" if event.seen is None else f"{event.seen:.6g}"
+            text = f"{seen_text:>10}  {event.event:<10}  {event.message}"
         click.echo(
             text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"),
             nl=False,
@@ -246,7 +248,7 @@ def first(
     """
     from d2rpick.api.running import first as write
 
-    found = write(
+    written_files = write(
         deck,
         output_dir,
         parts=part or None,
@@ -254,5 +256,7 @@ def first(
         after=after,
         overwrite=output.overwrite,
     )
-    output.notes(found.notes, ())
-    click.echo("\n".join(f"written  {make_printable(name)}" for name in found.files))
+    output.notes(written_files.notes, ())
+    click.echo(
+        "\n".join(f"written  {make_printable(name)}" for name in written_files.files)
+    )

@@ -1,4 +1,4 @@
-"""The commands of many runs: ``study`` and ``calibrate``."""
+"""Define the commands for many runs: ``study`` and ``calibrate``."""
 
 from __future__ import annotations
 
@@ -100,14 +100,17 @@ def study(
         raise click.UsageError(
             "--scheduler and --jobs exclude each other: the cluster has its own processes"
         )
-    asked = time_or_window(td, td_window)
+    td_or_window = time_or_window(td, td_window)
     sources = _sources(run, listed)
     output = output.beside(*sources)
     written = {"output-file": output.file, "plot": output.plot, "report": output.report}
     _check_ledger(resume, written)
-    question = question_of(request, asked, curve=bool(output.plot or output.report))
+    question = question_of(
+        request, td_or_window, curve=bool(output.plot or output.report)
+    )
     ledger = Ledger(resume, question) if resume is not None else None
-    mark, rows = fingerprint(question), []
+    mark = fingerprint(question)
+    rows = []
     by_line = output.output_format == "ndjson"
     streaming = by_line and output.file is None
     quiet = output.quiet or (streaming and sys.stdout.isatty())
@@ -138,16 +141,15 @@ def study(
 
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
-    """Names of all runs, given and listed, patterns replaced by what they match."""
+    """Return the names of all runs, given and listed, with patterns replaced by their matches."""
     from d2rpick.api.studies import find_runs
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
-        where = (
-            ""
-            if listed is None
-            else f"{'standard input' if listed == '-' else listed} names none; "
-        )
+        if listed is None:
+            where = ""
+        else:
+            where = f"{'standard input' if listed == '-' else listed} names none; "
         raise click.UsageError(
             f"no runs; {where}give their names, or a list with --from"
         )
@@ -159,7 +161,7 @@ def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
 
 def _listed(name: str) -> Iterator[str]:
-    """Names in a list, one a line; blank lines and comments are skipped."""
+    """Yield the names in a list, one a line; blank lines and comments are skipped."""
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:
@@ -176,14 +178,14 @@ def _listed(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # Not splitlines(): a name may hold its other signs.
+    # Not splitlines(): a name may contain its other line separators.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
-    """Raise D2RPickError when what ``--resume`` keeps would be overwritten by a result, ``written`` by its option."""
+    """Raise D2RPickError if a result, ``written`` by its option, would overwrite the file of ``--resume``."""
     if name is None:
         return
     for option, file in written.items():
@@ -198,17 +200,17 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """How many runs are known from an earlier study; it is told."""
+    """Return how many runs are known from an earlier study, and print it."""
     if ledger is None:
         return 0
-    known = ledger.taking(sources)
-    if (known or ledger.outdated or ledger.damaged) and not quiet:
+    known_count = ledger.taking(sources)
+    if (known_count or ledger.outdated or ledger.damaged) and not quiet:
         tell(f"note: {ledger.told(len(sources))}")
-    return known
+    return known_count
 
 
 def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -> Farm:
-    """Choose where to compute so many calls; a single one needs no other process."""
+    """Choose where to compute so many calls; a single call needs no other process."""
     from d2rpick.base import workers
 
     if scheduler and calls:

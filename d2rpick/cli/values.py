@@ -1,4 +1,4 @@
-"""How options get their values: the kinds there are, how the shell completes them, and defaults from a file."""
+"""Define the kinds of option values, their completion by the shell, and their defaults from a settings file."""
 
 from __future__ import annotations
 
@@ -23,11 +23,19 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # generic from click 8.4 on
+    FloatType = click.ParamType  # generic since click 8.4
+
+CARDS: Final = tuple(options_of(Cards))
+# Options that apply only together with one of others: settings are for all commands, even those that lack these.
+_BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
+    "weights": ("deck",),
+    "step_ratio": ("cost_share", "deck"),
+    **dict.fromkeys(CARDS, ("report", "write_deck")),
+}
 
 
 class NumberType(FloatType):
-    """A finite number with a point within its limits."""
+    """A finite number with a decimal point, within its limits."""
 
     name = "number"
 
@@ -37,7 +45,7 @@ class NumberType(FloatType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read a number or fail with what was found and what was expected."""
+        """Read a number, or fail with the value found and the values allowed."""
         try:
             number = float(value)
         except ValueError:
@@ -53,14 +61,14 @@ class NumberType(FloatType):
 
 
 class File(click.types.StringParamType):
-    """Name of a file or folder, for the shell to complete."""
+    """Name of a file or folder, completed by the shell."""
 
     envvar_list_splitter = ";"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Take a name; one with a NUL byte, which only a program can give, is none of a file."""
+        """Return a name; a NUL byte, which only a program can pass, is refused."""
         name = super().convert(value, param, ctx)
         if "\0" in name:
             self.fail(
@@ -76,28 +84,28 @@ class File(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Leave it to the shell."""
+        """Leave the completion to the shell."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
 
 
 class OutputFile(File):
-    """Name of a file or folder to write, which no settings file may choose."""
+    """Name of a file or folder to be written, which a settings file must not set."""
 
 
 class Program(click.types.StringParamType):
-    """Command that is started, or the address of a cluster that computes: no settings file may choose either."""
+    """A command to be started, or the address of a computing cluster: a settings file must not set either."""
 
 
 class Names(click.types.StringParamType):
-    """Names that are separated by semicolons in an environment variable, since labels hold blanks."""
+    """Names, separated by semicolons in an environment variable, since labels may contain blanks."""
 
     envvar_list_splitter = ";"
 
 
 class PartNames(Names):
-    """Numbers and titles of parts, for the shell to complete from the history that was typed before."""
+    """Ids and titles of parts, completed from the history on the command line."""
 
     def shell_complete(
         self,
@@ -105,7 +113,7 @@ class PartNames(Names):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the parts of the files that were typed before, and the words for several."""
+        """Offer the parts of the files on the command line, and the words for several parts."""
         run = _typed_run(ctx)
         parts = run.parts if run else ()
         words = [
@@ -129,7 +137,7 @@ class RuleIds(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the rules that begin so, with what they say."""
+        """Offer the rules with this prefix and their summaries."""
         from d2rpick.report.findings import as_list
 
         rows = (line.split(maxsplit=2) for line in as_list().split("\n"))
@@ -139,7 +147,7 @@ class RuleIds(click.types.StringParamType):
 
 
 class ChannelNames(Names):
-    """Names of channels, for the shell to complete from the history that was typed before."""
+    """Names of channels, completed from the history on the command line."""
 
     def shell_complete(
         self,
@@ -147,7 +155,7 @@ class ChannelNames(Names):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the channels of the files that were typed before; underscores stand for blanks, as they may."""
+        """Offer the channels of the files on the command line, with underscores for blanks, which are equivalent."""
         run = _typed_run(ctx)
         return _completed(
             [(name.replace(" ", "_"), "") for name in (run.channels if run else ())],
@@ -156,7 +164,7 @@ class ChannelNames(Names):
 
 
 def _typed_run(ctx: click.Context) -> Run | None:
-    """Open the files that were typed before; None where they are none of a run."""
+    """Open the files on the command line; return None if they are no run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -164,7 +172,7 @@ def _typed_run(ctx: click.Context) -> Run | None:
 
     words = ctx.meta.get("d2rpick.command", ())[
         1:
-    ]  # click has read no argument yet when an option is completed
+    ]  # click has not read any argument yet when an option is completed
     try:
         return read([word for word in words if Path(word).exists()])
     except (D2RPickError, OSError, ValueError):
@@ -174,28 +182,32 @@ def _typed_run(ctx: click.Context) -> Run | None:
 def _completed(
     offered: Iterable[tuple[str, str]], incomplete: str
 ) -> list[CompletionItem]:
-    """Give the names that begin with what was typed; what a shell would take apart is left out."""
+    """Return the names with this prefix, without those that a shell would split."""
     import re
 
     from click.shell_completion import CompletionItem
 
-    words = [(name, told) for name, told in offered if re.fullmatch(r"[\w./-]+", name)]
+    words = [
+        (name, help_text)
+        for name, help_text in offered
+        if re.fullmatch(r"[\w./-]+", name)
+    ]
     return [
-        CompletionItem(name, help=told)
-        for name, told in words
+        CompletionItem(name, help=help_text)
+        for name, help_text in words
         if name.startswith(incomplete)
     ]
 
 
 class SolverName(click.types.StringParamType):
-    """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
+    """Name of a solver whose input can be printed; the table of solvers is imported only when it is needed."""
 
     name = "solver"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str:
-        """Take a name or fail with those there are."""
+        """Return the name, or fail with the allowed names."""
         if value not in solvers():
             self.fail(
                 f"{value!r} was found, one of {', '.join(solvers())} was expected",
@@ -205,7 +217,7 @@ class SolverName(click.types.StringParamType):
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Show the names in the help."""
+        """Return the names for the help."""
         return f"[{'|'.join(solvers())}]"
 
     def shell_complete(
@@ -214,7 +226,7 @@ class SolverName(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the names that begin so."""
+        """Offer the names with this prefix."""
         return _completed([(name, "") for name in solvers()], incomplete)
 
 
@@ -232,7 +244,7 @@ _NAMED: Final = {
 
 
 def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
-    """Give the type by which click reads a kind of value."""
+    """Return the type by which click reads a kind of value."""
     if isinstance(kind, str):
         return _NAMED[kind]
     if isinstance(kind, range):
@@ -242,52 +254,50 @@ def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
     return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)
 
 
-CARDS: Final = tuple(options_of(Cards))
-# What counts only beside one of other options: settings are for all commands, and not all of them are asked for it.
-_BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
-    "weights": ("deck",),
-    "step_ratio": ("cost_share", "deck"),
-    **dict.fromkeys(CARDS, ("report", "write_deck")),
-}
-
-
 def settings_of(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Values of options by name, as the ``table`` of settings gives them that was read from ``source``.
+    """Return the values of options by name from the ``table`` of settings that was read from ``source``.
 
-    Keys of all commands stand above, those of one command in a table of its name.  ``without`` holds what the command
-    line and the environment give: what they exclude counts for nothing.
+    Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
+    context with the command line and the environment: settings that these exclude are ignored.
 
     Raises
     ------
     ConfigurationError
-        For a key that is no option, or a value that is none of it.
+        For a key that is no option, or a value that its option does not allow.
     """
-    own = {
-        option: _value(ctx, option, value, place)
-        for option, value, place in _given(ctx.command, table, source)
+    values = {
+        option: _value(ctx, option, value, position)
+        for option, value, position in _given(ctx.command, table, source)
     }
-    given = {
-        name: one
-        for name, one in without.params.items()
+    given_values = {
+        name: value
+        for name, value in without.params.items()
         if _source(without, name) is not ParameterSource.DEFAULT
     }
-    asked = {**{option.name: value for option, value in own.items()}, **given}
+    all_values = {
+        **{option.name: value for option, value in values.items()},
+        **given_values,
+    }
     return {
         option.name or "": value
-        for option, value in own.items()
-        if _counts(ctx, option, given, asked)
+        for option, value in values.items()
+        if _counts(ctx, option, given_values, all_values)
     }
 
 
 def _given(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
-    """Options of a command that the settings name, with what stands there and where; unknown keys are refused."""
-    tables = {name: one for name, one in table.items() if isinstance(one, Mapping)}
+    """Yield the options of a command in the settings, with value and position; unknown keys are refused."""
+    tables = {
+        name: entry for name, entry in table.items() if isinstance(entry, Mapping)
+    }
     shared = {
-        name: one for name, one in table.items() if name not in (*tables, *RULE_KEYS)
+        name: entry
+        for name, entry in table.items()
+        if name not in (*tables, *RULE_KEYS)
     }
     for name in COMMANDS:
         if name in shared:
@@ -297,18 +307,20 @@ def _given(
     refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown(tables, (*COMMANDS, "severity"), source)
     options = {
-        spelled(one): one for one in command.params if isinstance(one, click.Option)
+        spelled(entry): entry
+        for entry in command.params
+        if isinstance(entry, click.Option)
     }
-    own = tables.get(command.name or "", {})
-    refuse_unknown(own, options, f"{source}: {command.name}")
-    for name, value in {**shared, **own}.items():
+    own_table = tables.get(command.name or "", {})
+    refuse_unknown(own_table, options, f"{source}: {command.name}")
+    for name, value in {**shared, **own_table}.items():
         if name in options:
             yield options[name], value, f"{source}: {name}"
 
 
-def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> Any:
-    """Read the value of an option; files lie where the settings do."""
-    _refuse_dangerous(option, place)
+def _value(ctx: click.Context, option: click.Option, value: Any, position: str) -> Any:
+    """Read the value of an option; relative file names start from the folder of the settings."""
+    _refuse_dangerous(option, position)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
     if (option.nargs > 1 and not isinstance(value, list)) or not all(
@@ -316,39 +328,39 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
     ):
         expected = "a list" if option.nargs > 1 else _expected_kind(option)
         raise ConfigurationError(
-            f"{place} is {format_toml_value(value)}, {expected} was expected"
+            f"{position} is {format_toml_value(value)}, {expected} was expected"
         )
     try:
-        found = option.type_cast_value(ctx, values if has_list else value)
+        converted = option.type_cast_value(ctx, values if has_list else value)
     except click.BadParameter as error:
-        raise ConfigurationError(f"{place}: {error.message}") from None
+        raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
-        return found
-    from pathlib import Path  # mostly no file is among the settings
+        return converted
+    from pathlib import Path  # imported here since settings rarely contain a file
 
-    folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
-    return (
-        [str(Path(folder, name)) for name in found]
-        if has_list
-        else str(Path(folder, found))
-    )
+    folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
+    if has_list:
+        return [str(Path(folder, name)) for name in converted]
+    return str(Path(folder, converted))
 
 
-def _refuse_dangerous(option: click.Option, place: str) -> None:
-    """Refuse what would start a program, write a file or replace one: the settings may be those of somebody else."""
+def _refuse_dangerous(option: click.Option, position: str) -> None:
+    """Refuse to start a program or write a file from settings, which another person may have written."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
-        what = "programs, output files and overwrite are never taken from a file"
-    elif not option.expose_value:  # --help, --debug and others that are about one call
-        what = "this is never taken from a file"
+        reason = "programs, output files and overwrite are never taken from a file"
+    elif (
+        not option.expose_value
+    ):  # --help, --debug and others that concern a single call
+        reason = "this is never taken from a file"
     else:
         return
     raise ConfigurationError(
-        f"{place}: {what}; remove the key, and give the option on the command line"
+        f"{position}: {reason}; remove the key, and give the option on the command line"
     )
 
 
 def _fits(option: click.Option, value: object) -> bool:
-    """Return whether a single value from a TOML file is of the kind that an option takes."""
+    """Return True if a single value from a TOML file has the kind of the option."""
     if option.is_flag or isinstance(value, bool):
         return option.is_flag and isinstance(value, bool)
     if isinstance(option.type, File):
@@ -361,34 +373,32 @@ def _fits(option: click.Option, value: object) -> bool:
 
 
 def _expected_kind(option: click.Option) -> str:
-    """Say which kind of value an option takes."""
+    """Return the name of the kind of value that an option takes."""
     if option.is_flag:
         return "true or false"
     if isinstance(option.type, File):
         return "a text"
-    return (
-        "a whole number"
-        if isinstance(option.type, click.IntRange)
-        else "a number or a text"
-    )
+    if isinstance(option.type, click.IntRange):
+        return "a whole number"
+    return "a number or a text"
 
 
 def _counts(
     ctx: click.Context,
     option: click.Option,
-    given: Mapping[str, Any],
-    asked: Mapping[Any, Any],
+    given_values: Mapping[str, Any],
+    all_values: Mapping[Any, Any],
 ) -> bool:
-    """Whether a setting counts, beside the options that are ``given``, and with all that is ``asked``."""
-    if any(name in given for name in getattr(option, "instead_of", ())):
+    """Return True if a setting applies, with the ``given`` options and all options in ``asked``."""
+    if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (
-        ctx.command.name == "card" or asked.get("output_format") == "card"
+        ctx.command.name == "card" or all_values.get("output_format") == "card"
     ):
         return True
     unjudged = option.name in JUDGING and ctx.command.name in ("card", "check")
-    beside = ("history",) if unjudged else _BESIDE.get(option.name, ())
-    return not beside or any(asked.get(name) for name in beside)
+    needed_options = ("history",) if unjudged else _BESIDE.get(option.name, ())
+    return not needed_options or any(all_values.get(name) for name in needed_options)
 
 
 def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
@@ -396,20 +406,26 @@ def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
 
 
 def words_of(ctx: click.Context) -> Sequence[str]:
-    """Write the options that settings gave as they are typed."""
+    """Return the options from the settings as they are typed."""
     of_settings = (
-        one
-        for one in ctx.command.params
-        if _source(ctx, one.name) is ParameterSource.DEFAULT_MAP
+        parameter
+        for parameter in ctx.command.params
+        if _source(ctx, parameter.name) is ParameterSource.DEFAULT_MAP
     )
-    options = [one for one in of_settings if isinstance(one, click.Option)]
+    options = [
+        parameter for parameter in of_settings if isinstance(parameter, click.Option)
+    ]
     return [
         text
-        for one in options
-        for text in typed(spelled(one), ctx.params[one.name or ""], many=one.multiple)
+        for parameter in options
+        for text in typed(
+            spelled(parameter),
+            ctx.params[parameter.name or ""],
+            many=parameter.multiple,
+        )
     ]
 
 
 def spelled(option: click.Option) -> str:
-    """Spell an option in full, as in the settings."""
+    """Return the long name of an option, as in the settings."""
     return max(option.opts, key=len)[2:]

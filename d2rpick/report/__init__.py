@@ -1,1 +1,1 @@
-"""Results as text: a table for people, JSON, CSV and Markdown for everything else.  Nothing here prints."""
+"""Write results as text: a table for people; JSON, CSV and Markdown for programs. Nothing in this folder prints."""

@@ -1,4 +1,4 @@
-"""The answer of ``calibrate`` as table, JSON and the TOML file that ``--weights`` reads."""
+"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file that ``--weights`` reads."""
 
 from __future__ import annotations
 
@@ -35,62 +35,62 @@ COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
-def as_table(found: Calibration, shown: Shown) -> str:
-    """The weights beside those that were measured, and the legs they rest on."""
-    weights = found.weights
+def as_table(calibration: Calibration, display: Shown) -> str:
+    """Return a table of the assumed and measured weights of each formulation, and of the restart segments used."""
+    weights = calibration.weights
     lines = [
-        tables.as_text(HEAD, _rows(found), shown.width), "",
+        tables.as_text(HEAD, _rows(calibration), display.width), "",
         f"elements of a step  {weights.element_share:.3f}",
         f"node of a body      {weights.rigid_node:.3g} us",
-        f"misfit              {found.misfit:.1%} of the time of a leg", "",
-        tables.as_text(LEG_HEAD, _legs(found), shown.width),
+        f"misfit              {calibration.misfit:.1%} of the time of a leg", "",
+        tables.as_text(LEG_HEAD, _legs(calibration), display.width),
     ]  # fmt: skip
     return "\n".join(lines)
 
 
-def as_markdown(found: Calibration, _: Shown) -> str:
-    """The weights and the legs as Markdown tables."""
+def as_markdown(calibration: Calibration, _: Shown) -> str:
+    """Return the weights and the restart segments as Markdown tables."""
     return "\n\n".join(
         [
-            tables.as_markdown(HEAD, _rows(found)),
-            tables.as_markdown(LEG_HEAD, _legs(found)),
+            tables.as_markdown(HEAD, _rows(calibration)),
+            tables.as_markdown(LEG_HEAD, _legs(calibration)),
         ]
     )
 
 
-def as_csv(found: Calibration, _: Shown) -> str:
-    """A row per formulation."""
-    return tables.as_csv(COLUMNS, plain_rows(found)).rstrip("\n")
+def as_csv(calibration: Calibration, _: Shown) -> str:
+    """Return CSV with one row per formulation."""
+    return tables.as_csv(COLUMNS, plain_rows(calibration)).rstrip("\n")
 
 
-def as_toml(found: Calibration, _: Shown) -> str:
-    """The file that ``--weights`` reads."""
-    return weights_as_toml(found.weights)
+def as_toml(calibration: Calibration, _: Shown) -> str:
+    """Return the file that ``--weights`` reads."""
+    return weights_as_toml(calibration.weights)
 
 
-def plain_rows(found: Calibration) -> list[list[tables.Cell]]:
-    """Cells of a row per formulation at full precision, below ``COLUMNS``."""
+def plain_rows(calibration: Calibration) -> list[list[tables.Cell]]:
+    """Return one row of cells per formulation at full precision, in the order of ``COLUMNS``."""
     return [
-        [name, weight, MEASURED[name], name in found.told]
-        for name, weight in found.weights.per_element.items()
+        [name, weight, MEASURED[name], name in calibration.told]
+        for name, weight in calibration.weights.per_element.items()
     ]
 
 
-def _rows(found: Calibration) -> list[list[tables.Cell]]:
+def _rows(calibration: Calibration) -> list[list[tables.Cell]]:
     return [
         [
             name,
             f"{weight:.3g}",
             f"{MEASURED[name]:.3g}",
-            "these legs" if name in found.told else "ratio as measured",
+            "these legs" if name in calibration.told else "ratio as measured",
         ]
-        for name, weight in found.weights.per_element.items()
+        for name, weight in calibration.weights.per_element.items()
     ]
 
 
-def _legs(found: Calibration) -> list[list[tables.Cell]]:
+def _legs(calibration: Calibration) -> list[list[tables.Cell]]:
     return [
-        [make_printable(one.name), f"{one.total:.4g} us", None if one.elements is None else f"{one.elements:.4g} us",
-         f"{one.rigid_nodes:.0f}"]
-        for one in found.legs
+        [make_printable(leg.name), f"{leg.total:.4g} us", None if leg.elements is None else f"{leg.elements:.4g} us",
+         f"{leg.rigid_nodes:.0f}"]
+        for leg in calibration.legs
     ]  # fmt: skip

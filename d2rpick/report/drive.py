@@ -1,4 +1,4 @@
-"""The answer of ``drive`` as table and JSON."""
+"""Write the result of ``drive`` as a table and JSON."""
 
 from __future__ import annotations
 
@@ -28,72 +28,86 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
     Field("legs", many(_LEG), "in the order they were computed, with those that were thrown away"),
-    Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda one: one.saved[0]),
-    Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda one: one.saved[1]),
+    Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda answer: answer.saved[0]),
+    Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda answer: answer.saved[1]),
 ))  # fmt: skip
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 
 
-def as_table(found: Driven, shown: Shown) -> str:
-    """The windows, what the legs took, and what was saved."""
+def as_table(answer: Driven, display: Shown) -> str:
+    """Return the rigid windows, the CPU time of the restart segments, and what was saved."""
     parts = [
-        tables.as_text(*windows(found), shown.width) if found.windows else "no window",
-        tables.as_text(*legs(found), shown.width),
+        tables.as_text(*windows(answer), display.width)
+        if answer.windows
+        else "no window",
+        tables.as_text(*legs(answer), display.width),
     ]
-    return "\n\n".join([*parts, "\n".join(tables.in_line(outlook(found), 9))])
+    return "\n\n".join([*parts, "\n".join(tables.in_line(outlook(answer), 9))])
 
 
-def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the flights; ``deformable`` is what of each was computed so."""
+def windows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Return the column names and rows of the flights; ``deformable`` is the deformable time of a flight."""
     columns = {
-        "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
-        "tr": lambda one: None if one.reason else one.tr, "td": lambda one: None if one.reason else one.td,
-        "contact": lambda one: one.contact,
-        "margin": lambda one: None if one.contact is None or one.reason else f"{one.contact - one.td:.3g}",
-        "deformable": lambda one: f"{(one.contact if one.reason and one.contact else one.tr) - one.free:.3g}",
-        "status": lambda one: f"left out: {one.reason}" if one.reason else "switched",
-    }  # fmt: skip
-    return tables.filled(columns, found.windows)
-
-
-def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the same of the legs, those of a kind together."""
-    rows: list[list[tables.Cell]] = []
-    for kind in dict.fromkeys(one.kind for one in found.legs):
-        own = [one for one in found.legs if one.kind == kind]
-        cpu = (
+        "flight": lambda window: window.free,
+        "wait": lambda window: f"{window.wait:.4g}",
+        "tr": lambda window: None if window.reason else window.tr,
+        "td": lambda window: None if window.reason else window.td,
+        "contact": lambda window: window.contact,
+        "margin": lambda window: (
             None
-            if any(one.cpu is None for one in own)
-            else f"{sum(one.cpu or 0.0 for one in own):.4g}"
-        )
+            if window.contact is None or window.reason
+            else f"{window.contact - window.td:.3g}"
+        ),
+        "deformable": lambda window: (
+            f"{(window.contact if window.reason and window.contact else window.tr) - window.free:.3g}"
+        ),
+        "status": lambda window: (
+            f"left out: {window.reason}" if window.reason else "switched"
+        ),
+    }
+    return tables.filled(columns, answer.windows)
+
+
+def legs(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Return the column names and the rows of the restart segments, one row per kind."""
+    rows: list[list[tables.Cell]] = []
+    for kind in dict.fromkeys(leg.kind for leg in answer.legs):
+        legs_of_kind = [leg for leg in answer.legs if leg.kind == kind]
+        if any(leg.cpu is None for leg in legs_of_kind):
+            cpu = None
+        else:
+            cpu = f"{sum(leg.cpu or 0.0 for leg in legs_of_kind):.4g}"
         rows.append(
             [
                 kind,
-                len(own),
-                f"{sum(one.length for one in own):.4g}",
-                sum(one.cycles or 0 for one in own),
+                len(legs_of_kind),
+                f"{sum(leg.length for leg in legs_of_kind):.4g}",
+                sum(leg.cycles or 0 for leg in legs_of_kind),
                 cpu,
             ]
         )
     return ["kind", "legs", "time", "cycles", "CPU s"], rows
 
 
-def outlook(found: Driven) -> list[tuple[str, str]]:
-    """What was saved, and what to know of it; a name and a sentence each."""
+def outlook(answer: Driven) -> list[tuple[str, str]]:
+    """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
     words = zip(
-        found.saved,
+        answer.saved,
         ("by the cost model", "by the processor time of its legs"),
         strict=True,
     )
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
-    lines = (
-        [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
-    )
+    if saved:
+        lines = [("saves", f"{', '.join(saved)}, against a deformable run")]
+    else:
+        lines = []
     lines += [
-        ("place", one.message) for one in found.cautions if one.code == "out-of-place"
+        ("place", caution.message)
+        for caution in answer.cautions
+        if caution.code == "out-of-place"
     ]
     return [
         *lines,
-        *([("wait", found.why)] if found.why else []),
+        *([("wait", answer.why)] if answer.why else []),
         ("keeps", _NOT_KNOWN),
     ]

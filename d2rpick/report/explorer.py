@@ -1,7 +1,7 @@
-"""The interactive part of a page: td can be dragged, typed and moved by keys, and all that depends on it follows.
+"""Build the interactive part of a page: the user drags, types or steps td, and everything that depends on td follows.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.  What every page has stands in
-``explorer.html``.
+Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
+that every page has.
 """
 
 from __future__ import annotations
@@ -31,145 +31,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.
+# Number of intervals for which the lowest and highest energy is drawn: in the view, and in the overview of the run.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Between the section, the chart of the motion and what is said of a pair.
+# Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
 _NEXT: Final = "<!-- next -->"
 
-
-def styles() -> tuple[Markup, ...]:
-    """Give the style sheets that the interactive part needs."""
-    return resource("uplot/uPlot.min.css"), resource("explorer.css")
-
-
-def scripts() -> tuple[Markup, ...]:
-    """Give the scripts, in their order; that of uPlot with its licence."""
-    licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
-    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
-        "explorer.js"
-    )
-
-
-def explorer(explored: Explorer | None) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data; nothing without any.
-
-    Charts and values stand in two columns; on a narrow page the style puts them below each other in another order.
-    """
-    if explored is None:
-        return Markup()
-    flights = [_flight(one) for one in explored.trade_offs]
-    known = {
-        name for flight in flights for name in flight["texts"]
-    }  # what no pair has is left out
-    listed = (
-        tag("div", tag("dt", name), tag("dd", data_value=key))
-        for key, name in _VALUES.items()
-        if key in known
-    )
-    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
-    values = Template(values).substitute(listed=join(listed))
-    below = (
-        (motion, values)
-        if any(flight["motion"] for flight in flights)
-        else (values, "")
-    )
-    options = (
-        tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
-    )
-    unit = explored.trade_offs[0].situation.history.time_unit
-    section = Template(section).substitute(
-        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight"))
-        if len(flights) > 1
-        else "",
-        unit=join([f" [{unit}]"] if unit else []),
-        windows=tag("li", tag("i", class_="windows"), "acceptable tr")
-        if "windows" in known
-        else "",
-        below_energy=below[0],
-        below_trade=below[1],
-    )
-    before, behind = (shell_line(words) for words in explored.command)
-    found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
-    return join([Markup(section), _data("explorer-data", found)])
-
-
-def _closed_up(text: str) -> str:
-    """Leave out the blanks and line ends between elements, and make one blank of those within a text."""
-    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
-
-
-def _data(name: str, content: Any) -> Markup:
-    """Give data for a script: JSON in which nothing can be taken for markup."""
-    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return tag("script", Markup(text), type="application/json", id=name)
-
-
-def _flight(found: TradeOff) -> dict[str, Any]:
-    """What is drawn and said of one flight."""
-    situation = found.situation
-    history, flight = situation.history, situation.flight
-    first = found.asked or found.recommended or found.start or found.offers[-1]
-    seen = view_of(situation, found.offers[-1].td)
-    levels = [one.energy_td for one in found.offers]
-    scale = scale_in(situation, seen, levels)
-    whole = draw_outline(history.time, history.energy, _OVERVIEW)
-    inner = history.between(seen.start, seen.end)
-    time, energy = draw_outline(*inner, stretches=_STRETCHES)
-    unit = history.time_unit
-    above = [
-        f"the {what}, up to {energy:.4g}"
-        for what, energy in seen.above
-        if energy > scale.high
-    ]
-    cut = f"; cut at the top: {' and '.join(above)}" if above else ""
-    return {
-        "caption": f"Internal energy in the flight{cut}",
-        "time": f"time [{unit}]" if unit else "time",
-        "error": _error_name(found.offers),
-        "saved": _saved_name(found.offers),
-        "view": [seen.start, seen.end],
-        "flight": [
-            seen.start if flight.start is None else flight.start,
-            seen.end if flight.end is None else flight.end,
-        ],
-        "heights": [scale.low, scale.high],
-        "log": scale.logarithmic,
-        "energy": [
-            _brief(time),
-            _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy),
-        ],
-        "whole": [_brief(column) for column in whole],
-        "motion": _motion(situation),
-        "start": found.offers.index(first),
-        **_table(found, first, seen),
-    }
-
-
-def _motion(situation: Situation) -> dict[str, Any] | None:
-    """Give the curves of which the script composes the deformation; None where no oscillator is known."""
-    found = response(situation)
-    if found is None:
-        return None
-    columns = {
-        "time": found.time,
-        "reference": found.reference,
-        "release": found.release,
-    }
-    return {
-        **{name: _brief(column) for name, column in columns.items()},
-        "preload": found.preload,
-    }
-
-
-def _brief(values: Samples) -> list[float]:
-    """Numbers for a curve, to six digits."""
-    return [float(f"{value:.6g}") for value in values.tolist()]
-
-
-# What is listed of a pair, by key, in this order.
+# Labels of the values shown for a pair, by key and in display order.
 _VALUES: Final[Mapping[str, str]] = {
     "verdict": "verdict",
     "why": "why",
@@ -186,60 +54,201 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "acceptable tr",
     "reason": "no tr",
 }
-# Columns in which windows of acceptable tr are drawn, a multiple of eight.
+# Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
 _COLUMNS: Final = 480
-# Digits of a difference that people read.
+# significant digits of a difference
 _READ: Final = 3
 
 
-def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
-    """Give a row for each td, the names of its values once: ``numbers`` for curves, ``texts`` that stand beside them.
+def styles() -> tuple[Markup, ...]:
+    """Return the style sheets of the interactive part."""
+    return resource("uplot/uPlot.min.css"), resource("explorer.css")
 
-    ``first`` is the td that is shown first, with which others are compared.
+
+def scripts() -> tuple[Markup, ...]:
+    """Return the scripts in loading order; that of uPlot includes its licence."""
+    licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
+    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
+        "explorer.js"
+    )
+
+
+def explorer(explored: Explorer | None) -> Markup:
+    """Return the interactive section and its data, or nothing if there is nothing to explore.
+
+    The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
+    narrow page the style sheet puts them below each other in another order.
     """
-    situation, unit = found.situation, found.situation.history.time_unit
-    columns: dict[str, Callable[[Offer], Any]] = {
-        "td": lambda one: one.td,
-        "tr": lambda one: _short(one.tr),
-        "level": lambda one: _short(one.energy_td),
-        "locked": lambda one: _short(one.best.energy if one.best else None),
-        "deformation": lambda one: _short(
-            locked_in(situation, one.tr) if one.basis == "oscillator" else None
-        ),
-        "saved": lambda one: _short(_saved(one)),
-        "error": lambda one: _short(one.error),
-        "windows": lambda one: _marked_columns(one.answer.windows or (), seen),
-        "peak": lambda one: int(one.peak),
-        "unbeaten": lambda one: int(one.unbeaten),
+    if explored is None:
+        return Markup()
+    flights = [_flight(trade_off) for trade_off in explored.trade_offs]
+    known_values = {
+        name for flight in flights for name in flight["texts"]
+    }  # values that no pair has are left out
+    listed = (
+        tag("div", tag("dt", name), tag("dd", data_value=key))
+        for key, name in _VALUES.items()
+        if key in known_values
+    )
+    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
+    values = Template(values).substitute(listed=join(listed))
+    if any(flight["motion"] for flight in flights):
+        below = (motion, values)
+    else:
+        below = (values, "")
+    options = (
+        tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
+    )
+    unit = explored.trade_offs[0].situation.history.time_unit
+    section = Template(section).substitute(
+        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight"))
+        if len(flights) > 1
+        else "",
+        unit=join([f" [{unit}]"] if unit else []),
+        windows=tag("li", tag("i", class_="windows"), "acceptable tr")
+        if "windows" in known_values
+        else "",
+        below_energy=below[0],
+        below_trade=below[1],
+    )
+    command_start, command_end = (shell_line(words) for words in explored.command)
+    data = {
+        "flight": 0,
+        "flights": flights,
+        "command": [f"{command_start} ", f" {command_end}"],
     }
-    names, numbers = filled(columns, found.offers)
-    texts = [_texts(one, first, f" {unit}" if unit else "") for one in found.offers]
-    said = list(
+    return join([Markup(section), _data("explorer-data", data)])
+
+
+def _closed_up(text: str) -> str:
+    """Remove whitespace between elements, and reduce whitespace within a text to one blank."""
+    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
+
+
+def _data(name: str, content: Any) -> Markup:
+    """Return a data element for a script: JSON in which nothing can be mistaken for markup."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return tag("script", Markup(text), type="application/json", id=name)
+
+
+def _flight(trade_off: TradeOff) -> dict[str, Any]:
+    """Return the curves, marks and texts of one flight."""
+    situation = trade_off.situation
+    history = situation.history
+    flight = situation.flight
+    first = (
+        trade_off.asked
+        or trade_off.recommended
+        or trade_off.start
+        or trade_off.offers[-1]
+    )
+    view = view_of(situation, trade_off.offers[-1].td)
+    levels = [offer.energy_td for offer in trade_off.offers]
+    scale = scale_in(situation, view, levels)
+    whole = draw_outline(history.time, history.energy, _OVERVIEW)
+    inner = history.between(view.start, view.end)
+    time, energy = draw_outline(*inner, stretches=_STRETCHES)
+    unit = history.time_unit
+    above = [
+        f"the {peak_name}, up to {energy:.4g}"
+        for peak_name, energy in view.above
+        if energy > scale.high
+    ]
+    cut = f"; cut at the top: {' and '.join(above)}" if above else ""
+    return {
+        "caption": f"Internal energy in the flight{cut}",
+        "time": f"time [{unit}]" if unit else "time",
+        "error": _error_name(trade_off.offers),
+        "saved": _saved_name(trade_off.offers),
+        "view": [view.start, view.end],
+        "flight": [
+            view.start if flight.start is None else flight.start,
+            view.end if flight.end is None else flight.end,
+        ],
+        "heights": [scale.low, scale.high],
+        "log": scale.logarithmic,
+        "energy": [
+            _brief(time),
+            _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy),
+        ],
+        "whole": [_brief(column) for column in whole],
+        "motion": _motion(situation),
+        "start": trade_off.offers.index(first),
+        **_table(trade_off, first, view),
+    }
+
+
+def _motion(situation: Situation) -> dict[str, Any] | None:
+    """Return the curves from which the script composes the deformation, None if no oscillator is known."""
+    motion = response(situation)
+    if motion is None:
+        return None
+    columns = {
+        "time": motion.time,
+        "reference": motion.reference,
+        "release": motion.release,
+    }
+    return {
+        **{name: _brief(column) for name, column in columns.items()},
+        "preload": motion.preload,
+    }
+
+
+def _brief(values: Samples) -> list[float]:
+    """Round the values of a curve to six digits."""
+    return [float(f"{value:.6g}") for value in values.tolist()]
+
+
+def _table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
+    """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
+
+    ``first`` is the offer whose td is shown first; the others are compared with it.
+    """
+    situation, unit = trade_off.situation, trade_off.situation.history.time_unit
+    columns: dict[str, Callable[[Offer], Any]] = {
+        "td": lambda offer: offer.td,
+        "tr": lambda offer: _short(offer.tr),
+        "level": lambda offer: _short(offer.energy_td),
+        "locked": lambda offer: _short(offer.best.energy if offer.best else None),
+        "deformation": lambda offer: _short(
+            locked_in(situation, offer.tr) if offer.basis == "oscillator" else None
+        ),
+        "saved": lambda offer: _short(_saved(offer)),
+        "error": lambda offer: _short(offer.error),
+        "windows": lambda offer: _marked_columns(offer.answer.windows or (), view),
+        "peak": lambda offer: int(offer.peak),
+        "unbeaten": lambda offer: int(offer.unbeaten),
+    }
+    names, numbers = filled(columns, trade_off.offers)
+    texts = [
+        _texts(offer, first, f" {unit}" if unit else "") for offer in trade_off.offers
+    ]
+    text_names = list(
         dict.fromkeys(name for row in texts for name, text in row.items() if text)
     )
     rows = [
-        [values, [row.get(name) or "" for name in said]]
+        [values, [row.get(name) or "" for name in text_names]]
         for values, row in zip(numbers, texts, strict=True)
     ]
-    return {"numbers": names, "texts": said, "rows": rows}
+    return {"numbers": names, "texts": text_names, "rows": rows}
 
 
 def _saved(offer: Offer) -> float | None:
-    """What a pair saves [%]: of the run time, or of the record where no cost is known."""
-    share = (
-        offer.best.rigid_fraction
-        if offer.best and offer.saving is None
-        else offer.saving
-    )
+    """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
+    share = offer.saving
+    if offer.best and share is None:
+        share = offer.best.rigid_fraction
     return None if share is None else 100 * share
 
 
 def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch, a bit each, in hexadecimal digits; empty without a window.
+    """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without a window.
 
-    However many windows noise makes, this is short, and finer than a screen shows.
+    The mask stays short however many windows noise makes, and it is finer than the screen.
     """
-    ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
+    ends = np.array([(window.start, window.end) for window in windows]).reshape(-1, 2)
     first, last = (
         np.clip(
             (ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1
@@ -254,30 +263,29 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
 
 
 def _short(value: float | None) -> float | None:
-    """Shorten a number that is drawn, not read."""
+    """Round a number that is only drawn."""
     return None if value is None else float(f"{value:.6g}")
 
 
 def _error_name(offers: Sequence[Offer]) -> str:
-    """Name what offers are compared by."""
-    return (
-        "shortfall of the level at td"
-        if all(one.basis == "energy" for one in offers)
-        else "residual"
-    )
+    """Return the name of the error by which the offers are compared."""
+    if all(offer.basis == "energy" for offer in offers):
+        return "shortfall of the level at td"
+    return "residual"
 
 
 def _saved_name(offers: Sequence[Offer]) -> str:
-    """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
-    known = any(one.saving is not None for one in offers)
-    return (
-        "saved, % of the processor time" if known else "rigid, % of the simulated time"
-    )
+    """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
+    is_cost_known = any(offer.saving is not None for offer in offers)
+    if is_cost_known:
+        return "saved, % of the processor time"
+    return "rigid, % of the simulated time"
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
-    """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
-    best, decision = offer.best, offer.decision
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
+    best = offer.best
+    decision = offer.decision
     return {
         "td": short(offer.td),
         "tr": short(best.tr) if best else "none",
@@ -296,11 +304,14 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
 
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
-    """What is said of the recommended tr."""
-    kept, windows = offer.answer.kept, offer.answer.windows
+    """Return the texts about the recommended tr."""
+    kept_share = offer.answer.kept
+    windows = offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None if kept is None else f"{span_of(kept)} of the reference's",
+        "after": None
+        if kept_share is None
+        else f"{span_of(kept_share)} of the reference's",
         "level_error": shown(
             best.level_error if best.residual is None else None, ".3f"
         ),
@@ -314,7 +325,7 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
 
 
 def _said(offer: Offer) -> str:
-    """What is said of the quality to who listens."""
+    """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
         return "nothing acceptable"
@@ -324,22 +335,22 @@ def _said(offer: Offer) -> str:
 
 
 def _compared(offer: Offer, start: Offer, unit: str) -> str:
-    """What an offer costs and gives, against the one that is shown first."""
+    """Describe what an offer costs and gains compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td
-    said = [
+    comparisons = [
         f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"
     ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
         share = offer.best.rigid_fraction - start.best.rigid_fraction
-        said.append(
+        comparisons.append(
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'}, "
             f"{share:+.1%} of the simulated time"
         )
     if offer.saving is not None and start.saving is not None:
-        said.append(
+        comparisons.append(
             f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
         )
     if (
@@ -347,7 +358,7 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         and start.error is not None
         and (offer.basis == "energy") == (start.basis == "energy")
     ):
-        said.append(
+        comparisons.append(
             f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}"
         )
-    return ", ".join(said)
+    return ", ".join(comparisons)

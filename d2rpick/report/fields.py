@@ -1,7 +1,7 @@
-"""Fields of results: each key once, with its kind, its meaning and where its value is taken from.
+"""Define the fields of results: each key once, with its kind, its meaning and where its value comes from.
 
-From a row of fields follow the JSON of a thing, its line of csv, the columns of a frame, and what the schemas in
-``d2rpick/schemas`` say of it.  Keys are only ever added.
+A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
+``d2rpick/schemas``.  Keys are only ever added.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from d2rpick.report import tables
 
 
 class Kind(NamedTuple):
-    """What values a key has: ``schema`` says it to a validator, ``plain`` makes of one what JSON can hold.
+    """The kind of values that a key has: ``schema`` describes it to a validator, ``plain`` converts a value to JSON.
 
-    Within ``schema`` other kinds stand for their schemas; one with a ``name`` is a definition that is referred to.
-    A row, an object, has ``fields``, in their order.
+    Within ``schema`` other kinds stand for their schemas; a kind with a ``name`` becomes a definition that others refer
+    to.  A row (an object) has ``fields`` in display order.
     """
 
     schema: Mapping[str, Any]
@@ -28,21 +28,21 @@ class Kind(NamedTuple):
 
     @property
     def keys(self) -> list[str]:
-        """Names of the fields: columns of a csv or a frame."""
+        """Names of the fields: the columns of a CSV file or a frame."""
         return [field.key for field in self.fields]
 
     def of_part(
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
-        """Take the fields with these ``keys``, or all, into the row of things with such a ``part``."""
+        """Return the fields with these ``keys``, or all fields, reading from the object that ``part`` returns."""
         return [_in_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:
-        """Give a field by its key."""
+        """Return a field by its key."""
         return next(field for field in self.fields if field.key == key)
 
 
-# Kinds that many fields have; with a question mark they may be None.  A size is a number that is not negative.
+# Kinds that many fields use; with a question mark they may be None. A size is a number that is not negative.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -50,9 +50,9 @@ Name = Literal[
 
 
 class Field(NamedTuple):
-    """A key with its kind and meaning; its value is what ``get`` takes from a thing, else what bears its name there.
+    """A key with its kind and meaning; ``get`` returns its value, by default the attribute with the key's name.
 
-    ``later``: it came after every schema that has it, so that older results may lack it.
+    ``later`` is True if the field was added after the first schema, so that older results may lack it.
     """
 
     key: str
@@ -62,21 +62,21 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Give the value that JSON has of a thing."""
+        """Return the field's value of an object as JSON holds it."""
         return kind_of(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
-        """Give the value as the thing has it."""
+        """Return the field's value as the object holds it."""
         if self.get:
             return self.get(thing)
-        return (
-            thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
-        )
+        if isinstance(thing, Mapping):
+            return thing[self.key]
+        return getattr(thing, self.key)
 
 
 def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
     return field._replace(
-        get=lambda thing: None if (found := part(thing)) is None else field.taken(found)
+        get=lambda thing: None if (inner := part(thing)) is None else field.taken(inner)
     )
 
 
@@ -85,11 +85,11 @@ def row(
     name: str = "",
     later: Iterable[str] = (),
     closed: bool = False,
-    **more: Any,
+    **keywords: Any,
 ) -> Kind:
-    """Make a row; keys that came ``later`` than its schema may be missing from results, a ``closed`` one has no others.
+    """Make a row of fields; older results may lack keys given as ``later``, a ``closed`` row allows no other keys.
 
-    ``more`` goes into its schema as it is.
+    ``more`` is added to its schema unchanged.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def row(
         ],
         "properties": {field.key: field for field in fields},
         **({"additionalProperties": False} if closed else {}),
-        **more,
+        **keywords,
     }
     return Kind(
         schema,
@@ -116,47 +116,46 @@ def row(
 
 
 def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
-    """Give a kind by its name, within limits in the words of JSON schema: ``minimum=0``."""
-    known = _KINDS[kind] if isinstance(kind, str) else kind
-    return (
-        Kind({**known.schema, **limits}, known.plain, known.name) if limits else known
-    )
+    """Return a kind by its name, with limits in the words of JSON schema, such as ``minimum=0``."""
+    named_kind = _KINDS[kind] if isinstance(kind, str) else kind
+    if limits:
+        return Kind({**named_kind.schema, **limits}, named_kind.plain, named_kind.name)
+    return named_kind
 
 
 def maybe(kind: Kind | Name) -> Kind:
-    """Let values be None where they are not known."""
+    """Return a kind that also allows None, for values that may be unknown."""
     kind = kind_of(kind)
-    known = kind.schema
-    if None in known.get("enum", ()) or "null" in known.get("type", ()):
+    schema = kind.schema
+    if None in schema.get("enum", ()) or "null" in schema.get("type", ()):
         return kind
-    null = (
-        {"enum": [*known["enum"], None]}
-        if "enum" in known
-        else {"type": [known["type"], "null"]}
-    )
+    if "enum" in schema:
+        null = {"enum": [*schema["enum"], None]}
+    else:
+        null = {"type": [schema["type"], "null"]}
     return Kind(
-        {**known, **null},
+        {**schema, **null},
         lambda value: None if value is None else kind.plain(value),
         kind.name,
     )
 
 
 def many(kind: Kind | Name) -> Kind:
-    """Give the kind of an array."""
-    one = kind_of(kind)
+    """Return the kind of an array of such values."""
+    item_kind = kind_of(kind)
     return Kind(
-        {"type": "array", "items": one},
-        lambda values: [one.plain(value) for value in values],
+        {"type": "array", "items": item_kind},
+        lambda values: [item_kind.plain(value) for value in values],
     )
 
 
 def each(kind: Name) -> Kind:
-    """Give the kind of an object with any keys, whose values are of one kind."""
+    """Return the kind of an object with any keys whose values all have the given kind."""
     return Kind({"type": "object", "additionalProperties": kind_of(kind)}, dict)
 
 
 def one_of(*names: str) -> Kind:
-    """Give the kind of a word among these."""
+    """Return the kind of a word that must be one of ``names``."""
     return Kind({"enum": list(names)})
 
 
@@ -177,9 +176,10 @@ _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.i
 
 
 class Document(NamedTuple):
-    """A result as JSON: the ``name`` of its schema, what it is, and its fields below schema, version and command.
+    """A result as JSON: the ``name`` of its schema, its description, and the fields after schema, version and command.
 
-    No object of a ``closed`` one has other keys; its schema defines ``also`` what other forms of the result hold.
+    Objects of a ``closed`` document have no other keys; its schema defines ``also`` the objects in other forms of the
+    result.
     """
 
     name: str
@@ -190,23 +190,23 @@ class Document(NamedTuple):
 
     @property
     def whole(self) -> Kind:
-        """All its fields."""
+        """All fields of the document as one row."""
         head = (
             Field("schema", Kind({"const": self.name})),
             Field("tool_version", "text"),
             Field("command", "texts"),
         )
-        known = self.row.schema
-        later = {*self.row.keys} - {*known["required"]}
-        more = {
+        schema = self.row.schema
+        later = {*self.row.keys} - {*schema["required"]}
+        further_keys = {
             key: value
-            for key, value in known.items()
+            for key, value in schema.items()
             if key not in ("type", "required", "properties")
         }
-        return row(*head, *self.row.fields, later=later, **more)
+        return row(*head, *self.row.fields, later=later, **further_keys)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
-        """Give what the JSON holds; ``command`` are the arguments that repeat the answer."""
+        """Return the content of the JSON document; ``command`` are the arguments that repeat the answer."""
         head = {
             "schema": self.name,
             "tool_version": __version__,
@@ -217,16 +217,16 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer by its schema; without an ``indent`` in one line, to be appended to those of other runs."""
+        """Write an answer by its schema; without ``indent`` in one line, which can be joined to those of other runs."""
         return tables.as_json(self.of(answer, command), indent)
 
 
 def csv_of(
     keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; "
 ) -> str:
-    """Write rows as csv with these columns; what is a list in JSON is joined in its cell."""
+    """Write rows as CSV with these columns; lists are joined in their cell."""
     return tables.as_csv(
-        keys, ([_cell(found[key], between) for key in keys] for found in rows)
+        keys, ([_cell(values[key], between) for key in keys] for values in rows)
     ).rstrip("\n")
 
 

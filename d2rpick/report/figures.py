@@ -1,4 +1,4 @@
-"""How every figure is drawn and rendered, in files and on pages: colours, sizes, marks, and what is in sight."""
+"""Style and render all figures, for files and pages: colours, sizes, marks, and the visible range."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "svg", "pdf")
-# Okabe and Ito's palette: told apart with any colour vision.
+# Palette of Okabe and Ito, distinguishable with any colour vision.
 REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#000000",
     "#d55e00",
@@ -35,27 +35,39 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Width of a figure that is written to a file [inch].
+# width of a figure in a file [inch]
 WIDTH: Final = 10.0
-# Share of the axes that the label of a switch time takes up, at most: in a file and on a page.
+# Largest width of the label of a switch time as a share of the axes, by whether the figure is on a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# From this ratio on a logarithmic axis has marks enough without those between powers of ten, each of which costs time.
+# From this ratio on, a logarithmic axis has enough marks without those between powers of ten, which cost time.
 _DECADES: Final = 100.0
-# Stretches of a curve, each with its lowest and highest value: as many as paper and screen tell apart.
+# Number of intervals for which a curve's lowest and highest value is drawn; paper and screens show no more.
 STRETCHES: Final = 400
-# Of a name from a file, what fits into a legend; in full it stands in the result.
+# Longest name from a file in a legend [letters]; the result contains it in full.
 _LONGEST_NAME = 28
+
+# Width of a figure on a page [inch]. On a phone, where it fills the screen, its letters are about as large as those of
+# the page; on a wider page they are no larger.
+PAGE_WIDTH: Final = 4.5
+# Space [inch]: above the panels for the labels of the switch times; between panels; on the right for half a number;
+# below for numbers and name of the time axis; for a line of the legend; and next to the name of the vertical axis.
+_TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
+# height of the letters of an axis name [inch]
+_NAME: Final = 0.16
+_COLUMNS: Final = 2
+# largest number of labels on the time axis
+_NUMBERS: Final = 5
 
 
 class Figure(figures.Figure):
-    """A figure that a notebook shows, whatever its backend is."""
+    """A matplotlib figure that a notebook shows with any backend."""
 
     def _repr_png_(self) -> bytes:
         return render(self, "figure.png")
 
 
 def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]:
-    """Begin a figure of axes below each other that share their times; ``height`` is that of it in a file [inch]."""
+    """Create a figure of axes below each other that share their time axis; ``height`` [inch] applies to a file."""
     figure = Figure(figsize=(WIDTH, height), layout=None if page else "constrained")
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
@@ -67,24 +79,24 @@ def shade(
     colour: str = FLIGHT,
     alpha: float = 0.15,
 ) -> None:
-    """Shade a span of times, a flight if nothing else is said."""
+    """Shade a span of times, by default as a flight."""
     axes.axvspan(*span, color=colour, alpha=alpha, linewidth=0, label=label)
 
 
 def note(
     axes: Axes,
     text: str,
-    place: tuple[float, float],
+    position: tuple[float, float],
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
-    """Write at a place, its height a share of the axes, ``offset`` by some points; by default at a time."""
+    """Write a text at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
-    axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
+    axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 
 
 def picture_format(name: str) -> str:
-    """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
+    """Return the format for the suffix of ``name``; raise FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
         raise FormatError(
@@ -94,8 +106,9 @@ def picture_format(name: str) -> str:
 
 
 def render(figure: figures.Figure, name: str) -> bytes:
-    """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
-    content, form = io.BytesIO(), picture_format(name)
+    """Return the bytes of the file ``name`` in the format of its suffix; a figure always gives the same bytes."""
+    content = io.BytesIO()
+    form = picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with mpl.rc_context({"svg.hashsalt": "d2rpick"}), any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
@@ -104,7 +117,7 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def any_letters() -> Iterator[None]:
-    """Let letters of a name that the font lacks be boxes, without a warning."""
+    """Draw letters that the font lacks as boxes, without a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
@@ -126,30 +139,35 @@ def show_span(
     scale: Scale,
     above: Sequence[tuple[str, float]],
 ) -> None:
-    """Show of a curve the times in ``span``; what is higher than the scale is cut, with a mark.
+    """Show the times in ``span`` of a curve, and mark where values above the scale are cut off.
 
     Parameters
     ----------
     axes : Axes
     span : (float, float)
-        First and last time in sight [time].
+        First and last visible time [time].
     scale : Scale
     above : sequence of (str, float)
-        What stands high in the span, and how high: a mark names it where it is cut.
+        Name and height of each peak that is cut off; a mark names it.
     """
     axes.set_xlim(*span)
     if scale.logarithmic:
         make_logarithmic(axes, scale.low, scale.high)
     axes.set_ylim(scale.low, scale.high)
-    for what, highest in above:
+    for peak_name, highest in above:
         if highest <= scale.high:
             continue
-        early = what == "load"  # it stands on the left, a landing on the right
+        early = peak_name == "load"  # the load is on the left, the landing on the right
         note(
-            axes, f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), (6 if early else -6, -6),
-            xycoords="axes fraction", ha="left" if early else "right", va="top",
+            axes,
+            f"{peak_name}, up to {highest:.4g} \N{UPWARDS ARROW}",
+            (0 if early else 1, 1),
+            (6 if early else -6, -6),
+            xycoords="axes fraction",
+            ha="left" if early else "right",
+            va="top",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-        )  # fmt: skip
+        )
 
 
 def mark_times(
@@ -157,19 +175,23 @@ def mark_times(
 ) -> None:
     """Mark the switch times; their labels stand above the first axes, away from each other and from the edges.
 
-    Where a label would reach over an edge it changes its side if there is room.
+    A label that would cross an edge moves to the other side of its line if there is room.
     """
     width, (low, high) = LABEL[page], panels[0].get_xlim()
-    places = [
+    positions = [
         None if time is None else (time - low) / (high - low) for time in (tr, td)
     ]
-    room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
+    room = (
+        1.0
+        if positions[0] is None or positions[1] is None
+        else positions[1] - positions[0]
+    )
     sides = ["right", "left"]
-    if places[0] is not None and places[0] < width < room:
+    if positions[0] is not None and positions[0] < width < room:
         sides[0] = "left"
     if (
-        places[1] is not None
-        and places[1] > 1 - width
+        positions[1] is not None
+        and positions[1] > 1 - width
         and room > width * (1 + (sides[0] == "left"))
     ):
         sides[1] = "right"
@@ -188,9 +210,9 @@ def mark_times(
 
 
 def finish(axes: Axes, *, legend: bool = True) -> None:
-    """Draw the grid, keep the time axis tight, and put the legend beside the axes.
+    """Draw the grid, limit the time axis to the data, and put the legend next to the axes.
 
-    A power of ten of the numbers stands above them, clear of the labels of the switch times.
+    The power of ten of the numbers stands above them, clear of the labels of the switch times.
     """
     axes.grid(visible=True, linewidth=0.3)
     axes.yaxis.get_offset_text().set_horizontalalignment("right")
@@ -200,9 +222,11 @@ def finish(axes: Axes, *, legend: bool = True) -> None:
 
 
 def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """What a legend of several panels names, each thing once."""
-    known = (zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels)
-    return {name: handle for pairs in known for handle, name in pairs}
+    """Return the legend entries of several panels, each name once."""
+    panel_entries = (
+        zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
+    )
+    return {name: handle for pairs in panel_entries for handle, name in pairs}
 
 
 def legend_below(
@@ -211,11 +235,11 @@ def legend_below(
     columns: int = 4,
     size: str | None = "small",
 ) -> None:
-    """Put one legend of all panels below them."""
-    if known := _entries(panels):
+    """Put one legend for all panels below them."""
+    if entries := _entries(panels):
         figure.legend(
-            known.values(),
-            known,
+            entries.values(),
+            entries,
             loc="outside lower left",
             ncols=columns,
             fontsize=size,
@@ -224,57 +248,45 @@ def legend_below(
 
 
 def with_unit(name: str, unit: str) -> str:
-    """Label an axis, with the unit where a file names one."""
+    """Return the label of an axis, with the unit if a file names one."""
     return f"{name} [{plain(unit)}]" if unit else name
 
 
 def plain(name: str) -> str:
-    """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden.
+    """Return a name from a file as plain text for matplotlib.
 
-    It is cut where it is too long, and what cannot be printed becomes a question mark.
+    A name may otherwise be read as a formula, or be hidden if it begins with an underscore.  Long names are cut off;
+    unprintable letters become question marks.
     """
-    shown = "".join(letter if letter.isprintable() else "?" for letter in name)
-    shown = shown if len(shown) <= _LONGEST_NAME else f"{shown[: _LONGEST_NAME - 1]}…"
-    return f"{' ' if shown.startswith('_') else ''}{shown}".replace("$", r"\$")
-
-
-# Width [inch]: on a phone as wide as the screen its letters have about the size of those of the page, and a page that
-# has more room makes them no larger than its own.
-PAGE_WIDTH: Final = 4.5
-# Above the panels, for the labels of the switch times; between panels; on the right, for half a number; below, for
-# numbers and name of the time axis; for a line of the legend; and beside the name of the other axis [inch].
-_TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
-# Height of the letters of an axis' name [inch].
-_NAME: Final = 0.16
-_COLUMNS: Final = 2
-# Numbers of the time axis, at most.
-_NUMBERS: Final = 5
+    text = "".join(letter if letter.isprintable() else "?" for letter in name)
+    text = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 1]}…"
+    return f"{' ' if text.startswith('_') else ''}{text}".replace("$", r"\$")
 
 
 def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
-    """Put panels of one ``height`` [inch] below each other, and one legend of all of them below the last.
+    """Put panels of one ``height`` [inch] below each other, and one legend for all of them below the last.
 
-    Margins are measured once, by the numbers of the vertical axes; an engine for layouts draws a figure three times.
+    Margins are measured once, from the numbers on the vertical axes; a layout engine would draw the figure three times.
     """
     FigureCanvasSVG(figure)
-    known = _entries(panels)
-    foot = _BELOW + _LINE * ceil(len(known) / _COLUMNS)
+    entries = _entries(panels)
+    foot = _BELOW + _LINE * ceil(len(entries) / _COLUMNS)
     full = _TOP + len(panels) * height + (len(panels) - 1) * _BETWEEN + foot
     figure.set_size_inches(PAGE_WIDTH, full)
     panels[-1].locator_params(axis="x", nbins=_NUMBERS)
     _place(panels, 0.15 * PAGE_WIDTH, height, full)
     boxes = ((panel, panel.yaxis.get_tightbbox()) for panel in panels)
-    left = (
+    left_margin = (
         max(panel.bbox.x0 - box.x0 for panel, box in boxes if box) / figure.dpi + _EDGE
     )
-    _place(panels, left, height, full)
+    _place(panels, left_margin, height, full)
     for panel in panels:
         panel.yaxis.set_label_coords(
-            (_EDGE + _NAME - left) / (PAGE_WIDTH - left - _RIGHT), 0.5
+            (_EDGE + _NAME - left_margin) / (PAGE_WIDTH - left_margin - _RIGHT), 0.5
         )
     figure.legend(
-        known.values(),
-        known,
+        entries.values(),
+        entries,
         loc="lower left",
         ncols=_COLUMNS,
         fontsize="small",
@@ -283,24 +295,26 @@ def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> No
     )
 
 
-def _place(panels: Sequence[Axes], left: float, height: float, full: float) -> None:
-    """Give each panel its place in a figure that is ``full`` high [inch]."""
-    for place, panel in enumerate(panels):
-        bottom = full - _TOP - (place + 1) * height - place * _BETWEEN
+def _place(
+    panels: Sequence[Axes], left_margin: float, height: float, full: float
+) -> None:
+    """Place the panels in a figure of height ``full`` [inch]."""
+    for index, panel in enumerate(panels):
+        bottom = full - _TOP - (index + 1) * height - index * _BETWEEN
         panel.set_position(
             (
-                left / PAGE_WIDTH,
+                left_margin / PAGE_WIDTH,
                 bottom / full,
-                1 - (left + _RIGHT) / PAGE_WIDTH,
+                1 - (left_margin + _RIGHT) / PAGE_WIDTH,
                 height / full,
             )
         )
 
 
 def svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters.
+    """Return a figure as an SVG element for a page, whose ids all begin with ``prefix``; text stays text.
 
-    It has no style sheet of its own: that of the page holds what matplotlib writes into it.
+    The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """
     content = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
@@ -314,8 +328,8 @@ def svg_element(figure: figures.Figure, prefix: str) -> str:
     element = element[element.index("<svg") :]
     element = re.sub(
         r' (?:width|height)="[\d.]+pt"', "", element, count=2
-    )  # the page says how wide
-    # a hundredth of a point is finer than any screen
+    )  # the page sets the width
+    # 0.01 points is finer than any screen
     element = re.sub(
         r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element
     )

@@ -1,4 +1,4 @@
-"""What is drawn of a vibration of many modes: the energy halfway, and the residual of each tr."""
+"""Draw a vibration of several modes: the energy halfway between tr and td, and the residual of each tr."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
-    """Mark the energy halfway between tr and td, which tells how the two deformations lie to each other."""
+    """Mark the energy halfway between tr and td, which shows the direction of the two deformations to each other."""
     middle = (tr + situation.td) / 2
     energy = situation.history.energy_at(middle)
     axes.scatter(
@@ -28,14 +28,15 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
     """Draw the residual of each tr in the flight, and that of a release without any vibration."""
-    profile, start = situation.vibration.profile, situation.earliest_tr
+    profile = situation.vibration.profile
+    start = situation.earliest_tr
     assert profile is not None
-    shown = profile.time >= (-np.inf if start is None else start)
+    is_visible = profile.time >= (-np.inf if start is None else start)
     residuals = np.asarray(
-        residual(profile.error[shown], situation.kinetic_share or 0.0)
+        residual(profile.error[is_visible], situation.kinetic_share or 0.0)
     )
     axes.plot(
-        *draw_outline(profile.time[shown], residuals, stretches=STRETCHES),
+        *draw_outline(profile.time[is_visible], residuals, stretches=STRETCHES),
         color=REFERENCE,
         linewidth=1,
         label="_",

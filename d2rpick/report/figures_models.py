@@ -1,4 +1,4 @@
-"""Figures of the models: the oscillator and the rollover box."""
+"""Draw the sample models: the oscillator and the rollover box."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Outlines of the rolling box, as many as can be told apart.
+# number of outlines of the rolling box that are distinguishable
 _OUTLINES = 8
+
+_SLED_LENGTH: Final = 1.6
 
 
 def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
-    """Displacements of both masses and the energies over time; the rigid window shaded."""
+    """Draw the displacements of both masses and the energies over time, with the rigid window shaded."""
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.plot(motion.time, motion.state.z, color=REFERENCE, label="z, frame")
@@ -60,15 +62,14 @@ def draw_rollover(
     switched: Record | None = None,
     windows: Sequence[RigidWindow] = (),
 ) -> Figure:
-    """Outlines of the box at even times with sled, curb and ground; roll and height over time, and what differs.
+    """Draw outlines of the box at regular times with sled, curb and ground, and roll and height over time.
 
-    ``switched`` is the same box, rigid in ``windows``; without it there is nothing to compare.
+    ``switched`` is the same box, rigid in ``windows``; with it, the difference of the two runs is drawn as well.
     """
-    rows = (
-        ["roll", "roll difference", "height", "height difference"]
-        if switched
-        else ["roll", "height"]
-    )
+    if switched:
+        rows = ["roll", "roll difference", "height", "height difference"]
+    else:
+        rows = ["roll", "height"]
     figure = Figure(figsize=(12, 8 if switched else 5.5), layout="constrained")
     grid = figure.subplot_mosaic(
         [["outlines", row] for row in rows], width_ratios=(1.4, 1)
@@ -87,10 +88,10 @@ def draw_rollover(
         grid["roll"].plot(time, np.degrees(record.roll), **drawn)
         grid["height"].plot(time, record.centre.imag, **drawn)
     if switched:
-        off = np.degrees(switched.roll - reference.roll)
-        grid["roll difference"].plot(time, off, color=SWITCHED, linewidth=1)
-        off = 1e3 * (switched.centre - reference.centre).imag
-        grid["height difference"].plot(time, off, color=SWITCHED, linewidth=1)
+        deviation = np.degrees(switched.roll - reference.roll)
+        grid["roll difference"].plot(time, deviation, color=SWITCHED, linewidth=1)
+        deviation = 1e3 * (switched.centre - reference.centre).imag
+        grid["height difference"].plot(time, deviation, color=SWITCHED, linewidth=1)
     units = {
         "roll": "roll [degrees]",
         "roll difference": "roll off by [degrees]",
@@ -108,8 +109,10 @@ def draw_rollover(
 def _draw_outlines(
     axes: Axes, parameters: Parameters, reference: Record, switched: Record | None
 ) -> None:
-    """Outlines at even times, each with its time; the sled where it starts and where it comes to rest, the ground."""
-    shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
+    """Draw labelled outlines of the box at regular times, the first and last position of the sled, and the ground."""
+    drawn_states = (
+        np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
+    )
     sled = Sled(parameters.speed, parameters.braking)
     for time in (0.0, float(reference.time[-1])):
         draw_sled(axes, parameters, sled.place(time))
@@ -119,12 +122,12 @@ def _draw_outlines(
     ):
         if record:
             closed = np.column_stack(
-                [record.outline[shown], record.outline[shown, 0]]
+                [record.outline[drawn_states], record.outline[drawn_states, 0]]
             ).T
             axes.plot(
                 closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style
             )
-    for state in shown:
+    for state in drawn_states:
         centre = reference.centre[state]
         text = f"{1e3 * reference.time[state]:.0f}"
         axes.text(
@@ -137,17 +140,16 @@ def _draw_outlines(
             color=GOOD,
         )
     axes.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
-    around = (
-        "; sled at start and end, curb, ground"
-        if parameters.drop is None
-        else "; ground"
-    )
+    if parameters.drop is None:
+        around = "; sled at start and end, curb, ground"
+    else:
+        around = "; ground"
     axes.set_title(f"box at the times named [ms]{around}", fontsize="medium")
     axes.grid(visible=True, linewidth=0.3)
 
 
 def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
-    """Shade the rigid windows; mark when the sled pushed last and when the ground pushes."""
+    """Shade the rigid windows; mark the end of the sled's push and the begin of the ground contact."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
         axes.axvspan(
@@ -169,13 +171,13 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
 def draw_scan(
     reference: Record, outcomes: Sequence[Outcome], answer: Suggestion
 ) -> Figure:
-    """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
+    """Draw the energy of the box with its level at td, and below it the errors of roll and mean energy against tr."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
-    before = reference.time <= answer.situation.td
-    internal = reference.internal_energy[before, 0]
+    is_before_td = reference.time <= answer.situation.td
+    internal = reference.internal_energy[is_before_td, 0]
     energy.plot(
-        reference.time[before],
+        reference.time[is_before_td],
         internal,
         color=REFERENCE,
         linewidth=1,
@@ -187,17 +189,17 @@ def draw_scan(
         linewidth=0.8,
         label=f"level at td, {internal[-1]:.4g}",
     )
-    times = [one.tr for one in outcomes]
+    times = [outcome.tr for outcome in outcomes]
     roll.plot(
         times,
-        [abs(one.roll_error) for one in outcomes],
+        [abs(outcome.roll_error) for outcome in outcomes],
         ".-",
         color=REFERENCE,
         label="roll error at td",
     )
     mean.plot(
         times,
-        [one.mean_ratio - 1 for one in outcomes],
+        [outcome.mean_ratio - 1 for outcome in outcomes],
         ".-",
         color=REFERENCE,
         label="error of the mean energy",
@@ -228,11 +230,8 @@ def draw_scan(
     return figure
 
 
-_SLED_LENGTH: Final = 1.6
-
-
-def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
-    """Floor, curb and cushion of the sled when it has come to ``place`` [m], and the ground."""
+def draw_sled(axes: Axes, parameters: Parameters, position: float) -> None:
+    """Draw floor, curb and cushion of the sled at ``place`` [m], and the ground."""
     p = parameters
     axes.axhline(-p.ground, color=REFERENCE, linewidth=1.2)
     if p.drop is not None:
@@ -250,7 +249,7 @@ def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
         ),
         ((0.0, CURB_THICKNESS, CURB_THICKNESS + 1j * p.curb, 1j * p.curb), SWITCHED),
     ):
-        shape = place + np.array(corners) * turn
+        shape = position + np.array(corners) * turn
         axes.add_patch(
             Polygon(
                 np.column_stack([shape.real, shape.imag]),

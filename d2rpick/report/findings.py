@@ -1,4 +1,4 @@
-"""Findings of check as table, JSON, GitHub annotations, JUnit XML and SARIF; its rules as text."""
+"""Write the findings of ``check`` as a table, JSON, GitHub annotations, JUnit XML and SARIF; explain its rules."""
 
 from __future__ import annotations
 
@@ -36,23 +36,6 @@ _SARIF: Final = {
 }
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
 
-
-@dataclass(frozen=True)
-class Checks:
-    """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
-
-    ``failed`` are decks that could not be read, ``history`` are the files by which
-    the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
-    """
-
-    results: Sequence[Checked]
-    root: str = field(default_factory=os.getcwd)
-    failed: Sequence[Unreadable] = ()
-    cautions: Sequence[Caution] = ()
-    history: Sequence[str] | None = None
-    fail_on: Severity = Severity.ERROR
-
-
 _LINE: Final = kind_of("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
@@ -78,8 +61,24 @@ _WINDOW: Final = row(
 )
 
 
+@dataclass(frozen=True)
+class Checks:
+    """The findings in several decks; paths below ``root`` are shown relative to it.
+
+    ``failed`` are decks that could not be read.  ``history`` are the files by which the windows were judged, None
+    without any.  Findings lighter than ``fail_on`` are no failures.
+    """
+
+    results: Sequence[Checked]
+    root: str = field(default_factory=os.getcwd)
+    failed: Sequence[Unreadable] = ()
+    cautions: Sequence[Caution] = ()
+    history: Sequence[str] | None = None
+    fail_on: Severity = Severity.ERROR
+
+
 def as_table(checks: Checks, _: Shown) -> str:
-    """Findings and windows of each deck, one per line, and how many there are; decks that failed are counted."""
+    """Return the findings and windows of each deck, one per line, and their number, with the number of failed decks."""
     lines: list[str] = []
     for result in checks.results:
         lines.append(_shown(result.deck, checks.root))
@@ -88,43 +87,49 @@ def as_table(checks: Checks, _: Shown) -> str:
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
         lines += [f"  {line}" for line in _window_lines(result.windows, checks.root)]
-        lines += [f"  {_line(one)}" for one in _findings(checks, result)]
+        lines += [f"  {_line(finding)}" for finding in _findings(checks, result)]
     return "\n".join([*map(make_printable, lines), "", _last_line(checks)])
 
 
-def as_ndjson(checks: Checks, shown: Shown) -> str:
-    """Give a line for each deck, by the same schema as the JSON of all."""
-    each = (replace(checks, results=[result]) for result in checks.results)
-    return "\n".join(DOCUMENT.as_json(one, shown.command, None) for one in each)
+def as_ndjson(checks: Checks, display: Shown) -> str:
+    """Return a line of JSON per deck, each by the schema of the whole result."""
+    deck_checks = (replace(checks, results=[result]) for result in checks.results)
+    return "\n".join(
+        DOCUMENT.as_json(deck_check, display.command, None)
+        for deck_check in deck_checks
+    )
 
 
 def as_csv(checks: Checks, _: Shown) -> str:
-    """A row per finding, a column for each key of ``findings`` in the JSON output."""
+    """Return CSV with one row per finding and a column for each key of ``findings`` in the JSON output."""
     return csv_of(FINDING.keys, map(FINDING.plain, _findings(checks)))
 
 
 def as_markdown(checks: Checks, _: Shown) -> str:
-    """The findings as a Markdown table, and how many there are."""
-    found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
+    """Return the findings as a Markdown table, and their number."""
+    rows = [list(FINDING.plain(finding).values()) for finding in _findings(checks)]
     return "\n\n".join(
         [
-            *([tables.as_markdown(FINDING.keys, found)] if found else []),
+            *([tables.as_markdown(FINDING.keys, rows)] if rows else []),
             _last_line(checks),
         ]
     )
 
 
 def as_github(checks: Checks, _: Shown) -> str:
-    """Workflow commands that GitHub Actions shows beside the lines of a deck."""
-    found = [
+    """Return workflow commands that make GitHub Actions show the findings next to the lines of a deck."""
+    annotations = [
         f"::{_GITHUB[f.severity]} file={_escaped(f.file, ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
         for f in _findings(checks)
     ]
-    failed = ((_shown(one.deck, checks.root), one.reason) for one in checks.failed)
+    failed = (
+        (_shown(failed_deck.deck, checks.root), failed_deck.reason)
+        for failed_deck in checks.failed
+    )
     return "\n".join(
         [
-            *found,
+            *annotations,
             *(
                 f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}"
                 for deck, reason in failed
@@ -134,7 +139,7 @@ def as_github(checks: Checks, _: Shown) -> str:
 
 
 def as_junit(checks: Checks, _: Shown) -> str:
-    """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
+    """Return a suite per deck and a case per finding; findings lighter than ``fail_on`` pass but show their message."""
     from xml.etree import ElementTree as ET  # start-up
 
     suites = ET.Element("testsuites", name="d2rpick check")
@@ -149,23 +154,29 @@ def as_junit(checks: Checks, _: Shown) -> str:
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         ET.SubElement(case, "error", type=failed.code, message=_xml(failed.reason))
     for result in checks.results:
-        failing = [one.severity.rank <= checks.fail_on.rank for one in result.findings]
+        failing = [
+            finding.severity.rank <= checks.fail_on.rank for finding in result.findings
+        ]
         suite, name = begin(
             result.deck, tests=max(1, len(failing)), failures=sum(failing), errors=0
         )
         if not failing:
             ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        for one, fails in zip(_findings(checks, result), failing, strict=True):
+        for finding, fails in zip(_findings(checks, result), failing, strict=True):
             case = ET.SubElement(
                 suite,
                 "testcase",
-                name=_xml(f"{one.rule} {_place(one)}"),
+                name=_xml(f"{finding.rule} {_place(finding)}"),
                 classname=name,
             )
-            about = {"type": one.rule, "message": _xml(one.message)} if fails else {}
+            about = (
+                {"type": finding.rule, "message": _xml(finding.message)}
+                if fails
+                else {}
+            )
             ET.SubElement(
                 case, "failure" if fails else "system-out", about
-            ).text = _xml(_line(one))
+            ).text = _xml(_line(finding))
     ET.indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(
         suites, encoding="unicode"
@@ -173,7 +184,7 @@ def as_junit(checks: Checks, _: Shown) -> str:
 
 
 def as_sarif(checks: Checks, _: Shown) -> str:
-    """SARIF 2.1.0 with all rules; ids are stable."""
+    """Return SARIF 2.1.0 with all rules; their ids are stable."""
     ids = list(RULES)
     rules = [
         {
@@ -185,7 +196,7 @@ def as_sarif(checks: Checks, _: Shown) -> str:
         }
         for rule in RULES.values()
     ]
-    found = [
+    results = [
         {
             "ruleId": f.rule,
             "ruleIndex": ids.index(f.rule),
@@ -200,10 +211,10 @@ def as_sarif(checks: Checks, _: Shown) -> str:
     messages = [
         {
             "level": "error",
-            "message": {"text": one.reason},
-            "locations": _places(_shown(one.deck, checks.root)),
+            "message": {"text": failed_deck.reason},
+            "locations": _places(_shown(failed_deck.deck, checks.root)),
         }
-        for one in checks.failed
+        for failed_deck in checks.failed
     ]
     run = {
         "tool": {"driver": {"name": "d2rpick", "version": __version__, "rules": rules}},
@@ -214,21 +225,21 @@ def as_sarif(checks: Checks, _: Shown) -> str:
                 "toolExecutionNotifications": messages,
             }
         ],
-        "results": found,
+        "results": results,
     }
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
-def _place(one: Finding) -> str:
-    return f"{one.file}:{one.line}:{one.column}"
+def _place(finding: Finding) -> str:
+    return f"{finding.file}:{finding.line}:{finding.column}"
 
 
-def _line(one: Finding) -> str:
-    return f"{_place(one)}: {one.severity} {one.rule} {one.message}"
+def _line(finding: Finding) -> str:
+    return f"{_place(finding)}: {finding.severity} {finding.rule} {finding.message}"
 
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
-    """Windows that the same cards make at the same times are one line."""
+    """Return a line per window; windows with the same cards and times share one line."""
     alike = (
         ((window.cards, window.unit.kind, window.tr, window.td), window)
         for window in windows
@@ -243,30 +254,40 @@ def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
 def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
     for result in checks.results:
         for window in result.windows:
-            place, unit = window.place, window.unit
+            location = window.place
+            unit = window.unit
             yield {
                 "part": window.part,
                 "part_set": unit.id if unit.is_set else None,
                 "node": unit.id if unit.is_body else None,
                 "tr": window.tr,
                 "td": window.td,
-                "file": _shown(place.file, checks.root),
-                "line": place.line,
+                "file": _shown(location.file, checks.root),
+                "line": location.line,
                 "deck": _shown(result.deck, checks.root),
             }
 
 
 def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
-    """Give what was found in all decks, or in some ``results``, with paths as they are shown."""
-    for one in (one for result in results or checks.results for one in result.findings):
-        yield one._replace(
-            file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root)
+    """Return the findings in all decks, or in some ``results``, with displayed paths."""
+    for finding in (
+        finding for result in results or checks.results for finding in result.findings
+    ):
+        yield finding._replace(
+            file=_shown(finding.file, checks.root),
+            deck=_shown(finding.deck, checks.root),
         )
 
 
 def _warnings(checks: Checks) -> list[Caution]:
-    """Give what to be aware of, decks that could not be read among it."""
-    return [*checks.cautions, *(Caution(one.code, one.reason) for one in checks.failed)]
+    """Return all warnings, including one for each deck that could not be read."""
+    return [
+        *checks.cautions,
+        *(
+            Caution(failed_deck.code, failed_deck.reason)
+            for failed_deck in checks.failed
+        ),
+    ]
 
 
 DOCUMENT: Final = Document(
@@ -293,41 +314,41 @@ def _counts(results: Sequence[Checked]) -> dict[str, int]:
 
 
 def _last_line(checks: Checks) -> str:
-    """How many findings and decks there are, and what was not judged."""
+    """Return the number of findings and decks, and what was not judged."""
     results = checks.results
-    found = [
+    counted = [
         f"{count} {name if count != 1 else name[:-1]}"
         for name, count in _counts(results).items()
     ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
     unjudged = checks.history is None and any(result.windows for result in results)
-    return f"{', '.join(found)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
+    return f"{', '.join(counted)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
 
 
 def _shown(path: str, root: str) -> str:
-    """Path relative to the working folder where it lies below it, with ``/``; bytes that are no text replaced."""
+    """Return a path for display: relative to ``root`` if it lies below it, with ``/``, undecodable bytes replaced."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
-    shown = (
+    displayed = (
         os.path.relpath(absolute, root)
         if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118
         else absolute
     )
-    return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
+    return os.fsencode(displayed).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _places(shown: str, **more: Any) -> list[dict[str, Any]]:
-    """Give a place in a file as SARIF has it."""
+def _places(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
+    """Return a location in a file as SARIF defines it."""
     from urllib.parse import quote
 
-    uri = f"{'file://' * shown.startswith('/')}{quote(shown)}"
-    return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **more}}]
+    uri = f"{'file://' * displayed.startswith('/')}{quote(displayed)}"
+    return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **keywords}}]
 
 
-def _escaped(text: str, more: str = "") -> str:
-    for letter in "%\r\n" + more:
+def _escaped(text: str, separators: str = "") -> str:
+    for letter in "%\r\n" + separators:
         text = text.replace(letter, f"%{ord(letter):02X}")
     return make_printable(text)
 
@@ -338,14 +359,14 @@ def _xml(text: str) -> str:
 
 
 def as_list() -> str:
-    """Id, severity and summary of every rule."""
+    """Return id, severity and summary of every rule."""
     return "\n".join(
         f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values()
     )
 
 
 def explained_rules(names: Iterable[str], width: int) -> str:
-    """Explain rules by their ids or beginnings, and warnings by their codes.
+    """Explain the rules with these ids or prefixes, and the warnings with these codes.
 
     Raises
     ------
@@ -356,7 +377,7 @@ def explained_rules(names: Iterable[str], width: int) -> str:
 
 
 def _explained(name: str, width: int) -> Iterator[str]:
-    """Explain the rules that begin so, or the warning of this code."""
+    """Explain the rules whose id begins with ``name``, or the warning with this code."""
     from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
 
     if name in EXPLANATIONS:
@@ -367,7 +388,7 @@ def _explained(name: str, width: int) -> Iterator[str]:
 
 
 def as_text(rule: Rule, width: int) -> str:
-    """One rule: what it finds, why that matters, and decks that pass and fail, which are as wide as their cards."""
+    """Explain one rule: what it finds, why that matters, and decks that pass and fail, as wide as their cards."""
     from textwrap import wrap  # not above: findings do without it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
@@ -381,7 +402,7 @@ def as_text(rule: Rule, width: int) -> str:
 
 
 def _example(title: str, example: Example, width: int) -> Iterator[str]:
-    """A deck as it stands in its file, with what it includes and what it is checked against."""
+    """Return the lines of an example deck, of its included files, and of the files that it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.continued(

@@ -1,6 +1,6 @@
-"""One table: which result can be written in which form.
+"""List which result can be written in which form, and write it.
 
-A result is a module of this folder, imported when it is written: ``--help`` lists the forms without it.
+Each result has a module in this folder, which is imported only to write it: ``--help`` lists the forms without it.
 """
 
 from __future__ import annotations
@@ -14,27 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-# Columns of text that are read at a glance; a terminal may have fewer.
+# widest text that is easy to read [columns]; a terminal may have fewer
 WIDEST: Final = 100
 
-
-class Shown(NamedTuple):
-    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
-
-    ``every``: all windows of a plan, not only the supported ones.  ``verbose``: all that is known; tables and text are
-    no wider than ``width`` columns.
-    """
-
-    command: Sequence[str] = ()
-    limit: int = 10
-    every: bool = False
-    lines: Sequence[str] = ()
-    verbose: bool = False
-    width: int = WIDEST
-
-
 PLAIN: Final = ("table", "json", "csv", "markdown")
-# The first form of each is the default.
+# forms of each result; the first is the default
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "suggestion": (*PLAIN, "ndjson", "value"),
     "plan": (*PLAIN, "ndjson", "value"),
@@ -50,7 +34,22 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 }
 
 
-def write(result: str, form: str, answer: Any, shown: Shown) -> str:
+class Shown(NamedTuple):
+    """What to show besides the answer: the command, the number of rows, lines already written.
+
+    With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
+    and text are no wider than ``width`` columns.
+    """
+
+    command: Sequence[str] = ()
+    limit: int = 10
+    every: bool = False
+    lines: Sequence[str] = ()
+    verbose: bool = False
+    width: int = WIDEST
+
+
+def write(result: str, form: str, answer: Any, display: Shown) -> str:
     """Write an answer in one of the forms of its result: by ``as_FORM`` of its module, JSON by its ``DOCUMENT``.
 
     Examples
@@ -58,13 +57,13 @@ def write(result: str, form: str, answer: Any, shown: Shown) -> str:
     >>> list(FORMATS["suggestion"])
     ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
-    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, shown)
+    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, display)
 
 
-def written_by(report: Any, form: str, answer: Any, shown: Shown) -> str:
-    """Write an answer in a form of the module of its result."""
-    if own := getattr(report, f"as_{form}", None):
-        return str(own(answer, shown))
+def written_by(report: Any, form: str, answer: Any, display: Shown) -> str:
+    """Write an answer in a form that the module ``report`` provides."""
+    if write_form := getattr(report, f"as_{form}", None):
+        return str(write_form(answer, display))
     return str(
-        report.DOCUMENT.as_json(answer, shown.command, 2 if form == "json" else None)
+        report.DOCUMENT.as_json(answer, display.command, 2 if form == "json" else None)
     )

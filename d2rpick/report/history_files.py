@@ -1,4 +1,4 @@
-"""Histories as files: any columns; and which each format has of the oscillator's motion and of a run of the box."""
+"""Write histories of the sample models as files: as tables of any columns, or as databases of a solver."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 Table = dict[str, "Samples"]
 
-TABLES: Final = ("csv", "hdf5")  # formats that hold any columns under any names
+TABLES: Final = ("csv", "hdf5")  # formats that hold columns with any names
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 
 def format_of(name: str | None, formats: Sequence[str]) -> str:
-    """Tell the format that a file's name asks for; csv without a name, FormatError when it asks for none.
+    """Return the format for a file name: csv without a name; raise FormatError if the name does not determine one.
 
-    The suffix decides; a name without one of these suffixes is that of a solver's database, or holds it.
+    The suffix decides.  A name without a known suffix must be or contain the name of a solver's database.
 
     Examples
     --------
@@ -39,12 +39,12 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
         return "csv"
     path = PurePath(name.lower())
     by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
-    asked = _SUFFIXES.get(path.suffix[1:], by_name)
-    if asked not in formats:
+    form = _SUFFIXES.get(path.suffix[1:], by_name)
+    if form not in formats:
         raise FormatError(
             f"{make_printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}"
         )
-    return str(asked)
+    return str(form)
 
 
 def write_table(form: str, columns: Table) -> bytes:
@@ -53,7 +53,7 @@ def write_table(form: str, columns: Table) -> bytes:
 
 
 def _oscillator_table(motion: Trajectory) -> Table:
-    """Columns time z y vz vy internal_energy kinetic_energy."""
+    """Return the columns time z y vz vy internal_energy kinetic_energy."""
     state = motion.state
     return {
         "time": motion.time, "z": state.z, "y": state.y, "vz": state.vz, "vy": state.vy,
@@ -62,9 +62,10 @@ def _oscillator_table(motion: Trajectory) -> Table:
 
 
 def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
-    """Energies of the oscillator; its time step is the output interval."""
+    """Return a glstat with the energies of the oscillator; its time step is the output interval."""
     step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
-    internal, kinetic = motion.internal_energy, motion.kinetic_energy
+    internal = motion.internal_energy
+    kinetic = motion.kinetic_energy
     columns = {
         "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
         "internal energy": internal, "total energy": kinetic + internal,
@@ -73,8 +74,10 @@ def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
 
 
 def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
-    """Parts frame, suspended mass and spring with their energies and momenta."""
-    frame, suspended, state = oscillator.frame_mass, oscillator.mass, motion.state
+    """Return a matsum of the parts frame, suspended mass and spring with their energies and momenta."""
+    frame = oscillator.frame_mass
+    suspended = oscillator.mass
+    state = motion.state
     zero = 0.0 * motion.time
     parts = (
         matsum.PartColumns(
@@ -93,11 +96,11 @@ def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
 
 
 def _box_table(record: Record) -> Table:
-    """Columns of the box, time to kinetic_energy; the momentum of box and step together; the balance of the model.
+    """Return the columns of the box, the momentum of box and step together, and the energy balance of the model.
 
-    Internal and kinetic energy are those of the box, so that it can be switched by them; those of the step, the terms
-    of the contacts and walls (see `Record`) and the work done stand beside them, and the total is the sum of all but
-    the work.
+    Internal and kinetic energy are those of the box, so that switch times of the box can be chosen from them.  Separate
+    columns hold the energies of the step, the terms of contacts and walls (see `Record`) and the work done.  The total
+    is the sum of all but the work.
     """
     energies = record.internal_energy.T, record.kinetic_energy.T
     flying = record.momentum.sum(axis=1)
@@ -115,15 +118,13 @@ def _box_table(record: Record) -> Table:
 
 
 def _box_glstat(record: Record) -> bytes:
-    """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity.
+    """Return a glstat of box and step: energies, work exchanged with sled, curb and ground, and the mean velocity.
 
-    The walls of the model are floor, curb and ground, see `Record`; the friction on them is energy of the contacts and
-    is listed once more by itself, as Radioss does, since health asks for the energy of the contacts without friction.
+    The rigid walls of the model are floor, curb and ground, see `Record`.  Friction on them is part of the contact
+    energy and is also listed separately, like in Radioss, since health needs the contact energy without friction.
     """
-    internal, kinetic = (
-        record.internal_energy.sum(axis=1),
-        record.kinetic_energy.sum(axis=1),
-    )
+    internal = record.internal_energy.sum(axis=1)
+    kinetic = record.kinetic_energy.sum(axis=1)
     zero = 0 * record.time
     speed = record.momentum.sum(axis=1) / record.mass
     return glstat.write(
@@ -140,17 +141,19 @@ def _box_glstat(record: Record) -> bytes:
 
 
 def _box_matsum(record: Record) -> bytes:
-    """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
+    """Return a matsum of box and step; while the box is rigid, its values are those of the rigid-body motion."""
     from d2rpick.models.box_run import (
         PARTS,
-    )  # not above: columns are written without the model
+    )  # imported here since tables are written without the model
 
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
         strict=True,
     )  # fmt: skip
     return matsum.write(
-        "rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns)
+        "rollover box",
+        record.time,
+        tuple(matsum.PartColumns(*part_columns) for part_columns in columns),
     )
 
 
@@ -159,7 +162,7 @@ def _writers(
     glstat: Callable[..., bytes],
     matsum: Callable[..., bytes],
 ) -> Mapping[str, Callable[..., bytes]]:
-    """Give how to write a run in each format, by what makes its columns or writes it."""
+    """Return the writer of each format, from functions that make a table, a glstat or a matsum."""
     tables = {
         form: lambda run, *_, form=form: write_table(form, table(run))
         for form in TABLES

@@ -1,6 +1,6 @@
-"""Fields that several results share: of a candidate and its measures, the history, its health, the situation at td.
+"""Define the fields that several results share: of a candidate, the history, its health, and the situation at td.
 
-Tests hold the schemas in ``d2rpick/schemas`` against these tables: ``python -m tests.generated_schemas`` writes them.
+Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
 
 from __future__ import annotations
@@ -39,31 +39,6 @@ WINDOW: Final = row(
     Field("share", "number", "of the flight up to td"),
 )
 
-
-class Read(Protocol):
-    """A file that was read."""
-
-    @property
-    def name(self) -> str:
-        """Name that the user gave it."""
-
-    def sha256(self) -> str:
-        """SHA-256 of what was read."""
-
-
-def _once(files: Iterable[Read]) -> dict[str, Read]:
-    """Files by their names: one that is included twice once."""
-    return {file.name: file for file in files}
-
-
-FILES: Final = (
-    Field("source", "texts", get=lambda read: _once(read.files)),
-    Field(
-        "sha256",
-        "texts",
-        get=lambda read: [file.sha256() for file in _once(read.files).values()],
-    ),
-)
 WEIGHTS: Final = (
     Field("source", "text", "where they come from, in words"),
     Field("file", "text?", "the file of --weights; null where they were not read from one",
@@ -84,33 +59,6 @@ HISTORY: Final = row(
     Field("notes", "texts"),
     name="history",
 )  # fmt: skip
-
-
-def _asked(answer: Any) -> Plan | Situation:
-    """Give what knows the history of an answer, and the settings."""
-    known: Plan | Situation = (
-        answer if hasattr(answer, "settings") else answer.situation
-    )
-    return known
-
-
-def _weights(answer: Any) -> Weights | None:
-    used = _asked(answer).settings.by_deck
-    return used.weights if used else None
-
-
-# What the JSON of an answer about a history begins with.
-FRAME: Final = (
-    WARNINGS,
-    Field("history", HISTORY, get=lambda answer: _asked(answer).history),
-    Field("deck", maybe(row(*FILES, closed=True)),
-          "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
-          "nothing of it is used",
-          lambda answer: _asked(answer).settings.by_deck),
-    Field("weights", maybe(row(*WEIGHTS, closed=True)),
-          "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
-)  # fmt: skip
-
 _SOURCE: Final = one_of(
     "given",
     "momentum",
@@ -136,29 +84,6 @@ FLIGHT: Final = row(
     ),
     name="flight",
 )
-
-
-def _oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Give the oscillator that was fitted, or None if none was looked for."""
-    fit = situation.evidence.fit
-    if fit is None:
-        return None
-    numbers = ("omega", "alpha", "energy_plastic", "preload")
-    return {
-        **{name: getattr(fit.mode, name) if fit.mode else None for name in numbers},
-        "misfit": fit.misfit,
-        "source": "given" if situation.settings.oscillator else "identified",
-        "describes_record": fit.describes_record,
-        "reason": fit.reason,
-    }
-
-
-def _modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Give the modes that the choice rests on, or None if it does not rest on the lines of the energy."""
-    modal = situation.vibration.modal
-    return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
-
-
 OSCILLATOR: Final = row(
     Field("omega", "number?"), Field("alpha", "number?"), Field("energy_plastic", "number?"),
     Field("preload", "number?", "square root of energy"),
@@ -168,24 +93,7 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# What is known at td; of a situation.
-MECHANICS: Final = row(
-    Field("energy_td", "number"),
-    Field("kinetic_share", maybe(SHARE)),
-    Field("kinetic_share_estimated", "flag",
-          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
-          lambda now: now.vibration.estimated is not None),
-    Field("basis", BASIS),
-    Field("flight", FLIGHT, "window of free flight"),
-    Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
-    Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
-    Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
-          "parts whose deformation has no sign; null where energies of single parts are not known",
-          lambda now: now.evidence.parts and now.evidence.parts.unsigned),
-)  # fmt: skip
-
-# Where a rigid body will be at td, as far as single parts tell.
+# position of the rigid body at td, estimated from single parts
 _POSITION: Final = (
     Field("position_error", "size?",
           "how far a rigid body will be out of place at td since a part is frozen elsewhere, the largest of several "
@@ -200,7 +108,7 @@ _POSITION: Final = (
           "whether the body may be further off: inner motion that is slower than the flight, or that bends the body, "
           "passes for its rotation; null where nothing is known", later=True),
 )  # fmt: skip
-# What is said of a candidate beside its parts; in CSV the notes come last.  A new measure stands at the end.
+# Values of a candidate besides its parts; in CSV the notes come last. Add a new measure at the end.
 CANDIDATE: Final = row(
     Field("rank", kind_of("integer", minimum=1)),
     Field("tr", "number"),
@@ -240,7 +148,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
+# Values that explain tr but do not measure the pair; and the measures that ``verify`` shows first, in its order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
@@ -267,14 +175,13 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys that came later than the schemas of ``suggest`` and ``verify``, but not than others.
+# Keys added after the first schemas of ``suggest`` and ``verify``, but present from the start in the others.
 LATER: Final = (
     "run_time_share",
     "same_swing",
     "residual_high",
     *(field.key for field in _POSITION),
 )
-
 MATCHES: Final = Field("parts", many(row(
     Field("name", "text"),
     Field("sign_match", "flag?"),
@@ -284,9 +191,7 @@ MATCHES: Final = Field("parts", many(row(
 )))  # fmt: skip
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
-
-
-# What is said of a pair, by the decision on it.
+# values of the decision on a pair
 DECIDED: Final = row(
     Field("verdict", VERDICT, "what to do with the pair, by its grade"),
     Field("verdict_reason", "text", "why, in words", lambda decision: decision.reason),
@@ -296,7 +201,7 @@ DECIDED: Final = row(
     Field("worst_residual", kind_of("number", minimum=0),
           "the largest residual that the record allows; 2 if nothing is known of it"),
 )  # fmt: skip
-# The same of what has a decision, or None.
+# the same values for a result whose decision may be None
 DECISION: Final = tuple(
     field._replace(kind=maybe(field.kind), later=True)
     for field in DECIDED.of_part(lambda answer: answer.decision)
@@ -358,3 +263,94 @@ HEALTH: Final = Field("health", maybe(row(
     name="health", later=("part_hourglass_share", "part", "until"),
 )), "of the reference run up to td; shares of the peak internal energy of the model, null for what the files do not "
     "have")  # fmt: skip
+
+
+class Read(Protocol):
+    """An input file."""
+
+    @property
+    def name(self) -> str:
+        """Name as the user gave it."""
+
+    def sha256(self) -> str:
+        """Return the SHA-256 digest of the content."""
+
+
+def _once(files: Iterable[Read]) -> dict[str, Read]:
+    """Return the files by name; a file that is included twice occurs once."""
+    return {file.name: file for file in files}
+
+
+FILES: Final = (
+    Field("source", "texts", get=lambda answer: _once(answer.files)),
+    Field(
+        "sha256",
+        "texts",
+        get=lambda answer: [file.sha256() for file in _once(answer.files).values()],
+    ),
+)
+
+
+def _asked(answer: Any) -> Plan | Situation:
+    """Return the plan or situation of an answer, which holds the history and the settings."""
+    holder: Plan | Situation = (
+        answer if hasattr(answer, "settings") else answer.situation
+    )
+    return holder
+
+
+def _weights(answer: Any) -> Weights | None:
+    used = _asked(answer).settings.by_deck
+    return used.weights if used else None
+
+
+# fields with which the JSON of every answer about a history begins
+FRAME: Final = (
+    WARNINGS,
+    Field("history", HISTORY, get=lambda answer: _asked(answer).history),
+    Field("deck", maybe(row(*FILES, closed=True)),
+          "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
+          "nothing of it is used",
+          lambda answer: _asked(answer).settings.by_deck),
+    Field("weights", maybe(row(*WEIGHTS, closed=True)),
+          "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
+)  # fmt: skip
+
+
+def _oscillator(situation: Situation) -> dict[str, Any] | None:
+    """Return the oscillator that was fitted, or None if none was searched for."""
+    fit = situation.evidence.fit
+    if fit is None:
+        return None
+    numbers = ("omega", "alpha", "energy_plastic", "preload")
+    return {
+        **{name: getattr(fit.mode, name) if fit.mode else None for name in numbers},
+        "misfit": fit.misfit,
+        "source": "given" if situation.settings.oscillator else "identified",
+        "describes_record": fit.describes_record,
+        "reason": fit.reason,
+    }
+
+
+def _modes(situation: Situation) -> list[dict[str, float]] | None:
+    """Return the modes on which the choice rests, or None if it does not rest on modes."""
+    modal = situation.vibration.modal
+    return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
+
+
+# values of a situation at td
+MECHANICS: Final = row(
+    Field("energy_td", "number"),
+    Field("kinetic_share", maybe(SHARE)),
+    Field("kinetic_share_estimated", "flag",
+          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
+          lambda now: now.vibration.estimated is not None),
+    Field("basis", BASIS),
+    Field("flight", FLIGHT, "window of free flight"),
+    Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
+    Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
+          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
+    Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
+          "parts whose deformation has no sign; null where energies of single parts are not known",
+          lambda now: now.evidence.parts and now.evidence.parts.unsigned),
+)  # fmt: skip

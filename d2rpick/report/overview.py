@@ -1,4 +1,4 @@
-"""The answer of ``info`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``info`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _EVIDENCE: Final = one_of(
     "energy",
 )
 _FLIGHT: Final = row(
-    Field("start", "number", get=lambda seen: seen[1].start),
+    Field("start", "number", get=lambda flight: flight[1].start),
     Field("end", "number?", "null where the record ends in flight",
-          lambda seen: seen[1].end if seen[1].end_seen else None),
+          lambda flight: flight[1].end if flight[1].end_seen else None),
     Field("parts", maybe(many(keys.PART)), "that fly together, null for the whole model",
-          lambda seen: seen[1].parts or None),
-    Field("source", _EVIDENCE, get=lambda seen: seen[0]),
+          lambda flight: flight[1].parts or None),
+    Field("source", _EVIDENCE, get=lambda flight: flight[0]),
 )  # fmt: skip
 _TIMES: Final = row(
     Field("start", "number", get=lambda times: times[0]),
@@ -44,7 +44,7 @@ _FORCE: Final = row(
     Field("acts", many(_TIMES), "times in which it acts, to one output interval"),
 )
 _PART: Final = row(
-    *keys.PART.of_part(lambda one: one.part),
+    *keys.PART.of_part(lambda overview_part: overview_part.part),
     Field("energy_max", "number?", "null where not written in every state"),
 )
 _SAMPLING: Final = row(
@@ -77,9 +77,9 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("verdict_reason", "text", "why, in words", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are written", later=True),
 ))  # fmt: skip
-_MOST_TIMES: Final = 4  # that are named of a contact which acts at many
+_MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# Keys of the JSON output with a single value.
+# keys of the JSON output with a single value
 _PLAIN = (
     "format",
     "version",
@@ -92,53 +92,58 @@ _PLAIN = (
 )
 
 
-def as_table(overview: Overview, shown: Shown) -> str:
-    """Whether the run can be used, why, and what to type next; then a line per fact, and the parts."""
+def as_table(overview: Overview, display: Shown) -> str:
+    """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.in_line(verdict(overview))
     if overview.health and (health := _health(overview)):
-        lines += ["", tables.as_text(head(overview.health), health, shown.width)]
-    known = [(name, value) for name, value in facts(overview) if value is not None]
-    lines += ["", *tables.in_line(known)]
+        lines += ["", tables.as_text(head(overview.health), health, display.width)]
+    known_facts = [
+        (name, value) for name, value in facts(overview) if value is not None
+    ]
+    lines += ["", *tables.in_line(known_facts)]
     if overview.parts:
-        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), display.width)]
     return "\n".join(
         [*lines, *(f"note: {make_printable(note)}" for note in overview.notes)]
     )
 
 
 def verdict(overview: Overview) -> list[tuple[str, str]]:
-    """Whether the run can be used, why, its flights, and what to type next; a name and a sentence each."""
+    """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
     lines = [("this run", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         cure = None if overview.unjudged else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
     flying = any(flight.parts for _, flight in overview.flights)
-    which = (
-        ["--part", "flying"] if flying else ["--part", "all"] if overview.parts else []
-    )
+    if flying:
+        which = ["--part", "flying"]
+    else:
+        which = ["--part", "all"] if overview.parts else []
     command = ["d2rpick", "plan", *which, *tables.positional(overview.source)]
     return [*lines, ("next", tables.shell_line(command))]
 
 
 def as_markdown(overview: Overview, _: Shown) -> str:
-    """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
-    said = tables.listed(verdict(overview))
-    known = [(name, value) for name, value in facts(overview) if value is not None]
-    told = tables.as_markdown(("what", "value"), known)
-    parts = (
-        [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
-    )
+    """Return the facts and the parts as Markdown tables, with the notes below."""
+    verdict_lines = tables.listed(verdict(overview))
+    known_facts = [
+        (name, value) for name, value in facts(overview) if value is not None
+    ]
+    fact_table = tables.as_markdown(("what", "value"), known_facts)
+    if overview.parts:
+        parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))]
+    else:
+        parts = []
     listed = _health(overview)
-    health = (
-        [tables.as_markdown(head(overview.health), listed)]
-        if overview.health and listed
-        else []
-    )
+    if overview.health and listed:
+        health = [tables.as_markdown(head(overview.health), listed)]
+    else:
+        health = []
     return "\n\n".join(
         [
-            *said,
-            told,
+            *verdict_lines,
+            fact_table,
             *parts,
             *health,
             *(f"* {tables.in_markdown(note)}" for note in overview.notes),
@@ -147,7 +152,7 @@ def as_markdown(overview: Overview, _: Shown) -> str:
 
 
 def as_csv(overview: Overview, _: Shown) -> str:
-    """One row, a column for each key of the JSON output, what is a list there with semicolons."""
+    """Return one row of CSV with a column for each key of the JSON output; lists are joined by semicolons."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {
         "source": "; ".join(overview.source),
@@ -158,11 +163,14 @@ def as_csv(overview: Overview, _: Shown) -> str:
         },
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(
-            f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts
+            f"{overview_part.part.id} {overview_part.part.title}".rstrip()
+            for overview_part in overview.parts
         ),
         "flights": "; ".join(_flight(*flight) for flight in overview.flights),
         "should_write": overview.should_write,
-        "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
+        "health": "; ".join(
+            f"{measure_name} {value}" for measure_name, value, *_ in _health(overview)
+        ),
         "notes": "; ".join(overview.notes),
         "verdict": overview.verdict,
         "verdict_reason": overview.reason,
@@ -172,7 +180,7 @@ def as_csv(overview: Overview, _: Shown) -> str:
 
 
 def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
-    """Name each fact, and give it."""
+    """Return each fact as a pair of its name and value."""
     sampling = overview.sampling
     rows: list[tuple[str, tables.Cell]] = [
         ("source", ", ".join(overview.source)),
@@ -196,23 +204,31 @@ def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
 
 
 def _health(overview: Overview) -> list[list[tables.Cell]]:
-    """Measures that the files hold, with what practice allows."""
+    """Return the health measures that the files contain, with the limits of good practice."""
     if overview.health is None:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}
     return [
-        [one.what, one.value, one.limit, verdicts[one.good]]
-        for one in measures_of(overview.health)
-        if one.value
+        [
+            health_measure.what,
+            health_measure.value,
+            health_measure.limit,
+            verdicts[health_measure.good],
+        ]
+        for health_measure in measures_of(overview.health)
+        if health_measure.value
     ]
 
 
 def _parts(overview: Overview) -> list[list[tables.Cell]]:
-    return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
+    return [
+        [overview_part.part.id, overview_part.part.title, overview_part.energy_max]
+        for overview_part in overview.parts
+    ]
 
 
 def _force(force: ForceOverview) -> str:
-    """Name a contact and the times in which it acts."""
+    """Return the name of a contact and the times in which it acts."""
     times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
     when = f"acts from {list_names(times, most=_MOST_TIMES)}" if times else "never acts"
     return f"{force.name} {when}"
@@ -220,10 +236,9 @@ def _force(force: ForceOverview) -> str:
 
 def _flight(source: str, flight: FreeFlight) -> str:
     names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
-    who = ", ".join(names) or "the whole model"
-    end = (
-        f"to {flight.end:.6g}"
-        if flight.end_seen
-        else f"to the end of the record, {flight.end:.6g}"
-    )
-    return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"
+    flying = ", ".join(names) or "the whole model"
+    if flight.end_seen:
+        end = f"to {flight.end:.6g}"
+    else:
+        end = f"to the end of the record, {flight.end:.6g}"
+    return f"{flying} from {flight.start:.6g} {end} ({spoken(source)})"

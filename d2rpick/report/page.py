@@ -1,6 +1,6 @@
-"""HTML pages: elements from nested calls, in which all that is not HTML already is escaped, and what pages share.
+"""Build HTML pages: elements from nested calls, which escape all text that is not HTML, and sections that pages share.
 
-They share cards of a pair, what was read, and how to repeat it.
+Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
 
 from __future__ import annotations
@@ -33,20 +33,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import Run
     from d2rpick.report.keys import Read
 
-# More columns than this do not fit on a narrow screen.
+# tables with more columns do not fit on a narrow screen
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# Characters that no page may hold, and those that turn the text around them.
+# control characters that no page may contain, and those that change the direction of the text around them
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
-_MOST_FILES: Final = 20  # of a deck that are named
-# Lines of a page to be filled in by hand.
+_MOST_FILES: Final = 20  # largest number of files of a deck that are named
+# lines of a page to be filled in by hand
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
+
+# CSS class of the card and badge of each verdict
+CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 class Markup(str):
@@ -56,7 +59,7 @@ class Markup(str):
 
 
 def tag(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Give an element; attributes that are Python's words end in an underscore, blanks in names are written so too.
+    """Return an element; attributes like Python keywords end in an underscore, and ``_`` stands for ``-`` in names.
 
     Examples
     --------
@@ -65,19 +68,19 @@ def tag(name: str, /, *children: str, **attributes: str) -> Markup:
     >>> tag("meta", charset="utf-8")
     '<meta charset="utf-8">'
     """
-    given = "".join(
+    written_attributes = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_escape(text)}"'
         for key, text in attributes.items()
     )
     return Markup(
-        f"<{name}{given}>"
+        f"<{name}{written_attributes}>"
         if name in _VOID
-        else f"<{name}{given}>{join(children)}</{name}>"
+        else f"<{name}{written_attributes}>{join(children)}</{name}>"
     )
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
-    """Put elements and texts one after the other."""
+    """Join elements and texts into one."""
     return Markup(
         between.join(
             child if isinstance(child, Markup) else _escape(child, quote=False)
@@ -93,9 +96,9 @@ def document(
     styles: Sequence[Markup] = (),
     scripts: Sequence[Markup] = (),
 ) -> str:
-    """Give a whole page that needs nothing but itself, with lines ``signed`` to be filled in by hand.
+    """Return a whole page that needs no other file, with lines ``signed`` to be filled in by hand.
 
-    ``styles`` and ``scripts`` are what it needs beside the style of every page; nothing else takes effect on it.
+    ``styles`` and ``scripts`` are needed besides the style of every page; the policy of the page blocks all others.
     """
     sheets = (resource("style.css"), *styles)
     head = tag(
@@ -110,7 +113,7 @@ def document(
         tag("title", title),
         *(tag("style", sheet) for sheet in sheets),
     )
-    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
+    # at the top, next to the times: after a long card it could be printed on a sheet of its own
     sign = tag("p", *(tag("span", line) for line in signed), class_="sign")
     header = tag(
         "header",
@@ -128,9 +131,10 @@ def document(
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """Nothing is ever fetched, and only what the page itself is made of runs, whatever the files that were read hold.
+    """Return the content security policy: nothing is fetched, and only the page's own scripts and styles are used.
 
-    Drawings have styles of their own as attributes.  Older browsers know one rule for all styles only.
+    This holds whatever the input files contain.  Drawings have their styles as attributes.  Older browsers know only
+    one rule for all styles.
     """
     allowed = {"style-src-elem": styles, "script-src": scripts}
     rules = [
@@ -148,18 +152,18 @@ def _digest(text: str) -> str:
 
 
 def section(title: str, *content: str) -> Markup:
-    """Give a section under its title."""
+    """Return a section with a title."""
     return tag("section", tag("h2", title), *content)
 
 
 def drawing(caption: str, svg: str) -> Markup:
-    """Show an SVG element with its caption."""
+    """Return an SVG element with its caption."""
     drawn = tag("div", Markup(svg), role="img", aria_label=caption)
     return tag("figure", drawn, tag("figcaption", caption), class_="drawn")
 
 
 def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """List reasons and warnings; nothing where there are none."""
+    """Return a list of reasons and warnings, nothing if there are none."""
     lines = [tag("li", reason) for reason in reasons]
     lines += [
         tag("li", tag("b", caution.code), f": {caution.message}")
@@ -169,7 +173,7 @@ def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
 
 
 def resource(name: str) -> Markup:
-    """Read a text that is part of the package."""
+    """Read a text file of the package."""
     return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))
 
 
@@ -179,7 +183,7 @@ def table(
     rows: Iterable[Sequence[Cell]],
     marked: int | None = None,
 ) -> Markup:
-    """Give a table in a box that scrolls sideways where it is too wide; ``title`` is what a keyboard reaches it by."""
+    """Return a table in a box that scrolls sideways if needed; keyboard users reach it by its ``title``."""
     box = tag(
         "div",
         grid(head, rows, marked),
@@ -194,26 +198,28 @@ def table(
 def grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Give a table alone; the row ``marked`` stands out.
+    """Return a bare table in which the row ``marked`` is highlighted.
 
-    Columns of numbers, and of what is not known, are set to the right.  Lines break at blanks alone, never within a
-    number.
+    Columns of numbers are aligned right.  Lines break only at blanks, never within a number.
     """
     body = [list(row) for row in rows]
-    right = [
+    is_number = [
         name == "±"
         or all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
         for i, name in enumerate(head)
     ]
-    classes = [{"class_": "number"} if one else {} for one in right]
+    classes = [{"class_": "number"} if is_right else {} for is_right in is_number]
     top = (
-        tag("th", name, scope="col", **own)
-        for name, own in zip(head, classes, strict=True)
+        tag("th", name, scope="col", **cell_class)
+        for name, cell_class in zip(head, classes, strict=True)
     )
     lines = [
         tag(
             "tr",
-            *(_cell(cell, own) for cell, own in zip(row, classes, strict=True)),
+            *(
+                _cell(cell, cell_class)
+                for cell, cell_class in zip(row, classes, strict=True)
+            ),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
@@ -221,13 +227,15 @@ def grid(
     return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
 
 
-def _cell(cell: Cell, own: Mapping[str, str]) -> Markup:
+def _cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
     text = cell if isinstance(cell, Markup) else short(cell)
-    return tag("td", text, **(own or ({"class_": "words"} if " " in text else {})))
+    return tag(
+        "td", text, **(attributes or ({"class_": "words"} if " " in text else {}))
+    )
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Give a list of names, each with what it stands for; nothing where there are none."""
+    """Return a list of names and descriptions, nothing if there are none."""
     listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
     return tag("dl", *listed) if listed else Markup()
 
@@ -237,9 +245,9 @@ def _escape(text: str, *, quote: bool = True) -> str:
 
 
 class Explorer(NamedTuple):
-    """What can be explored: the trade-offs of one or several flights.
+    """The trade-offs of one or several flights, to be explored on a page.
 
-    ``command`` is the command line that asks for the pair of a td, in front of td and behind it.
+    ``command`` is the command line that asks for the pair at a td, as its words before and after the value of td.
     """
 
     trade_offs: tuple[TradeOff, ...]
@@ -249,9 +257,9 @@ class Explorer(NamedTuple):
 class PageContext(NamedTuple):
     """What a page shows besides the answer.
 
-    ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
-    options of ``card`` that judge by the same history.   ``card`` is the
-    solver input of a pair that is recommended or verified; ``explorer`` makes the page live.
+    ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
+    options of ``card`` that select the same history.  ``card`` is the solver input of a recommended or verified pair;
+    ``explorer`` makes the page interactive.
     """
 
     run: Run
@@ -263,12 +271,12 @@ class PageContext(NamedTuple):
 
 
 def front(cards: Sequence[Markup], *below: Markup) -> Markup:
-    """Give the first section: cards of what was chosen or judged beside each other, and what to know of them."""
+    """Return the first section: cards of the chosen or judged pairs next to each other, and remarks below."""
     return tag("section", tag("div", *cards, class_="choice"), *below)
 
 
 def refused(reason: str) -> Markup:
-    """Give the card of an answer that recommends nothing."""
+    """Return the card of an answer that recommends nothing."""
     return tag(
         "div",
         tag("h2", tag("span", "nothing to use", class_="badge refused")),
@@ -278,7 +286,7 @@ def refused(reason: str) -> Markup:
 
 
 def title_of(run: Run) -> str:
-    """Title that the solver wrote, else the name of the file."""
+    """Return the title that the solver wrote, or else the name of the file."""
     return (
         next((database.title for database in run.databases if database.title), "")
         or run.name
@@ -286,11 +294,15 @@ def title_of(run: Run) -> str:
 
 
 def pair(
-    title: str, times: tuple[float, float], told: Markup, history: History, class_: str
+    title: str,
+    times: tuple[float, float],
+    description: Markup,
+    history: History,
+    class_: str,
 ) -> Markup:
-    """Show (tr, td) large, what is ``told`` of them, and the times in full."""
+    """Return the card of (tr, td): the times large, a description of the pair, and the times with all digits."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    shown = (
+    large_times = (
         tag("span", tag("i", name), f"{short(time)}{unit}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
@@ -302,15 +314,11 @@ def pair(
     return tag(
         "div",
         tag("h2", title),
-        tag("div", *shown, class_="times"),
-        told,
+        tag("div", *large_times, class_="times"),
+        description,
         exact,
         class_=class_,
     )
-
-
-# The class of the card of a verdict, and of its badge.
-CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 def decided(
@@ -320,7 +328,7 @@ def decided(
     history: History,
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
-    """Show the verdict on a pair as a badge, its times large, and why; ``title`` stands before the verdict."""
+    """Return the card of a verdict: ``title``, the verdict as a badge, the times large, and the reason."""
     kind = CLASSES[decision.verdict]
     badge = tag("span", decision.verdict, class_=f"badge {kind}")
     _, *why = headed(decision, *times)
@@ -330,47 +338,48 @@ def decided(
 
 
 def digests(files: Iterable[Read]) -> list[tuple[str, str]]:
-    """Name each file with the SHA-256 of what was read of it."""
+    """Return each file with the SHA-256 digest of its content."""
     return [("SHA-256", f"{file.name}: {file.sha256()}") for file in files]
 
 
 def deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """The same of a deck, its main file first, and of a file of weights; of many includes the first are named."""
+    """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
     files = list({file.name: file for file in deck}.values())
-    more = len(files) - _MOST_FILES
-    left = (
-        [("SHA-256", f"of {more} more files of the deck: in the JSON result")]
-        if more > 0
-        else []
-    )
+    hidden_count = len(files) - _MOST_FILES
+    if hidden_count > 0:
+        hidden = [
+            ("SHA-256", f"of {hidden_count} more files of the deck: in the JSON result")
+        ]
+    else:
+        hidden = []
     return [
         *digests(files[:_MOST_FILES]),
-        *left,
+        *hidden,
         *digests([weights.file] if weights and weights.file else []),
     ]
 
 
 def digests_of(settings: Settings) -> list[tuple[str, str]]:
-    """The same of the deck that an answer rests on; nothing without one."""
+    """Return the digests of the deck that an answer uses, nothing without a deck."""
     used = settings.by_deck
     return deck_digests(used.files, used.weights) if used else []
 
 
 def parts(candidate: Candidate | None) -> Markup:
-    """Show what each part has of the mismatch at a pair; nothing where the parts are not known."""
+    """Return a table of each part's contribution to the mismatch of a pair, nothing if the parts are unknown."""
     if candidate is None or not candidate.parts:
         return Markup()
     sign = {True: "same", False: "opposite", None: "unknown"}
     listed = [
         (
-            one.name,
-            sign[one.sign_match],
-            "-" if one.share is None else f"{one.share:.0%}",
-            one.reason or "",
+            part.name,
+            sign[part.sign_match],
+            "-" if part.share is None else f"{part.share:.0%}",
+            part.reason or "",
         )
-        for one in candidate.parts
+        for part in candidate.parts
     ]
     title = "Parts at this pair"
     return section(
@@ -381,14 +390,14 @@ def parts(candidate: Candidate | None) -> Markup:
 def evidence(
     situation: Situation, health: Health | None, record: PageContext
 ) -> Iterator[Markup]:
-    """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
+    """Return the sections on the input, its health, the method, and how to repeat the answer."""
     yield section("What was read", _read(situation, record.run))
     yield section("Health of the reference run", *_health(health))
     yield from method(record.command, "-" in record.run.sources)
 
 
 def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
-    """Tell by what method an answer was found, and how to repeat it."""
+    """Return the sections on the method of an answer, and how to repeat it."""
     folded = tag(
         "details",
         tag("summary", tag("h2", "Method and limits")),
@@ -399,16 +408,17 @@ def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
 
 
 def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
-    """Give the arguments that repeat an answer as a line to paste."""
-    said = [tag("p", "with the same history on standard input:")] if stdin else []
+    """Return the arguments that repeat an answer as a command line to paste."""
+    stdin_note = [tag("p", "with the same history on standard input:")] if stdin else []
     return section(
-        "To repeat this", *said, tag("pre", shell_line(command), class_="wrap")
+        "To repeat this", *stdin_note, tag("pre", shell_line(command), class_="wrap")
     )
 
 
 def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
-    """Give the solver's card where it is known whom it switches, else the command that prints it."""
-    title, card = "Solver input", record.card
+    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+    title = "Solver input"
+    card = record.card
     assert card is not None
     if card.refusal:
         return section(
@@ -437,17 +447,18 @@ def _read(situation: Situation, run: Run) -> Markup:
         for database in run.databases
         if database.version
     ]
-    whole = (
-        "the files end after a complete state"
-        if situation.history.complete
-        else "only complete states were used"
-    )
+    if situation.history.complete:
+        whole = "the files end after a complete state"
+    else:
+        whole = "only complete states were used"
     listed += [("complete", whole)]
     return pairs(listed + [("note", note) for note in situation.history.notes])
 
 
 def _health(health: Health | None) -> Iterator[Markup]:
-    if health is None or not any(one.value for one in measures_of(health)):
+    if health is None or not any(
+        health_measure.value for health_measure in measures_of(health)
+    ):
         yield tag("p", "The files do not hold the energies this needs.")
         return
     verdicts = {
@@ -456,8 +467,13 @@ def _health(health: Health | None) -> Iterator[Markup]:
         None: "-",
     }
     listed = [
-        (one.what, one.value or "not written", one.limit, verdicts[one.good])
-        for one in measures_of(health)
+        (
+            health_measure.what,
+            health_measure.value or "not written",
+            health_measure.limit,
+            verdicts[health_measure.good],
+        )
+        for health_measure in measures_of(health)
     ]
     yield table(
         "Health of the reference run",

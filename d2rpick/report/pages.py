@@ -1,4 +1,4 @@
-"""Answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
+"""Write answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
 
 from __future__ import annotations
 
@@ -49,12 +49,16 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# More rows than one compares by eye; csv and json hold all.
+# Most rows of a table on a page: the eye cannot compare more, and CSV and JSON hold all.
 _MOST_ROWS = 20
+
+# Most rows of a table in a notebook.
+_FEW_ROWS: Final = 12
+_WIDEST: Final = "max-width: 40em"  # a picture without a width fills the screen
 
 
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
-    """Write a page about one run; where something can be explored it runs a script."""
+    """Write a page about one run, with its script if something can be explored."""
     needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
     return document(
         f"Switch times: {page.title_of(record.run)}",
@@ -64,21 +68,24 @@ def _of_run(record: page.PageContext, *sections: Markup) -> str:
     )
 
 
-def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
-    """Draw something of a kind under its caption, an SVG element whose ids begin with ``prefix``."""
+def _figures(
+    prefix: str, caption: str, kind: str, *arguments: Any, **how: Any
+) -> Markup:
+    """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
-    drawn = getattr(figures_choice, f"draw_{kind}")(*asked, **how)
+    drawn = getattr(figures_choice, f"draw_{kind}")(*arguments, **how)
     return page.drawing(caption, figures.svg_element(drawn, prefix))
 
 
 def _draw_suggestion(answer: Suggestion) -> Markup:
-    shown = (
-        "the choice, and a better pair" if answer.clearly_better else "and the choice"
-    )
+    if answer.clearly_better:
+        choice_text = "the choice, and a better pair"
+    else:
+        choice_text = "and the choice"
     return _figures(
         "choice-",
-        f"Internal energy with its level at td, {shown}",
+        f"Internal energy with its level at td, {choice_text}",
         "suggestion",
         answer,
         page=True,
@@ -86,15 +93,19 @@ def _draw_suggestion(answer: Suggestion) -> Markup:
 
 
 def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
-    """Give a table whose first column has a star for what is recommended: the row stands out instead."""
+    """Return a table without its first column; a star there marks the recommended row, which is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return table(title, *unstarred(head, rows), marked)
 
 
 def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
-    shown = (_choice(answer), explorer(record.explorer), _draw_suggestion(answer))
-    return _of_run(record, *shown, *_below_figures(answer, record))
+    first_sections = (
+        _choice(answer),
+        explorer(record.explorer),
+        _draw_suggestion(answer),
+    )
+    return _of_run(record, *first_sections, *_below_figures(answer, record))
 
 
 def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
@@ -106,16 +117,19 @@ def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Mar
 
 
 def _choice(answer: Suggestion) -> Markup:
-    """Give the section above the figures: the pairs, large, and what to know of them."""
-    cards, better = [_recommended(answer)], answer.clearly_better
+    """Return the section above the figures: the pairs in large type, and remarks."""
+    cards = [_recommended(answer)]
+    better = answer.clearly_better
     if better:
-        told, times = (
-            tag("p", suggestion.better_about(answer, better)),
-            (better.tr, better.td),
-        )
+        better_text = tag("p", suggestion.better_about(answer, better))
+        times = (better.tr, better.td)
         cards.append(
             page.pair(
-                "Better pair: another td", times, told, answer.situation.history, "card"
+                "Better pair: another td",
+                times,
+                better_text,
+                answer.situation.history,
+                "card",
             )
         )
     return page.front(
@@ -124,7 +138,8 @@ def _choice(answer: Suggestion) -> Markup:
 
 
 def _recommended(answer: Suggestion) -> Markup:
-    best, decision = answer.chosen, answer.decision
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
         return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
     times = best.tr, answer.td
@@ -138,8 +153,10 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
         yield tag("p", "None.")
         return
     yield _starred("Candidates", *known(*suggestion.table(answer, _MOST_ROWS)))
-    if (left := len(answer.candidates) - _MOST_ROWS) > 0:
-        yield tag("p", f"{left} more in the csv and json results.", class_="soft")
+    if (hidden_count := len(answer.candidates) - _MOST_ROWS) > 0:
+        yield tag(
+            "p", f"{hidden_count} more in the csv and json results.", class_="soft"
+        )
 
 
 def verdict_page(answer: Verdict, record: page.PageContext) -> str:
@@ -148,13 +165,16 @@ def verdict_page(answer: Verdict, record: page.PageContext) -> str:
 
 
 def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
-    situation, candidate = answer.situation, answer.candidate
+    situation = answer.situation
+    candidate = answer.candidate
     times = candidate.tr, situation.td
     card = page.decided(
         "", answer.decision, times, situation.history, verdict.facts(answer)
     )
-    remarked = [one for one in answer.reasons if one not in answer.decision.reason]
-    yield page.front([card], remarks(answer.cautions, remarked))
+    further_reasons = [
+        reason for reason in answer.reasons if reason not in answer.decision.reason
+    ]
+    yield page.front([card], remarks(answer.cautions, further_reasons))
     yield explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
     yield _figures("pair-", caption, "verdict", answer, page=True)
@@ -170,50 +190,56 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
         yield page.solver_input(times, record)
 
 
-def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
-    """Show what the finished switched run has of the reference."""
+def _switched(comparison: Comparison, files: Iterable[Source]) -> Markup:
+    """Return the comparison of the finished switched run with the reference."""
     title = "The switched run"
     listed = [
-        ("compared", f"from td to {found.end:.6g}"),
-        *verdict.deviations(found),
+        ("compared", f"from td to {comparison.end:.6g}"),
+        *verdict.deviations(comparison),
         *page.digests(files),
     ]
-    listed += [("note", note) for note in found.notes]
+    listed += [("note", note) for note in comparison.notes]
     return section(
         title,
-        table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)),
+        table(
+            title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(comparison)
+        ),
         pairs(listed),
     )
 
 
-def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
+def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
     """Write the page of ``explore``."""
-    further = [one for one in found.cautions if one not in found.suggestion.cautions]
+    further = [
+        caution
+        for caution in answer.cautions
+        if caution not in answer.suggestion.cautions
+    ]
     caption = "Error and rigid time of the best pair for each td"
-    best = trade_off.some_of(found, _MOST_ROWS)
-    left = tag(
+    best = trade_off.some_of(answer, _MOST_ROWS)
+    hidden = tag(
         "p",
-        f"{len(found.offers) - len(best)} more td in the csv and json results.",
+        f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
     return _of_run(
         record,
-        _choice(found.suggestion),
-        tag("section", tag("p", trade_off.answer(found)), remarks(further)),
+        _choice(answer.suggestion),
+        tag("section", tag("p", trade_off.answer(answer)), remarks(further)),
         explorer(record.explorer),
-        _draw_suggestion(found.suggestion),
-        _figures("explore-", caption, "trade_off", found, page=True),
+        _draw_suggestion(answer.suggestion),
+        _figures("explore-", caption, "trade_off", answer, page=True),
         section(
             "Pairs that nothing beats",
             _starred("Pairs", *known(*trade_off.table(best))),
-            left,
+            hidden,
         ),
-        *_below_figures(found.suggestion, record),
+        *_below_figures(answer.suggestion, record),
     )
 
 
 def plan_page(
-    found: Plan,
+    answer: Plan,
     run: Run,
     command: Sequence[str],
     card: str | None,
@@ -225,57 +251,57 @@ def plan_page(
     ----------
     found : Plan
     run : Run
-        What was read.
+        The run that was read.
     command : sequence of str
         Arguments that repeat the answer.
     card : str or None
-        Solver input for the next run, where it is known whom it switches.
+        Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
         The flights of the plan.
     """
-    cards = [_window(row, found) for row in found.supported]
+    cards = [_window(row, answer) for row in answer.supported]
     cards = cards or [page.refused("No window of this run can be recommended.")]
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    files = [*page.digests(run.files), *page.digests_of(found.settings)]
-    notes = [("note", note) for note in found.history.notes]
+    files = [*page.digests(run.files), *page.digests_of(answer.settings)]
+    notes = [("note", note) for note in answer.history.notes]
     return _of_run(
         page.PageContext(run, command, (), explorer=explored),
         page.front(
             cards,
-            remarks(found.cautions),
+            remarks(answer.cautions),
             pairs(
                 [
-                    ("plan", plan.sentence(found)),
-                    *plan.next_steps(found),
-                    *plan.outlook(found),
+                    ("plan", plan.sentence(answer)),
+                    *plan.next_steps(answer),
+                    *plan.outlook(answer),
                 ]
             ),
         ),
         explorer(explored),
-        _figures("plan-", caption, "plan", found, page=True),
+        _figures("plan-", caption, "plan", answer, page=True),
         section(
             "Flights",
-            table("Flights", *unstarred(*plan.table(found))),
-            pairs([*plan.verdicts(found), *plan.reasons(found)]),
+            table("Flights", *unstarred(*plan.table(answer))),
+            pairs([*plan.verdicts(answer), *plan.reasons(answer)]),
         ),
         section("For the solver's input", tag("pre", card, tabindex="0"))
         if card
         else Markup(),
         section(
             "What was read",
-            pairs([("history", what_was_read(found.history)), *files, *notes]),
+            pairs([("history", what_was_read(answer.history)), *files, *notes]),
         ),
         *page.method(command),
     )
 
 
-def _window(row: Planned, found: Plan) -> Markup:
+def _window(row: Planned, answer: Plan) -> Markup:
     assert row.window is not None
     assert row.candidate is not None
     assert row.decision is not None
     facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
     title = f"Flight {row.number}: "
-    return page.decided(title, row.decision, row.window, found.history, facts)
+    return page.decided(title, row.decision, row.window, answer.history, facts)
 
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
@@ -303,7 +329,8 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
 
 
 def _common(answer: Study) -> Markup:
-    tr, title = answer.common.tr, tag("h2", "One tr for all runs")
+    tr = answer.common.tr
+    title = tag("h2", "One tr for all runs")
     if tr is None:
         return tag(
             "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
@@ -315,11 +342,11 @@ def _common(answer: Study) -> Markup:
         "" if answer.td is None else f", td = {answer.td!r}"
     )
     verdict = VERDICTS[answer.grade or POOR]
-    (_, said), *_ = study.outcome(answer)
+    (_, outcome), *_ = study.outcome(answer)
     kind = page.CLASSES[verdict]
     lines = (
         tag("div", *times, class_="times"),
-        tag("p", said),
+        tag("p", outcome),
         tag("p", exact, class_="soft"),
     )
     badge = tag(
@@ -329,7 +356,7 @@ def _common(answer: Study) -> Markup:
 
 
 def _files(answer: Study) -> str:
-    """Name what was read, with size and time, in the order of the runs."""
+    """Return the input files with size and time, in the order of the runs."""
     from datetime import UTC, datetime
 
     files = dict.fromkeys(stamp for row in answer.runs for stamp in row.files)
@@ -339,36 +366,34 @@ def _files(answer: Study) -> str:
     )
 
 
-def parts_page(found: Parts, command: Sequence[str]) -> str:
+def parts_page(answer: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    sets = (
-        [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
-        if found.sets
-        else []
-    )
+    if answer.sets:
+        sets = [section("Sets", _starred("Sets", *parts.set_table(answer, parts.SETS)))]
+    else:
+        sets = []
     tables = {
-        name: unstarred(*parts.table(found, columns))
+        name: unstarred(*parts.table(answer, columns))
         for name, columns in parts.TABLES.items()
     }
-    weights = [("weights", found.weights.source)] if found.weights else []
-    deck = (
-        page.deck_digests(found.inventory.files, found.weights)
-        if found.inventory
-        else []
-    )
+    weights = [("weights", answer.weights.source)] if answer.weights else []
+    if answer.inventory:
+        deck = page.deck_digests(answer.inventory.files, answer.weights)
+    else:
+        deck = []
     return document(
-        f"Parts to switch: {page.title_of(found.files)}",
-        page.front([_set(found.recommended)], remarks(found.cautions)),
+        f"Parts to switch: {page.title_of(answer.files)}",
+        page.front([_set(answer.recommended)], remarks(answer.cautions)),
         *sets,
         *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What to know", pairs(parts.outlook(found))),
+        section("What to know", pairs(parts.outlook(answer))),
         section(
             "What was read",
             pairs(
                 [
-                    *parts.heading(found),
+                    *parts.heading(answer),
                     *weights,
-                    *page.digests(found.files.files),
+                    *page.digests(answer.files.files),
                     *deck,
                 ]
             ),
@@ -397,98 +422,101 @@ def _set(best: PartSet | None) -> Markup:
     )
 
 
-def drive_page(found: Driven, command: Sequence[str]) -> str:
+def drive_page(answer: Driven, command: Sequence[str]) -> str:
     """Write the page of ``drive``; ``command`` are the arguments that repeat the run."""
     from d2rpick.histories.names import Selection
 
-    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
-    switched = [one for one in found.windows if not one.reason]
+    history = answer.run.history(Selection(parts=tuple(map(str, answer.deck.parts))))
+    switched = [window for window in answer.windows if not window.reason]
     contacts = (
-        "none to the end" if one.contact is None else f"{one.contact:.6g}"
-        for one in switched
+        "none to the end" if window.contact is None else f"{window.contact:.6g}"
+        for window in switched
     )
     cards = [
         page.pair(
             f"Window {number}",
-            (one.tr, one.td),
+            (window.tr, window.td),
             pairs([("contact", text)]),
             history,
             "card chosen",
         )
-        for number, (one, text) in enumerate(
+        for number, (window, text) in enumerate(
             zip(switched, contacts, strict=True), start=1
         )
     ]
     cards = cards or [tag("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights, rigid = (
-        [(one.free, one.contact or one.td) for one in switched],
-        [(one.tr, one.td) for one in switched],
-    )
+    flights = [(window.free, window.contact or window.td) for window in switched]
+    rigid = [(window.tr, window.td) for window in switched]
     return document(
-        f"First run: {found.deck.name}",
-        page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
+        f"First run: {answer.deck.name}",
+        page.front(cards, remarks(answer.cautions), pairs(drive.outlook(answer))),
         _figures("driven-", caption, "run", history, flights, rigid),
-        section("Evidence", table("Windows", *drive.windows(found))),
-        section("Cost", table("Legs", *drive.legs(found))),
-        section("What was read", pairs(page.digests(found.run.files))),
+        section("Evidence", table("Windows", *drive.windows(answer))),
+        section("Cost", table("Legs", *drive.legs(answer))),
+        section("What was read", pairs(page.digests(answer.run.files))),
         page.repeated(command),
         signed=page.CHECKED,
     )
 
 
-# Of a table in a notebook.
-_FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
-# What is said, the shortest first, and the head and rows of the table.
+# For each kind of answer: sentences, the shortest first, and the head and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
         overview.verdict,
-        lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
+        lambda answer: (("", ""), _told(overview.facts(answer)[1:])),
     ),
-    "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
+    "suggestion": (
+        suggestion.verdict,
+        lambda answer: suggestion.table(answer, _FEW_ROWS),
+    ),
     "verdict": (
         verdict.verdict,
-        lambda one: (("measure", "value"), verdict.measured(one)),
+        lambda answer: (("measure", "value"), verdict.measured(answer)),
     ),
     "trade_off": (
-        lambda one: [("", trade_off.answer(one))],
-        lambda one: trade_off.table(trade_off.some_of(one, _FEW_ROWS)),
+        lambda answer: [("", trade_off.answer(answer))],
+        lambda answer: trade_off.table(trade_off.some_of(answer, _FEW_ROWS)),
     ),
-    "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
+    "plan": (
+        lambda answer: [("", plan.sentence(answer)), *plan.outlook(answer)],
+        plan.table,
+    ),
     "parts": (
         parts.verdict_on_set,
-        lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
+        lambda answer: parts.table(answer, next(iter(parts.TABLES.values()))),
     ),
     "study": (study.outcome, study.table),
 }
 
 
 def sentence(kind: str, answer: Any) -> str:
-    """Say an answer in short."""
+    """Return an answer in one sentence."""
     return ": ".join(filter(None, _LOOKS[kind][0](answer)[0]))
 
 
 def of_run(run: Run) -> str:
-    """Say what a run is in short: files, format, states, times, parts, as far as its files can be read."""
+    """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
-    told = [" + ".join(one.format for one in run.databases)]
+    facts = [" + ".join(database.format for database in run.databases)]
     if time is not None and time.size:
-        told += [
+        facts += [
             f"{time.size} states",
             f"{time[0]:.6g} to {time[-1]:.6g} {first.time_unit}".rstrip(),
         ]
-    told += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
-    return f"{', '.join(map(repr, run.sources))}: {', '.join(told)}"
+    facts += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
+    return f"{', '.join(map(repr, run.sources))}: {', '.join(facts)}"
 
 
 def glance(kind: str, answer: Any, figure: Figure | None) -> str:
-    """Show an answer, or the overview of a run, as HTML; columns in which nothing is known are left out."""
-    said, table = _LOOKS[kind]
-    lines = [tag("div", tag("b", name), f" {text}") for name, text in said(answer)]
+    """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
+    give_sentences, table = _LOOKS[kind]
+    lines = [
+        tag("div", tag("b", name), f" {text}") for name, text in give_sentences(answer)
+    ]
     head, rows = table(answer)
     lines += [grid(*known(head, rows[:_FEW_ROWS]))] if rows else []
     lines += (
@@ -506,5 +534,5 @@ def _picture(figure: Figure) -> Markup:
 
 
 def _told(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
-    """Leave out what is not known."""
+    """Return only the facts whose values are known."""
     return [fact for fact in facts if fact[1] is not None]

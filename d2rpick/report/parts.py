@@ -1,4 +1,4 @@
-"""The answer of ``parts`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``parts`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switchable_parts import PartRow
     from d2rpick.report.formats import Shown
 
-# Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
+# Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.
 SETS = (
     "set",
     "parts",
@@ -65,19 +65,22 @@ TABLES = {
 _COUNTS: Final = maybe(each("integer"))
 _IN_FLIGHT: Final = row(
     Field(
-        "energy", "number?", "mean internal energy in the flight", lambda one: one.mean
+        "energy",
+        "number?",
+        "mean internal energy in the flight",
+        lambda part_set: part_set.mean,
     ),
     Field(
         "energy_change",
         "number?",
         "at its end less at its start",
-        lambda one: one.change,
+        lambda part_set: part_set.change,
     ),
     Field(
         "energy_scatter",
         "number?",
         "standard deviation over mean",
-        lambda one: one.scatter,
+        lambda part_set: part_set.scatter,
     ),
     Field("flies", "flag?", "whether the part flies with the rest"),
     Field(
@@ -86,7 +89,7 @@ _IN_FLIGHT: Final = row(
         "whether its energy still scatters by a tenth of its mean or more",
     ),
 )
-# What it does in flight is that of the longest.
+# a part's behaviour in flight is that in the longest flight
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers by kind; null without a deck"),
@@ -112,42 +115,6 @@ PART: Final = row(
     Field("reasons", "texts"),
 )
 
-
-def _free(one: PartSet) -> bool | None:
-    """Tell whether nothing deformable keeps the step."""
-    return None if one.step_growth is None else isinf(one.step_growth)
-
-
-SET: Final = row(
-    Field("name", "text"),
-    Field("recommended", "flag"),
-    Field("parts", many("integer")),
-    Field("bodies", maybe(many(many("integer"))), "the rigid bodies that its parts make; null without a deck",
-          lambda one: one.bodies or None),
-    Field("elements", "integer?", "elements that are rigid with it"),
-    Field("element_fraction", "number?"),
-    Field("mass_fraction", "number?"),
-    Field("cost_share", "number?", "share of a step that is saved while it is rigid"),
-    Field("step_growth", "number?", "how much the step may at least grow while it is rigid",
-          lambda one: None if _free(one) else one.step_growth),
-    Field("step_free", "flag?", "whether nothing deformable keeps the step", _free),
-    Field("tr", "number?", get=lambda one: one.window and one.window[0]),
-    Field("td", "number?", get=lambda one: one.window and one.window[1]),
-    Field("rigid_fraction", "number?"),
-    Field("run_time_share", "number?"),
-    Field("saving", "number?"),
-    keys.CANDIDATE.field("position_error")._replace(kind="number?"),
-    Field("position_limit", "number?"),
-    Field("position_part", maybe(many(keys.PART)), get=lambda one: one.position_part and (one.position_part,)),
-    Field("position_body", maybe(many("integer")),
-          "parts of the rigid body that is off, where there are several; else null",
-          lambda one: one.position_body or None),
-    keys.CANDIDATE.field("position_error_assumes")._replace(key="position_assumes"),
-    Field("angle_error", "number?",
-          "by how much the body is turned at td from where it should be [degrees]; null where the parts do not tell"),
-    Field("reasons", "texts"),
-    keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
-)  # fmt: skip
 _HISTORY: Final = row(
     Field("source", "texts", get=lambda run: run.sources),
     Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
@@ -179,13 +146,62 @@ _WEIGHTS: Final = row(
 _FLIGHT: Final = row(
     Field("start", "number"), Field("end", "number"), Field("longest", "flag")
 )
+_MOST_SHOWN = 6
+# Columns that are left out, in this order, if a terminal is too narrow.
+_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
+# Verdicts on parts, for people.
+_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
+# Names of the sets, for people.
+_SET_NAMES: Final = {
+    "all that may": "all eligible parts",
+    "all but what moves": "all eligible parts but loose ones",
+    "heavy": "heaviest half by mass",
+}
 
 
-def _flights(found: Parts) -> list[dict[str, Any]]:
-    facts = found.facts
+def _free(part_set: PartSet) -> bool | None:
+    """Return True if no deformable part limits the time step."""
+    return None if part_set.step_growth is None else isinf(part_set.step_growth)
+
+
+SET: Final = row(
+    Field("name", "text"),
+    Field("recommended", "flag"),
+    Field("parts", many("integer")),
+    Field("bodies", maybe(many(many("integer"))), "the rigid bodies that its parts make; null without a deck",
+          lambda part_set: part_set.bodies or None),
+    Field("elements", "integer?", "elements that are rigid with it"),
+    Field("element_fraction", "number?"),
+    Field("mass_fraction", "number?"),
+    Field("cost_share", "number?", "share of a step that is saved while it is rigid"),
+    Field("step_growth", "number?", "how much the step may at least grow while it is rigid",
+          lambda part_set: None if _free(part_set) else part_set.step_growth),
+    Field("step_free", "flag?", "whether nothing deformable keeps the step", _free),
+    Field("tr", "number?", get=lambda part_set: part_set.window and part_set.window[0]),
+    Field("td", "number?", get=lambda part_set: part_set.window and part_set.window[1]),
+    Field("rigid_fraction", "number?"),
+    Field("run_time_share", "number?"),
+    Field("saving", "number?"),
+    keys.CANDIDATE.field("position_error")._replace(kind="number?"),
+    Field("position_limit", "number?"),
+    Field("position_part", maybe(many(keys.PART)),
+          get=lambda part_set: part_set.position_part and (part_set.position_part,)),
+    Field("position_body", maybe(many("integer")),
+          "parts of the rigid body that is off, where there are several; else null",
+          lambda part_set: part_set.position_body or None),
+    keys.CANDIDATE.field("position_error_assumes")._replace(key="position_assumes"),
+    Field("angle_error", "number?",
+          "by how much the body is turned at td from where it should be [degrees]; null where the parts do not tell"),
+    Field("reasons", "texts"),
+    keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
+)  # fmt: skip
+
+
+def _flights(answer: Parts) -> list[dict[str, Any]]:
+    facts = answer.facts
     return [
-        {"start": one[0], "end": one[1], "longest": at == facts.longest}
-        for at, one in enumerate(facts.flights)
+        {"start": span[0], "end": span[1], "longest": at == facts.longest}
+        for at, span in enumerate(facts.flights)
     ]
 
 
@@ -194,15 +210,15 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick parts; times, masses and energies in the units of the history.",
     row(
         keys.WARNINGS,
-        Field("history", _HISTORY, get=lambda found: found.files),
-        Field("deck", maybe(_DECK), get=lambda found: found.inventory),
+        Field("history", _HISTORY, get=lambda answer: answer.files),
+        Field("deck", maybe(_DECK), get=lambda answer: answer.inventory),
         Field("weights", maybe(_WEIGHTS)),
-        Field("step_ratio", "number", get=lambda found: found.settings.step_ratio),
+        Field("step_ratio", "number", get=lambda answer: answer.settings.step_ratio),
         Field("flights", many(_FLIGHT), get=_flights),
         Field(
             "parts",
             many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))),
-            get=lambda found: found.rows,
+            get=lambda answer: answer.rows,
         ),
         Field("sets", many(SET)),
         Field(
@@ -212,46 +228,44 @@ DOCUMENT: Final = Document(
     ),
     closed=True,
 )
-_MOST_SHOWN = 6
-# Left out, in this order, where a terminal has no room for them.
-_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
 
 
-def as_table(found: Parts, shown: Shown) -> str:
-    """The set to take and what to do next, a row per set, a row per part in two tables, and what was read."""
-    lines = tables.in_line(verdict_on_set(found))
-    if found.sets:
-        lines += ["", tables.as_text(*set_table(found, SETS), shown.width, _SPARE)]
+def as_table(answer: Parts, display: Shown) -> str:
+    """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
+    lines = tables.in_line(verdict_on_set(answer))
+    if answer.sets:
+        lines += ["", tables.as_text(*set_table(answer, SETS), display.width, _SPARE)]
     for names in TABLES.values():
-        head, body = tables.known(*table(found, names))
+        head, body = tables.known(*table(answer, names))
         if body and {*head} - {"", "part", "title"}:
-            lines += ["", tables.as_text(head, body, shown.width, _SPARE)]
-    below = [*outlook(found), *heading(found)]
+            lines += ["", tables.as_text(head, body, display.width, _SPARE)]
+    below = [*outlook(answer), *heading(answer)]
     return "\n".join([*lines, "", *tables.in_line(below)])
 
 
-def as_markdown(found: Parts, _: Shown) -> str:
-    """The set to take, the sets and the parts as Markdown tables, and what was read."""
-    sets = [tables.as_markdown(*set_table(found))] if found.sets else []
-    above = tables.listed(verdict_on_set(found))
-    below = tables.listed(outlook(found))
-    return "\n\n".join([*above, *sets, tables.as_markdown(*table(found)), *below])
+def as_markdown(answer: Parts, _: Shown) -> str:
+    """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
+    sets = [tables.as_markdown(*set_table(answer))] if answer.sets else []
+    above = tables.listed(verdict_on_set(answer))
+    below = tables.listed(outlook(answer))
+    return "\n\n".join([*above, *sets, tables.as_markdown(*table(answer)), *below])
 
 
-def as_csv(found: Parts, _: Shown) -> str:
-    """A row per part, a column for each key of ``parts`` in the JSON output; lists separated by semicolons."""
-    return csv_of(PART.keys, map(PART.plain, found.rows), ";")
+def as_csv(answer: Parts, _: Shown) -> str:
+    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
+    return csv_of(PART.keys, map(PART.plain, answer.rows), ";")
 
 
-def as_value(found: Parts, _: Shown) -> str:
-    """Numbers of the recommended set as ``--part`` takes them; nothing where there is none."""
-    return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
+def as_value(answer: Parts, _: Shown) -> str:
+    """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
+    return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
-def heading(found: Parts) -> list[tuple[str, str]]:
-    """What was read, by names."""
-    run, deck = found.files, found.inventory
-    formats = " + ".join(one.format for one in run.databases)
+def heading(answer: Parts) -> list[tuple[str, str]]:
+    """Return what was read, as pairs of a name and a description."""
+    run = answer.files
+    deck = answer.inventory
+    formats = " + ".join(database.format for database in run.databases)
     lines = [
         (
             "history",
@@ -268,86 +282,81 @@ def heading(found: Parts) -> list[tuple[str, str]]:
                 f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}",
             )
         )
-    longest = found.facts.longest
+    longest = answer.facts.longest
     if longest is not None:
-        start, end = found.facts.flights[longest]
+        start, end = answer.facts.flights[longest]
         lines.append(
             (
                 "flight",
-                f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}",
+                f"{start:.6g} to {end:.6g}, the longest of {len(answer.facts.flights)}",
             )
         )
     return [(name, make_printable(text)) for name, text in lines]
 
 
 def table(
-    found: Parts, names: Iterable[str] = ()
+    answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names and cells of all columns of the parts, or of some; the parts of the recommended set have a star."""
-    best = set(found.recommended.parts) if found.recommended else set()
+    """Return the names and cells of all or some columns of the parts, with a star for parts of the recommended set."""
+    best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.filled(
-        {"": lambda row: "*" if row.id in best else " ", **columns}, found.rows
+        {"": lambda row: "*" if row.id in best else " ", **columns}, answer.rows
     )
 
 
 def set_table(
-    found: Parts, names: Iterable[str] = ()
+    answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the same of the sets, among which the recommended one has a star."""
+    """Return the names and cells of all or some columns of the sets, with a star for the recommended set."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
     return tables.filled(
-        {"": lambda one: "*" if one.recommended else " ", **columns}, found.sets
+        {"": lambda part_set: "*" if part_set.recommended else " ", **columns},
+        answer.sets,
     )
 
 
-def _position(one: PartSet) -> str | None:
-    """How far a set is out of place, and what that takes for granted."""
-    found = _least(one, one.position_error)
-    return f"{found} if one body" if one.position_assumes else found
+def _position(part_set: PartSet) -> str | None:
+    """Return the position error of a set, and the assumption behind it."""
+    error = _least(part_set, part_set.position_error)
+    return f"{error} if one body" if part_set.position_assumes else error
 
 
-def _least(one: PartSet, value: float | None) -> str | None:
-    """An error, and whether it may be larger."""
-    return (
-        f">= {value:.3g}"
-        if one.position_is_lower_bound and value is not None
-        else _short(value)
-    )
+def _least(part_set: PartSet, value: float | None) -> str | None:
+    """Return an error, with a sign if it is only a lower limit."""
+    if part_set.position_is_lower_bound and value is not None:
+        return f">= {value:.3g}"
+    return _short(value)
 
 
 def verdict(row: PartRow) -> str:
-    """Whether to make a part rigid, in a word or two."""
+    """Return whether to make a part rigid, in one or two words."""
     if row.merge_with is not None:
         return f"merge with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
-# Of parts, for people.
-_VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
-
-
-def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
-    """Which parts to make rigid, why, and what to do next; a name and a sentence each."""
-    best = found.recommended
+def verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
+    """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
+    best = answer.recommended
     if best is None:
         why = next(
-            (one.reasons[0] for one in found.sets if one.reasons),
+            (part_set.reasons[0] for part_set in answer.sets if part_set.reasons),
             "no part can be switched",
         )
         return [
             ("make rigid", "nothing: no set of parts can be recommended"),
             ("why", why),
         ]
-    bodies = (
-        "one rigid body"
-        if len(best.bodies) == 1
-        else f"{len(best.bodies)} rigid bodies"
-    )
-    flights = len(found.facts.flights)
-    where = (
-        f", if rigid in the longest of {flights} flights only" if flights > 1 else ""
-    )
+    if len(best.bodies) == 1:
+        bodies = "one rigid body"
+    else:
+        bodies = f"{len(best.bodies)} rigid bodies"
+    flights = len(answer.facts.flights)
+    if flights > 1:
+        where = f", if rigid in the longest of {flights} flights only"
+    else:
+        where = ""
     share = best.run_time_share
     saves = "unknown" if share is None else f"{saved(share)}{where}"
     return [
@@ -357,58 +366,49 @@ def verdict_on_set(found: Parts) -> list[tuple[str, str]]:
     ]
 
 
-# What the sets are called for people.
-_SET_NAMES: Final = {
-    "all that may": "all eligible parts",
-    "all but what moves": "all eligible parts but loose ones",
-    "heavy": "heaviest half by mass",
-}
+def set_name(part_set: PartSet) -> str:
+    """Return the name of a set for people."""
+    return _SET_NAMES.get(part_set.name, part_set.name)
 
 
-def set_name(one: PartSet) -> str:
-    """Give what a set is called for people."""
-    return _SET_NAMES.get(one.name, one.name)
-
-
-def outlook(found: Parts) -> list[tuple[str, str]]:
-    """What to know of the recommended set, and why others are not compared; a name and a sentence each."""
+def outlook(answer: Parts) -> list[tuple[str, str]]:
+    """Return remarks on the recommended set, and why other sets are not compared, as pairs of a name and a sentence."""
     lines: list[tuple[str, str]] = []
-    best = found.recommended
+    best = answer.recommended
     if best and best.step_growth is not None and best.step_growth > 1:
-        much = (
-            "without limit"
-            if isinf(best.step_growth)
-            else f"{best.step_growth:.2g} times"
-        )
+        if isinf(best.step_growth):
+            much = "without limit"
+        else:
+            much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
         cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
         lines.append(("time step", f"{grows}: {cures}"))
-    lines += [(set_name(one), reason) for one in found.sets for reason in one.reasons]
+    lines += [
+        (set_name(part_set), reason)
+        for part_set in answer.sets
+        for reason in part_set.reasons
+    ]
     return lines
 
 
-def _number(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def _counted(row: PartRow) -> str | None:
-    return (
-        None
-        if row.elements is None
-        else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
-    )
+    if row.elements is None:
+        return None
+    return ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
 
 
 def _sharing(row: PartRow) -> str | None:
-    return (
-        None
-        if row.shares_nodes is None
-        else list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
-    )
+    if row.shares_nodes is None:
+        return None
+    return list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
 
 
 def ranges(ids: Sequence[int]) -> str:
-    """Numbers of parts as ``--part`` takes them.
+    """Return part ids as ``--part`` takes them.
 
     Examples
     --------
@@ -445,17 +445,17 @@ COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
 }
 SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "set": set_name,
-    "parts": lambda one: ranges(one.parts),
-    "elements": lambda one: one.elements,
-    "mass": lambda one: _percent(one.mass_fraction),
-    "saves of a step": lambda one: _percent(one.cost_share),
-    "step grows": lambda one: (
-        "free" if _free(one) else tables.shown(one.step_growth, ".2g")
+    "parts": lambda part_set: ranges(part_set.parts),
+    "elements": lambda part_set: part_set.elements,
+    "mass": lambda part_set: _percent(part_set.mass_fraction),
+    "saves of a step": lambda part_set: _percent(part_set.cost_share),
+    "step grows": lambda part_set: (
+        "free" if _free(part_set) else tables.shown(part_set.step_growth, ".2g")
     ),
-    "tr": lambda one: one.window[0] if one.window else None,
-    "td": lambda one: one.window[1] if one.window else None,
-    "processor time": lambda one: _percent(one.run_time_share),
-    "saves": lambda one: _percent(one.saving),
+    "tr": lambda part_set: part_set.window[0] if part_set.window else None,
+    "td": lambda part_set: part_set.window[1] if part_set.window else None,
+    "processor time": lambda part_set: _percent(part_set.run_time_share),
+    "saves": lambda part_set: _percent(part_set.saving),
     "out of place": _position,
-    "turned [deg]": lambda one: _least(one, one.angle_error),
+    "turned [deg]": lambda part_set: _least(part_set, part_set.angle_error),
 }

@@ -1,4 +1,4 @@
-"""The answer of ``plan`` as table, JSON, CSV, Markdown and bare values."""
+"""Write the result of ``plan`` as a table, JSON, CSV, Markdown and bare values."""
 
 from __future__ import annotations
 
@@ -37,6 +37,16 @@ _WHEN: Final = {
     "left-out": "not planned",
 }
 
+_BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
+_POSITION: Final = (
+    "position_error",
+    "position_error_part",
+    "position_error_body",
+    "position_error_assumes",
+)
+# Columns that are left out first if the table would be too wide.
+_SPARE: Final = ("margin", "processor time", "out of place", "error")
+
 
 def _times(row: Planned, at: int) -> float | None:
     return row.window[at] if row.window else None
@@ -47,17 +57,10 @@ def _situation(row: Planned) -> Situation | None:
 
 
 def _margin(key: str) -> Callable[[Planned], Any]:
-    """Take what is known of the margin of a window that is not done."""
+    """Return a function that reads a value of the margin of a window, unless that window is done already."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
-_BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
-_POSITION: Final = (
-    "position_error",
-    "position_error_part",
-    "position_error_body",
-    "position_error_assumes",
-)
 WINDOW: Final = row(
     Field("flight", kind_of("integer", minimum=1), "number of the flight in the record, from 1",
           lambda row: row.number),
@@ -104,28 +107,23 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 ))  # fmt: skip
 
 
-# Columns that are left out first where the table would be too wide.
-_SPARE: Final = ("margin", "processor time", "out of place", "error")
-
-
-def as_table(plan: Plan, shown: Shown) -> str:
-    """The plan in a sentence, what to do next, a row per flight, and why windows are no better, or not planned."""
-    rows = (
-        tables.as_text(*table(plan), shown.width, _SPARE)
-        if plan.flights
-        else "no flight"
-    )
+def as_table(plan: Plan, display: Shown) -> str:
+    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
+    if plan.flights:
+        rows = tables.as_text(*table(plan), display.width, _SPARE)
+    else:
+        rows = "no flight"
     below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
-    said = [(name, make_printable(text)) for name, text in below]
+    printable = [(name, make_printable(text)) for name, text in below]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
     steps = tables.in_line(next_steps(plan), 4)
     return "\n".join(
-        [sentence(plan), *steps, "", rows, "", *tables.in_line(said, 9), *above]
+        [sentence(plan), *steps, "", rows, "", *tables.in_line(printable, 9), *above]
     )
 
 
 def sentence(plan: Plan) -> str:
-    """What to do, in a sentence."""
+    """Return what to do, in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
     if not supported:
@@ -135,21 +133,21 @@ def sentence(plan: Plan) -> str:
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    found = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    text = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
-        found += f"; saves {saved(plan.run_time_share)}"
-    more = "1 more needs" if waiting == 1 else f"{waiting} more need"
-    return f"{found}; {more} a new run first" if waiting else found
+        text += f"; saves {saved(plan.run_time_share)}"
+    waiting_text = "1 more needs" if waiting == 1 else f"{waiting} more need"
+    return f"{text}; {waiting_text} a new run first" if waiting else text
 
 
 def _how_to_use(plan: Plan) -> str:
-    """Say how many windows can be used now, and which of them with care."""
+    """Return how many windows can be used now, and which of them only with care."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
         which = f"flight {number}: " if len(plan.flights) > 1 else ""
         return f"{which}{decision.verdict}"
-    careful = [str(number) for number, one in decisions if one.verdict != USE]
+    careful = [str(number) for number, decision in decisions if decision.verdict != USE]
     flights = f"flight{'s' * (len(careful) > 1)} {', '.join(careful)}"
     which = f" ({flights} with care)" if careful else ""
     open_ones = sum(row.status != "done" for row in plan.flights)
@@ -157,7 +155,7 @@ def _how_to_use(plan: Plan) -> str:
 
 
 def next_steps(plan: Plan) -> list[tuple[str, str]]:
-    """What to do next with the windows that can be used now."""
+    """Return the next commands for the windows that can be used now, as pairs of a name and a command."""
     if not plan.windows:
         return []
     waiting = any(row.status == "re-plan" for row in plan.flights)
@@ -169,7 +167,7 @@ def next_steps(plan: Plan) -> list[tuple[str, str]]:
 
 
 def verdicts(plan: Plan) -> list[tuple[str, str]]:
-    """Why the windows that are planned are no better, and what would make them so; the flight and a sentence each."""
+    """Return why the planned windows are not better and what would improve them, each with the name of its flight."""
     return [
         (f"flight {row.number}", in_full(row.decision))
         for row in plan.flights
@@ -178,7 +176,7 @@ def verdicts(plan: Plan) -> list[tuple[str, str]]:
 
 
 def as_markdown(plan: Plan, _: Shown) -> str:
-    """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
+    """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
     below = tables.listed(
         (*next_steps(plan), *verdicts(plan), *outlook(plan), *reasons(plan))
     )
@@ -188,32 +186,34 @@ def as_markdown(plan: Plan, _: Shown) -> str:
 
 
 def reasons(plan: Plan) -> list[tuple[str, str]]:
-    """Why windows are not supported; the flight and a sentence each."""
+    """Return why windows are not supported, as pairs of a flight and a sentence."""
     return [(f"flight {row.number}", row.reason) for row in plan.flights if row.reason]
 
 
 def as_csv(plan: Plan, _: Shown) -> str:
-    """A row per flight, a column for each key of ``windows`` in the JSON output."""
+    """Return CSV with one row per flight and a column for each key of ``windows`` in the JSON output."""
     return csv_of(WINDOW.keys, map(WINDOW.plain, plan.flights))
 
 
-def as_value(plan: Plan, shown: Shown) -> str:
-    """A line ``tr td`` for each window of the next run, in the shortest digits that read back.
+def as_value(plan: Plan, display: Shown) -> str:
+    """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
-    Those that are done, and the supported ones, or every new one; nothing where none is new.
+    These are the windows that are done, and the supported new ones or, if asked for, all new ones.  Nothing is returned
+    if there is no new window.
     """
-    new = plan.all_windows if shown.every else plan.windows
+    new = plan.all_windows if display.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
-    """What was given up for quality, and where bodies will be; a name and a sentence each."""
-    supported, lines = plan.supported, []
-    found = [(row.number, row.answer) for row in supported if row.answer]
+    """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
+    supported = plan.supported
+    lines = []
+    pairs = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
-        (f"flight {number}", given_up(one.longer, one.recommended))
-        for number, one in found
-        if one.longer and one.recommended
+        (f"flight {number}", given_up(pair.longer, pair.recommended))
+        for number, pair in pairs
+        if pair.longer and pair.recommended
     ]
     assumed = [
         row
@@ -221,19 +221,19 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
         if row.candidate and row.candidate.position_error_assumes
     ]
     if assumed:
-        told = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        deck_hint = "; `deck` tells which do" if plan.settings.bodies is None else ""
         listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
         lines.append(
             (
                 "place",
-                f"out of place at td if the parts become one rigid body: {listed}{told}",
+                f"out of place at td if the parts become one rigid body: {listed}{deck_hint}",
             )
         )
     return lines
 
 
 def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of all flights; run time and place only where they are known."""
+    """Return the column names and cells of all flights; CPU time and position error only if they are known."""
     placed = any(
         row.candidate and row.candidate.position_error is not None
         for row in plan.flights
@@ -249,27 +249,26 @@ def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def error(row: Planned) -> str | None:
-    """How well the pair of a window matches, in a word or two."""
+    """Return the name and value of the error of a window's pair."""
     best = row.candidate
     if best is None:
         return None
     if best.kind == "start":
         return "nothing vibrates"
-    name, off = (
-        ("level error", best.level_error)
-        if best.residual is None
-        else ("residual", best.residual)
-    )
-    return f"{name} {tables.measure(off)}"
+    if best.residual is None:
+        name, size = ("level error", best.level_error)
+    else:
+        name, size = ("residual", best.residual)
+    return f"{name} {tables.measure(size)}"
 
 
 def _place(row: Planned) -> str | None:
-    """How far a rigid body is out of place at td [length]."""
+    """Return the position error of a rigid body at td [length]."""
     best = row.candidate
     if best is None or best.position_error is None:
         return None
-    least = ">= " if best.position_error_is_lower_bound else ""
-    return f"{least}{best.position_error:.2g}"
+    bound_sign = ">= " if best.position_error_is_lower_bound else ""
+    return f"{bound_sign}{best.position_error:.2g}"
 
 
 _COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {

@@ -1,4 +1,4 @@
-"""The scan of ``rollover`` as table, JSON, CSV and Markdown."""
+"""Write the scan of ``rollover`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Suggestion
     from d2rpick.report.formats import Shown
 
-# Of each run, in JSON and as columns.
+# fields of each run, in JSON and as columns
 RUN: Final = row(*(Field(key, "number") for key in (
     "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio",
 )), closed=True)  # fmt: skip
@@ -37,7 +37,7 @@ DOCUMENT: Final = Document(
 
 
 class Scan(NamedTuple):
-    """Runs switched at many tr beside the ``reference`` without switching, and what is recommended from that one."""
+    """Runs switched at many tr, the ``reference`` run, and the recommendation from the reference run."""
 
     reference: Record
     outcomes: Sequence[Outcome]
@@ -45,10 +45,11 @@ class Scan(NamedTuple):
     cautions: Sequence[Caution]
 
 
-def as_table(scan: Scan, shown: Shown) -> str:
-    """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
+def as_table(scan: Scan, display: Shown) -> str:
+    """Return what happened in the reference run, a row for each tr, and the error of the tr that d2rpick recommends."""
     reference, outcomes, answer, _ = scan
-    td, recommended = answer.situation.td, _recommended(answer)
+    td = answer.situation.td
+    recommended = _recommended(answer)
     above = [
         (
             "load",
@@ -57,27 +58,31 @@ def as_table(scan: Scan, shown: Shown) -> str:
         ("td", f"{td:.6g} s: energy of the box {_energy(reference, td):.6g} J"),
         ("units", "s, J, m, rad/s; roll_error in degrees"),
     ]
-    rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
-    told = "none"
-    if chosen := next((one for one in outcomes if one.tr == recommended), None):
-        error, worst = (
-            abs(chosen.roll_error),
-            max(abs(one.roll_error) for one in outcomes),
-        )
-        told = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {error / worst:.2g} of the largest"
-    shown_rows = tables.as_text(("", *RUN.keys), rows, shown.width)
+    rows = [
+        ["*" if outcome.tr == recommended else "", *_short(outcome)]
+        for outcome in outcomes
+    ]
+    recommendation = "none"
+    if chosen := next(
+        (outcome for outcome in outcomes if outcome.tr == recommended), None
+    ):
+        error = abs(chosen.roll_error)
+        largest_error = max(abs(outcome.roll_error) for outcome in outcomes)
+        share = error / largest_error
+        recommendation = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {share:.2g} of the largest"
+    shown_rows = tables.as_text(("", *RUN.keys), rows, display.width)
     return "\n".join(
-        [*tables.in_line(above), "", shown_rows, "", f"recommended  {told}"]
+        [*tables.in_line(above), "", shown_rows, "", f"recommended  {recommendation}"]
     )
 
 
 def as_markdown(scan: Scan, _: Shown) -> str:
-    """A row for each tr."""
-    return tables.as_markdown(RUN.keys, [_short(one) for one in scan.outcomes])
+    """Return a Markdown table with one row for each tr."""
+    return tables.as_markdown(RUN.keys, [_short(outcome) for outcome in scan.outcomes])
 
 
 def as_csv(scan: Scan, _: Shown) -> str:
-    """A row for each tr, at full precision."""
+    """Return CSV with one row for each tr, at full precision."""
     return csv_of(RUN.keys, map(RUN.plain, scan.outcomes))
 
 
@@ -85,9 +90,9 @@ def _recommended(answer: Suggestion) -> float | None:
     return answer.recommended.tr if answer.recommended else None
 
 
-def _short(one: Outcome) -> list[tables.Cell]:
-    """Four digits are enough to read: runs differ in the second."""
-    return [float(f"{value:.4g}") for value in RUN.plain(one).values()]
+def _short(outcome: Outcome) -> list[tables.Cell]:
+    """Return the cells of a run with four digits: runs already differ in the second."""
+    return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 
 def _time(time: float | None) -> str:

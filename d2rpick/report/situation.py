@@ -1,4 +1,4 @@
-"""What suggest and verify have in common in their output: history, flight, oscillator, health of the run."""
+"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -16,42 +16,40 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-# Parts that a line names of those that are switched or fly together; the JSON document has all.
+# Largest number of parts that a line names; the JSON document contains all.
 _NAMED = 5
 
 
 def what_was_read(history: History) -> str:
-    """Name files, format, energy and span of a history."""
+    """Return files, format, energy and time span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    what = f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
+    description = (
+        f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
+    )
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
-    return make_printable(f"{what}, {history.time.size} states, {span}")
+    return make_printable(f"{description}, {history.time.size} states, {span}")
 
 
 def energy_name(history: History) -> str:
-    """Name the energy; of many parts the first ones."""
+    """Return the name of the energy; with many parts only the first ones are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
-    return (
-        history.channel
-        if len(parts) <= _NAMED
-        else f"internal energy of {list_names(parts, most=_NAMED)}"
-    )
+    if len(parts) <= _NAMED:
+        return history.channel
+    return f"internal energy of {list_names(parts, most=_NAMED)}"
 
 
 def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
-    """What stands above a table, by names: what was read, and what the choice rests on, ``verbose``: why."""
-    flight, share, why = (
-        situation.flight,
-        situation.kinetic_share,
-        situation.vibration.reasons if verbose else None,
-    )
-    known = "" if share is None else f", kinetic share {measure(share)}"
+    """Return the history and what the choice rests on, as pairs of a name and a text; ``verbose`` adds the reasons."""
+    flight = situation.flight
+    share = situation.kinetic_share
+    why = situation.vibration.reasons if verbose else None
+    kinetic = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", what_was_read(situation.history)),
         (
             "td",
-            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
+            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{kinetic}{estimate}",
         ),
         ("basis", f"{_basis(situation)}{f': {why}' if why else ''}"),
     ]
@@ -62,27 +60,33 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
         parts = [
             part.name if part.title else str(part.id) for part in flight.parts or ()
         ]
-        who = f" of {list_names(parts, most=_NAMED)}" if parts else ""
+        names = f" of {list_names(parts, most=_NAMED)}" if parts else ""
         lines.append(
-            ("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
+            (
+                "flight",
+                f"from {flight.start:.6g} ({spoken(flight.source)}{names}), {end}",
+            )
         )
     return [(name, make_printable(text)) for name, text in lines]
 
 
 def spoken(source: str | None) -> str:
-    """Name the source of a flight for people."""
+    """Return the name of the source of a flight for people."""
     return "energy alone, not certain" if source == "energy" else str(source)
 
 
 def _basis(situation: Situation) -> str:
-    """What the choice rests on, and the oscillator behind it."""
-    fit, vibration = situation.evidence.fit, situation.vibration
-    mode, told = vibration.whole.mode, vibration.told
+    """Return what the choice rests on, and the fitted oscillator."""
+    fit = situation.evidence.fit
+    vibration = situation.vibration
+    mode = vibration.whole.mode
+    summary = vibration.told
     if not (mode and fit):
-        kinetic = (
-            "; kinetic energy from the modes of each part" if vibration.signed else ""
-        )
-        return f"{told}{kinetic}" if told else _level_alone(situation)
+        if vibration.signed:
+            kinetic = "; kinetic energy from the modes of each part"
+        else:
+            kinetic = ""
+        return f"{summary}{kinetic}" if summary else _level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
@@ -92,12 +96,12 @@ def _basis(situation: Situation) -> str:
         else f"misfit {fit.misfit:.1e}"
     )
     source = "given" if situation.settings.oscillator else "identified"
-    front = f"{told}; " if told else ""
+    front = f"{summary}; " if summary else ""
     return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
 
 
 def _level_alone(situation: Situation) -> str:
-    """Say that no deformation is known, and where it is so, that several modes are why."""
+    """Return a note that no deformation is known, with the reason if it is that several modes vibrate."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
@@ -106,7 +110,7 @@ def _level_alone(situation: Situation) -> str:
 
 
 def head(health: Health) -> tuple[str, ...]:
-    """Names of the columns of a table of health; the first says up to when the run was judged."""
+    """Return the column names of a table of health; the first says up to which time the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -116,7 +120,7 @@ def head(health: Health) -> tuple[str, ...]:
 
 
 class Measure(NamedTuple):
-    """A measure for people: ``value`` None where the files lack it, and then ``good`` is None too."""
+    """A health measure for people: ``value`` and ``good`` are None if the files lack it."""
 
     what: str
     value: str | None
@@ -125,11 +129,12 @@ class Measure(NamedTuple):
 
 
 def measures_of(health: Health) -> list[Measure]:
-    """All measures of a run, those of its window last."""
-    low, high = health.energy_ratio_min, health.energy_ratio_max
+    """Return all health measures of a run, those of its rigid window last."""
+    low = health.energy_ratio_min
+    high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)
     part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
-    found = [
+    measures = [
         _share("hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS),
         _share(part, health.part_hourglass_share, limits.MOST_HOURGLASS),
         Measure(
@@ -147,7 +152,7 @@ def measures_of(health: Health) -> list[Measure]:
         _share("energy of deleted elements", health.eroded_share, MOST_WORK),
     ]
     if health.window:
-        found += [
+        measures += [
             _share(
                 "change of contact energy in the window",
                 health.window_sliding,
@@ -158,14 +163,14 @@ def measures_of(health: Health) -> list[Measure]:
             ),
             _share("energy deleted there", health.window_eroded, 0.0),
         ]
-    return found
+    return measures
 
 
-def _share(what: str, share: float | None, most: float) -> Measure:
-    limit = f"at most {most:.0%}" if most else "none"
+def _share(name: str, share: float | None, limit_share: float) -> Measure:
+    limit = f"at most {limit_share:.0%}" if limit_share else "none"
     return Measure(
-        what,
+        name,
         None if share is None else f"{share:.2%}",
         limit,
-        None if share is None else share <= most,
+        None if share is None else share <= limit_share,
     )

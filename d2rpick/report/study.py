@@ -1,4 +1,4 @@
-"""The answer of ``study`` as table, JSON, CSV, Markdown, and its last line of newline-delimited JSON."""
+"""Write the result of ``study`` as a table, JSON, CSV, Markdown, and the last line of newline-delimited JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STATUS: Final = one_of(
     "ok", "none", "unreadable", "out-of-range", "failed", "internal-error"
 )
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
-# What a run has where it is of status ok, and otherwise.
+# Fields of a run whose status is ok; they are None otherwise.
 _JUDGED: Final[dict[str, Any]] = {
     "description": "One run; null where nothing can be said.",
     "if": {"properties": {"status": {"const": "ok"}}},
@@ -63,10 +63,12 @@ _ERROR: Final = Field(
     "common_error", "number?",
     "error at the common tr: the residual, on basis energy the level error, 0 where nothing vibrates; in -f ndjson "
     "common_errors of the last line",
-    lambda one: one[1],
+    lambda run_and_error: run_and_error[1],
 )  # fmt: skip
-# A run in JSON, and a row of the csv; of a run and its error at the common tr.
-RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
+# A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
+RUN: Final = row(
+    *PLAIN.of_part(lambda run_and_error: run_and_error[0]), _ERROR, **_JUDGED
+)
 _RUN: Final = row(
     *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
 )
@@ -96,7 +98,7 @@ _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
-# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and what follows them.
+# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and the line after them.
 _CURVE: Final = kind_of(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
@@ -109,7 +111,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Left out, in this order, where a terminal has no room for them.
+# Columns that are left out, in this order, if a terminal is too narrow.
 _SPARE: Final = ("E(td)", "+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -120,8 +122,8 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Study, shown: Shown) -> str:
-    """What the runs have in common, and below it one line per run, by what tells its name from the others."""
+def as_table(answer: Study, display: Shown) -> str:
+    """Return what the runs have in common, and one line per run with its shortened name."""
     head, rows = tables.known(*table(answer))
     rows = [
         [name, *row[1:]]
@@ -129,68 +131,76 @@ def as_table(answer: Study, shown: Shown) -> str:
             short_names([row.source for row in answer.runs]), rows, strict=True
         )
     ]
-    said = tables.in_line([*outcome(answer), *reasons(answer)])
-    return "\n".join([*said, "", tables.as_text(head, rows, shown.width, _SPARE)])
+    outcome_lines = tables.in_line([*outcome(answer), *reasons(answer)])
+    return "\n".join(
+        [*outcome_lines, "", tables.as_text(head, rows, display.width, _SPARE)]
+    )
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
-    """What the runs have in common, and below it the runs as a Markdown table."""
-    said = tables.listed([*outcome(answer), *reasons(answer)])
-    listed = "\n".join(f"* {line}" for line in said)
+    """Return what the runs have in common, and the runs as a Markdown table."""
+    outcome_lines = tables.listed([*outcome(answer), *reasons(answer)])
+    listed = "\n".join(f"* {line}" for line in outcome_lines)
     return f"{listed}\n\n{tables.as_markdown(*table(answer))}"
 
 
 def as_csv(answer: Study, _: Shown) -> str:
-    """One row per run, a column for each key of the JSON output."""
+    """Return CSV with one row per run and a column for each key of the JSON output."""
     return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
 
 
-def as_ndjson(answer: Study, shown: Shown) -> str:
-    """The lines of the runs, as far as they are not written yet, and what the runs have in common."""
-    return "\n".join([*shown.lines, LAST.as_json(answer, shown.command, None)])
+def as_ndjson(answer: Study, display: Shown) -> str:
+    """Return the lines of the runs that are not written yet, and what the runs have in common."""
+    return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
-    """Give the runs, each with its error at the common tr."""
+    """Yield the runs, each with its error at the common tr."""
     return zip(
         answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True
     )
 
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the runs."""
+    """Return the column names and cells of the runs."""
     cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.runs)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
-        "run": lambda one: one[0].source,
-        "tr": lambda one: one[0].tr,
-        "+-": lambda one: tables.half(one[0].tr_low, one[0].tr_high),
-        "td": lambda one: one[0].td,
-        "E(td)": lambda one: one[0].energy_td,
-        "residual": lambda one: tables.measure(one[0].residual),
-        "error at common tr": lambda one: tables.measure(one[1]),
-        "verdict": lambda one: one[0].verdict,
-        "basis": lambda one: one[0].basis,
-        "status": lambda one: None if one[0].status == OK else one[0].status,
-        "why": lambda one: (
-            cut.get(one[0].source, "")
-            + (one[0].message or ", ".join(one[0].warnings)).removeprefix(
-                f"{one[0].source.rstrip('/')}: "
-            )
+        "run": lambda run_and_error: run_and_error[0].source,
+        "tr": lambda run_and_error: run_and_error[0].tr,
+        "+-": lambda run_and_error: tables.half(
+            run_and_error[0].tr_low, run_and_error[0].tr_high
+        ),
+        "td": lambda run_and_error: run_and_error[0].td,
+        "E(td)": lambda run_and_error: run_and_error[0].energy_td,
+        "residual": lambda run_and_error: tables.measure(run_and_error[0].residual),
+        "error at common tr": lambda run_and_error: tables.measure(run_and_error[1]),
+        "verdict": lambda run_and_error: run_and_error[0].verdict,
+        "basis": lambda run_and_error: run_and_error[0].basis,
+        "status": lambda run_and_error: (
+            None if run_and_error[0].status == OK else run_and_error[0].status
+        ),
+        "why": lambda run_and_error: (
+            cut.get(run_and_error[0].source, "")
+            + (
+                run_and_error[0].message or ", ".join(run_and_error[0].warnings)
+            ).removeprefix(f"{run_and_error[0].source.rstrip('/')}: ")
         ),
     }
     return tables.filled(columns, with_errors(answer))
 
 
 def outcome(answer: Study) -> list[tuple[str, str]]:
-    """What the runs have in common, by names, for people."""
-    spread, common = answer.spread, answer.common
-    found = "none"
+    """Return what the runs have in common, as pairs of a name and a text."""
+    spread = answer.spread
+    common = answer.common
+    own_tr = "none"
     if spread:
-        found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        found += (
+        own_tr = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
+        own_tr += (
             "the intervals overlap" if answer.agree else "the intervals do not overlap"
         )
-    heading, shared = "common tr", f"none: {common.reason}"
+    heading = "common tr"
+    shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
@@ -201,30 +211,33 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         (heading, shared),
         ("each run", _verdicts(answer)),
         ("td", td_of(answer)),
-        ("own tr", found),
+        ("own tr", own_tr),
     ]
 
 
 def _span(errors: Sequence[float]) -> str:
-    """Write the least and the largest of some errors, one number if they read alike."""
-    low, high = tables.measure(min(errors)), tables.measure(max(errors))
+    """Return the smallest and largest of some errors, or one number if they are displayed the same."""
+    low = tables.measure(min(errors))
+    high = tables.measure(max(errors))
     return low if low == high else f"{low} to {high}"
 
 
 def _verdicts(answer: Study) -> str:
-    """Count the runs by what is said of their own pairs."""
+    """Return how many runs have each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {runs_of(counts[word])}"
         for word in VERDICTS.values()
         if counts[word]
     ]
-    left = sum(row.verdict is None for row in answer.runs)
-    return ", ".join([*counted, *[f"no pair in {runs_of(left)}"] * (left > 0)])
+    undecided_count = sum(row.verdict is None for row in answer.runs)
+    return ", ".join(
+        [*counted, *[f"no pair in {runs_of(undecided_count)}"] * (undecided_count > 0)]
+    )
 
 
 def reasons(answer: Study) -> list[tuple[str, str]]:
-    """Why the pairs of runs are no better, each reason once, and what would make them so."""
+    """Return each reason once why pairs of runs are not better, and what would improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -237,7 +250,7 @@ def reasons(answer: Study) -> list[tuple[str, str]]:
 
 
 def td_of(answer: Study) -> str:
-    """The td of all runs, or the window in which each has its own."""
+    """Return the td of all runs, or the range in which each run has its own td."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     if answer.td is None:
@@ -246,7 +259,7 @@ def td_of(answer: Study) -> str:
 
 
 def short_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Give of each name what tells it from the others: folders and file names that all share are left out.
+    """Return the distinctive part of each name, without folders and file names that all have in common.
 
     Examples
     --------
@@ -264,8 +277,8 @@ def short_names(sources: Sequence[str]) -> tuple[str, ...]:
     last = next(
         (i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1
     )
-    kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
+    distinct_paths = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
     return tuple(
-        "/".join(part.strip("/") for part in one) or source
-        for one, source in zip(kept, sources, strict=True)
+        "/".join(part.strip("/") for part in distinct_path) or source
+        for distinct_path, source in zip(distinct_paths, sources, strict=True)
     )

@@ -1,4 +1,4 @@
-"""The answer of ``suggest`` as table, JSON, CSV, Markdown and bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
 
 from __future__ import annotations
 
@@ -27,35 +27,46 @@ if TYPE_CHECKING:
     from d2rpick.choice.decision import Decision
     from d2rpick.report.formats import Shown
 
-# Windows of acceptable tr that a line names.
+# largest number of windows of acceptable tr that a line names
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
 )
-# A candidate, and the decision on it.
+# a candidate and the decision on it
 CANDIDATE: Final = row(
-    *keys.CANDIDATE.of_part(lambda one: one[0]),
-    keys.MATCHES._replace(get=lambda one: one[0].parts),
-    *keys.DECIDED.of_part(lambda one: one[1], ("verdict", "verdict_reason", "cure")),
+    *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
+    keys.MATCHES._replace(
+        get=lambda candidate_and_decision: candidate_and_decision[0].parts
+    ),
+    *keys.DECIDED.of_part(
+        lambda candidate_and_decision: candidate_and_decision[1],
+        ("verdict", "verdict_reason", "cure"),
+    ),
     name="candidate",
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
+# Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
+_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
+_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+
 
 def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
-    """Give the candidates, each with the decision on it."""
-    return [(one, answer.decision_on(one)) for one in answer.candidates]
+    """Return each candidate with the decision on it."""
+    return [
+        (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
+    ]
 
 
 def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
-    """Give the windows of acceptable tr, and which of them holds the recommended one."""
+    """Return the windows of acceptable tr, and which of them contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
-    return (
-        None
-        if windows is None
-        else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
-    )
+    if windows is None:
+        return None
+    return [
+        {**window._asdict(), "recommended": holds(window, tr)} for window in windows
+    ]
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -81,59 +92,61 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 ))  # fmt: skip
 
 
-# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
-_SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+def as_table(answer: Suggestion, display: Shown) -> str:
+    """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
 
-
-def as_table(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, what it rests on, and the first candidates; the recommended row has a star.
-
-    Where nothing is recommended the candidates stand there only if all is asked for.
+    If nothing is recommended, candidates are listed only if all details are asked for.
     """
-    above = heading(answer.situation, verbose=shown.verbose)
+    above = heading(answer.situation, verbose=display.verbose)
     lines = [
         *tables.in_line((*verdict(answer), *next_step(answer))),
         "",
         *tables.in_line((*facts(answer), *outlook(answer), *above)),
     ]
-    if answer.candidates and (answer.recommended or shown.verbose):
-        lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]
-        left = len(answer.candidates) - shown.limit
-        lines += [f"... and {left} more (--limit)"] * (left > 0)
+    if answer.candidates and (answer.recommended or display.verbose):
+        lines += ["", tables.as_text(*_some(answer, display), display.width, _SPARE)]
+        hidden_count = len(answer.candidates) - display.limit
+        lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
     return "\n".join(lines)
 
 
-def as_markdown(answer: Suggestion, shown: Shown) -> str:
-    """The verdict, the candidates as a Markdown table, and below it what the verdict rests on."""
+def as_markdown(answer: Suggestion, display: Shown) -> str:
+    """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
     above = tables.listed((*verdict(answer), *next_step(answer)))
     below = tables.listed((*facts(answer), *outlook(answer)))
-    table = tables.as_markdown(*_some(answer, shown))
+    table = tables.as_markdown(*_some(answer, display))
     return "\n\n".join([*above, table, *below])
 
 
 def _some(
-    answer: Suggestion, shown: Shown
+    answer: Suggestion, display: Shown
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give the first candidates, in the columns that hold something."""
-    head, rows = tables.known(*table(answer, shown.limit))
-    kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
-    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    """Return the first candidates, without empty columns."""
+    head, rows = tables.known(*table(answer, display.limit))
+    shown_columns = [
+        i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
+    ]
+    return [head[i] for i in shown_columns], [
+        [row[i] for i in shown_columns] for row in rows
+    ]
 
 
 def as_csv(answer: Suggestion, _: Shown) -> str:
-    """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
+    """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
     return csv_of(
-        columns, ({**CANDIDATE.plain(one), "td": td} for one in _decided(answer))
+        columns,
+        ({**CANDIDATE.plain(candidate), "td": td} for candidate in _decided(answer)),
     )
 
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to do with the recommended pair, why, and what comes after td; a name and a sentence each."""
-    best, decision, better = answer.chosen, answer.decision, answer.clearly_better
+    """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
+    best = answer.chosen
+    decision = answer.decision
+    better = answer.clearly_better
     lines = [("no pair to use", answer.why_none)]
     if best and decision:
         lines = headed(decision, best.tr, answer.td)
@@ -145,8 +158,9 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def facts(answer: Suggestion) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
-    best, decision = answer.chosen, answer.decision
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
+    best = answer.chosen
+    decision = answer.decision
     if best is None or decision is None:
         return []
     lines = [*statements(decision), ("rigid for", rigid_for(best))]
@@ -160,7 +174,7 @@ def facts(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def next_step(answer: Suggestion) -> list[tuple[str, str]]:
-    """What to type next: for a pair that can be used."""
+    """Return the next command for a pair that can be used."""
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
         return []
@@ -173,25 +187,24 @@ def next_step(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def better_about(answer: Suggestion, better: Pair) -> str:
-    """What is better about the better pair."""
-    own = answer.recommended
-    if own is None:
+    """Return in which respect the better pair is better."""
+    recommended = answer.recommended
+    if recommended is None:
         return "there an acceptable tr exists"
-    if better.residual is not None and own.residual is not None:
-        return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
-    level, here = (
-        answer.situation.vibration.whole.energy(better.td),
-        answer.situation.energy_td,
-    )
-    return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
+    if better.residual is not None and recommended.residual is not None:
+        return f"residual {tables.measure(better.residual)} instead of {tables.measure(recommended.residual)}"
+    level = answer.situation.vibration.whole.energy(better.td)
+    own_level = answer.situation.energy_td
+    return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
-    """What else there is to choose from; a name and a sentence each."""
+    """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
-    lines = (
-        [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
-    )
+    if answer.windows:
+        lines = [("acceptable", acceptable(answer.windows, chosen))]
+    else:
+        lines = []
     best = answer.chosen
     if best and best.position_error is not None:
         lines.append(
@@ -206,7 +219,7 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def position(best: Candidate, *, deck: bool) -> str:
-    """How far a body is out of place at td, why, and what that takes for granted, with a ``deck`` or without."""
+    """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` tells which do)" if taken and not deck else ""
@@ -214,49 +227,51 @@ def position(best: Candidate, *, deck: bool) -> str:
         return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
-    least = "at least " if best.position_error_is_lower_bound else ""
-    return f"off by {least}{best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    bound_text = "at least " if best.position_error_is_lower_bound else ""
+    size = f"{bound_text}{best.position_error:.2g}"
+    return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
 def given_up(longer: Pair, chosen: Pair) -> str:
-    """How much rigid time was given up for a better level or residual, and for which."""
-    what = (
-        "a lower level at td"
-        if longer.residual is None
-        else f"residual {tables.measure(longer.residual)}"
-    )
+    """Return how much rigid time was given up for a better level or residual, and how much better it is."""
+    if longer.residual is None:
+        better_quality = "a lower level at td"
+    else:
+        better_quality = f"residual {tables.measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
+    return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
 def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
-    """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
-    share = sum(one.share for one in windows)
+    """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
+    share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[
-        :_NAMED
-    ]
-    shown = [
+    named_windows = sorted(
+        windows, key=lambda window: (not holds(window, tr), window.start - window.end)
+    )[:_NAMED]
+    window_texts = [
         f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
-        for w in named
+        for w in named_windows
     ]
-    more = (
-        f" and {len(windows) - len(named)} shorter windows"
-        if len(windows) > len(named)
-        else ""
-    )
-    return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
+    if len(windows) > len(named_windows):
+        shorter_text = f" and {len(windows) - len(named_windows)} shorter windows"
+    else:
+        shorter_text = ""
+    return f"every tr from {'; '.join(window_texts)}{shorter_text}; in all {share:.0%} of the flight up to td"
 
 
 def holds(window: AcceptableWindow, tr: float | None) -> bool:
-    """Whether the recommended tr lies in a window."""
+    """Return True if the recommended tr lies in the window."""
     return tr is not None and window.start <= tr <= window.end
 
 
 def as_value(answer: Suggestion, _: Shown) -> str:
-    """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
+    """Return the recommended tr, and td if it was chosen too, with the fewest digits that give the same number.
+
+    Without a recommendation the text is empty.
+    """
     pair = answer.recommended
     if pair is None:
         return ""
@@ -264,7 +279,7 @@ def as_value(answer: Suggestion, _: Shown) -> str:
 
 
 def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the first ``limit`` candidates."""
+    """Return the column names and cells of the first ``limit`` candidates."""
     columns: dict[str, Callable[[Candidate], tables.Cell]] = {
         "": lambda c: "*" if c.recommended else " ",
         "rank": lambda c: c.rank,

@@ -1,4 +1,4 @@
-"""Tables for reading, as Markdown and as CSV, numbers as people read them, command lines as a shell takes them."""
+"""Write tables as text, Markdown and CSV, numbers with few digits, and command lines with shell quoting."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# A longer word, as a path or a list of parts, is broken where a table would be too wide, and one of more than the least
-# where that is not enough: no number is as long.
+# Width of a column above which long words, such as paths or lists of parts, are split if a table is too wide; if that
+# is not enough, words longer than the least width are split too. No number is as long.
 _WORD: Final = 32
 _LEAST: Final = 12
-# Before these signs, which spreadsheets of some languages also know in full width, a formula begins: in a cell, and
-# behind a semicolon, which separates cells in languages that write decimals with a comma.  A number is none.
+# A formula begins with one of these signs, which spreadsheets of some languages also accept in full width: at the start
+# of a cell, or after a semicolon, which separates cells in languages with a decimal comma. A number is no formula.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# A cell of more letters is text, which may go on in a further line before a column is left out.
+# A longer cell is text, which is wrapped before a column is left out [letters].
 _TEXT: Final = 20
 
 
 def short(value: Cell) -> str:
-    """Write a cell for people: six significant digits, a dash for what is not known.
+    """Write a cell for people: six significant digits, a dash if the value is unknown.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def short(value: Cell) -> str:
 
 
 def measure(value: float | None) -> str:
-    """Write a share or an error, for which three decimals say all: 0.957, 0.000, or a dash.
+    """Write a share or an error with three decimals, such as 0.957, or a dash if it is unknown.
 
     Examples
     --------
@@ -54,37 +54,39 @@ def measure(value: float | None) -> str:
 
 
 def shown(value: float | None, form: str) -> str | None:
-    """Write a number in a form of Python's, as ``.0%``; None where it is not known."""
+    """Format a number by a Python format such as ``.0%``; return None if it is unknown."""
     return None if value is None else format(value, form)
 
 
 def half(low: float | None, high: float | None) -> str | None:
-    """Write half the width of an interval, as it stands behind +-."""
+    """Return half the width of an interval as text, for use after +-; None if it is unknown."""
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
 def known(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Leave the columns out in which nothing is known.
+    """Leave out the columns without a known value.
 
     Examples
     --------
     >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
     (['tr'], [[0.5], [0.7]])
     """
-    kept = [
+    known_columns = [
         i
         for i in range(len(head))
         if any(row[i] not in (None, "", "-") for row in rows)
     ]
-    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    return [head[i] for i in known_columns], [
+        [row[i] for i in known_columns] for row in rows
+    ]
 
 
 def filled(
     columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Give the names of columns, and below them the cells of each thing.
+    """Return the names of the columns, and one row of cells per object.
 
     Examples
     --------
@@ -99,22 +101,22 @@ def filled(
 def unstarred(
     head: Sequence[str], rows: Iterable[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Leave out the first column, which has a star for what is recommended; ``±`` as it is written on a page."""
+    """Leave out the first column, which has a star for what is recommended, and write +- as ``±`` for a page."""
     return [name.replace("+-", "±") for name in head[1:]], [
         list(row[1:]) for row in rows
     ]
 
 
-def in_line(said: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
-    """Write lines of a name, in so many letters or those of the longest, and what it stands for."""
-    lines = list(said)
+def in_line(named_texts: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
+    """Return aligned lines of a name and its text; names take ``width`` letters, by default as many as the longest."""
+    lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
     return [f"{name.ljust(width)}  {short(value)}" for name, value in lines]
 
 
-def listed(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Write the same as paragraphs of Markdown."""
-    return [f"{name}: {in_markdown(text)}" for name, text in said]
+def listed(named_texts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return pairs of a name and a text as paragraphs of Markdown."""
+    return [f"{name}: {in_markdown(text)}" for name, text in named_texts]
 
 
 def as_text(
@@ -123,10 +125,10 @@ def as_text(
     width: int = WIDEST,
     spare: Iterable[str] = (),
 ) -> str:
-    """Columns in line, numbers to the right of their column, two blanks between.
+    """Return a table as text: numbers aligned right, columns separated by two blanks.
 
-    Where it would be wider than ``width``, columns of ``spare`` are left out, the first of them first, and then words
-    of the widest columns go on in further lines.
+    A table wider than ``width`` first loses the columns in ``spare``, in their order; then the widest columns wrap
+    their text.
 
     Examples
     --------
@@ -150,7 +152,7 @@ def as_text(
             and sum(min(_TEXT, w) + 2 for w in widths.values()) - 2 > width
         ):
             del widths[name], texts[name]
-    right = [
+    is_number = [
         all(cell is None or isinstance(cell, (int, float)) for cell in columns[name])
         for name in texts
     ]
@@ -158,7 +160,7 @@ def as_text(
     lines = (
         "  ".join(
             t.rjust(w) if r else t.ljust(w)
-            for t, w, r in zip(line, narrow, right, strict=True)
+            for t, w, r in zip(line, narrow, is_number, strict=True)
         )
         for row in zip(*texts.values(), strict=True)
         for line in _broken(row, narrow)
@@ -167,7 +169,7 @@ def as_text(
 
 
 def wrapped(text: str, width: int) -> str:
-    r"""Break the lines of a text that are longer than ``width``; they go on below what follows a name.
+    r"""Wrap the lines of a text that are longer than ``width``; further lines are indented to the text after the name.
 
     Examples
     --------
@@ -182,7 +184,7 @@ def wrapped(text: str, width: int) -> str:
 
 
 def continued(line: str, width: int) -> str:
-    r"""Break a command line that is longer than ``width`` before options, where a shell joins it again.
+    r"""Wrap a command line that is longer than ``width`` before options, so that a shell reads it as one line.
 
     Examples
     --------
@@ -206,7 +208,7 @@ def continued(line: str, width: int) -> str:
 
 
 def _below(line: str, width: int) -> str:
-    """Break a line behind the blanks that follow its name, or those that it begins with."""
+    """Wrap a line, and indent its further lines to the text after the name, or like the line itself."""
     from textwrap import fill
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
@@ -223,8 +225,8 @@ def _below(line: str, width: int) -> str:
 def _narrowed(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
-    """Take from the widest columns what is too much: names break before cells, and words at last."""
-    found = list(widths)
+    """Reduce the widest columns until a table fits: first wrap names, then cells, and split words last."""
+    narrowed = list(widths)
     names, *cells = (
         [min(_WORD, max(map(len, text.split()), default=1)) for text in row]
         for row in texts
@@ -234,19 +236,19 @@ def _narrowed(
     ]
     words = [max(column) for column in zip(names, *cells, strict=True)]
     excess = sum(widths) + 2 * (len(widths) - 1) - width
-    for least in (whole, words, [min(_LEAST, word) for word in words]):
-        while excess > 0 and any(map(gt, found, least)):
+    for floor_widths in (whole, words, [min(_LEAST, word) for word in words]):
+        while excess > 0 and any(map(gt, narrowed, floor_widths)):
             widest = max(
-                (i for i in range(len(found)) if found[i] > least[i]),
-                key=lambda i: found[i],
+                (i for i in range(len(narrowed)) if narrowed[i] > floor_widths[i]),
+                key=lambda i: narrowed[i],
             )
-            found[widest] -= 1
+            narrowed[widest] -= 1
             excess -= 1
-    return found
+    return narrowed
 
 
 def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
-    """Give the lines of a row whose cells are no wider than their columns."""
+    """Yield the lines of a row whose cells are wrapped to the widths of their columns."""
     from itertools import zip_longest
 
     cells = (
@@ -257,7 +259,7 @@ def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
 
 
 def _lines(text: str, width: int) -> list[str]:
-    """Break a text between words, or behind what joins names, folders and numbers of parts where one is too long."""
+    """Wrap a text between words; too long words break after the signs that join names, folders and part ids."""
     from textwrap import TextWrapper
 
     wrapper = TextWrapper(width, break_on_hyphens=False)
@@ -267,7 +269,7 @@ def _lines(text: str, width: int) -> list[str]:
 
 
 def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """Give a Markdown table; what would be markup in cells is escaped.
+    """Return a Markdown table with escaped cells.
 
     Examples
     --------
@@ -285,7 +287,7 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
 
 def in_markdown(text: str) -> str:
-    r"""Escape what Markdown would take for markup in a name, in printable text.
+    r"""Escape the Markdown markup in a name, and replace unprintable characters.
 
     Examples
     --------
@@ -300,7 +302,7 @@ def in_markdown(text: str) -> str:
 
 
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    r"""Comma-separated at full precision, empty cells for what is not known, lines ending in a line feed.
+    r"""Return CSV at full precision: comma-separated, empty cells for unknown values, lines ending in a line feed.
 
     A text that a spreadsheet would compute as a formula gets an apostrophe before it: names and titles come from files.
 
@@ -330,19 +332,18 @@ def _exact(value: Cell) -> Cell:
 
 
 def as_json(result: Any, indent: int | None = 2) -> str:
-    r"""Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises.
+    r"""Write a result as JSON at full precision, null for unknown values; a NaN is a bug and raises ValueError.
 
-    Without an ``indent`` it is one line.  What commands a terminal or turns the text around is written as ``\u....``.
+    Without ``indent`` it is one line.  Characters that control a terminal or change the text direction become
+    ``\u....``.
     """
     import json
     import unicodedata
 
-    def seen(found: re.Match[str]) -> str:
-        return (
-            json.dumps(found[0])[1:-1]
-            if unicodedata.category(found[0]) in UNSEEN
-            else found[0]
-        )
+    def seen(match: re.Match[str]) -> str:
+        if unicodedata.category(match[0]) in UNSEEN:
+            return json.dumps(match[0])[1:-1]
+        return match[0]
 
     return re.sub(
         r"[^\n -~]",
@@ -352,14 +353,14 @@ def as_json(result: Any, indent: int | None = 2) -> str:
 
 
 def shell_line(words: Iterable[str]) -> str:
-    r"""Quote words so that bash, zsh and POSIX shells of 2024 give them back, in printable characters.
+    r"""Quote words so that bash, zsh and POSIX shells of 2024 restore them, in printable characters only.
 
     Examples
     --------
     >>> print(shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
-    import shlex  # not above: start-up
+    import shlex  # imported here to keep the start fast
 
     return " ".join(
         shlex.quote(word)
@@ -370,7 +371,7 @@ def shell_line(words: Iterable[str]) -> str:
 
 
 def positional(names: Sequence[str]) -> tuple[str, ...]:
-    """Give names as they are typed behind the options: behind ``--`` where one could be taken for an option.
+    """Return names as they are typed after the options: after ``--`` if one could be mistaken for an option.
 
     Examples
     --------
@@ -390,7 +391,7 @@ def positional(names: Sequence[str]) -> tuple[str, ...]:
 def _escaped(letter: str) -> str:
     if letter.isprintable():
         return f"\\{letter}" if letter in "\\'" else letter
-    # Bytes of a file name that are no text come as lone surrogates.
+    # Bytes of a file name that are not valid text are lone surrogates.
     errors = "surrogateescape" if "\udc80" <= letter <= "\udcff" else "surrogatepass"
-    # Three octal digits: of hexadecimal ones some shells take more than two, those of the name behind them.
+    # Three octal digits end by themselves; some shells read more than two hexadecimal digits.
     return "".join(f"\\{byte:03o}" for byte in letter.encode(errors=errors))

@@ -1,4 +1,4 @@
-"""The answer of ``explore`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``explore`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# Columns of the csv and of a frame.
+# columns of the CSV and of a frame
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
 
 
-# A change of the rigid time below this share is none that people read.
+# smallest change of the rigid time, as a share of it, that is mentioned
 _NO_CHANGE: Final = 5e-4
-# An error that falls to about this share of itself is halved; much further, it is as good as gone.
+# An error that falls to a share within these limits is halved; if it falls further, its new value is what counts.
 _HALF: Final = (0.45, 0.5)
 
 
-# Columns that are left out first where the table would be too wide.
+# Columns that are left out first if the table would be too wide.
 _SPARE: Final = (
     "timing tolerance",
     "level error",
@@ -59,104 +59,115 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
+_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
 
-def as_table(found: TradeOff, shown: Shown) -> str:
-    """The answer in a sentence, the verdict on the best pair, some of the offers that nothing beats, what was read."""
-    some = some_of(found, shown.limit)
-    offered = (
-        tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
-        if some
-        else "nothing to offer"
-    )
-    low, high = found.td_window
-    window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
+
+def as_table(trade_off: TradeOff, display: Shown) -> str:
+    """Return the answer in a sentence, the verdict on the best pair, some Pareto-optimal offers, and the input."""
+    listed_offers = some_of(trade_off, display.limit)
+    if listed_offers:
+        offered = tables.as_text(
+            *tables.known(*table(listed_offers)), display.width, _SPARE
+        )
+    else:
+        offered = "nothing to offer"
+    low, high = trade_off.td_window
+    window = f"{len(trade_off.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
-        make_printable(answer(found)),
-        *tables.in_line(verdict(found)),
+        make_printable(answer(trade_off)),
+        *tables.in_line(verdict(trade_off)),
         "",
         offered,
     ]
-    left = len(found.offers) - len(some)
-    if left:
-        lines.append(f"... and {left} more td (--limit; csv and json have all)")
-    read = [("history", what_was_read(found.situation.history)), ("td", window)]
-    return "\n".join([*lines, "", *tables.in_line(read)])
+    hidden_count = len(trade_off.offers) - len(listed_offers)
+    if hidden_count:
+        lines.append(f"... and {hidden_count} more td (--limit; csv and json have all)")
+    input_lines = [
+        ("history", what_was_read(trade_off.situation.history)),
+        ("td", window),
+    ]
+    return "\n".join([*lines, "", *tables.in_line(input_lines)])
 
 
-def verdict(found: TradeOff) -> list[tuple[str, str]]:
-    """What to do with the recommended pair, why, and what would be better."""
-    best = found.recommended
+def verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
+    """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
+    best = trade_off.recommended
     if best is None or best.best is None or best.decision is None:
         return [("no pair to use", "no td in the window has an acceptable tr")]
     return headed(best.decision, best.best.tr, best.td)
 
 
-def as_markdown(found: TradeOff, shown: Shown) -> str:
-    """The same offers as a Markdown table, and the answer below it."""
-    some = tables.known(*table(some_of(found, shown.limit)))
-    said = [tables.in_markdown(answer(found)), *tables.listed(verdict(found))]
-    return "\n\n".join([*said, tables.as_markdown(*some)])
+def as_markdown(trade_off: TradeOff, display: Shown) -> str:
+    """Return the same offers as a Markdown table, with the answer below it."""
+    offer_table = tables.known(*table(some_of(trade_off, display.limit)))
+    paragraphs = [
+        tables.in_markdown(answer(trade_off)),
+        *tables.listed(verdict(trade_off)),
+    ]
+    return "\n\n".join([*paragraphs, tables.as_markdown(*offer_table)])
 
 
-def as_csv(found: TradeOff, _: Shown) -> str:
-    """All offers, a column for each key of ``offers`` in the JSON output that is a single value."""
-    return csv_of(COLUMNS, map(OFFER.plain, found.offers))
+def as_csv(trade_off: TradeOff, _: Shown) -> str:
+    """Return CSV with all offers and a column for each key of ``offers`` in the JSON output that is a single value."""
+    return csv_of(COLUMNS, map(OFFER.plain, trade_off.offers))
 
 
-_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+def answer(trade_off: TradeOff) -> str:
+    """Return in one sentence how good the requested td is, and what a change to another td gains or costs.
 
-
-def answer(found: TradeOff) -> str:
-    """The shortest sensible answer in a sentence: how good the td asked for is, and what a step to another one changes.
-
-    Without a td that was asked for, the step begins at the one that saves most.
+    Without a requested td, the comparison starts from the td that saves most.
     """
-    start, step, unit = found.start, found.step, found.situation.history.time_unit
+    start = trade_off.start
+    step = trade_off.step
+    unit = trade_off.situation.history.time_unit
     if start is None:
         return "no td in the window has an acceptable tr"
-    named = f"td = {start.td:.6g}" + ("" if found.asked else " saves the most")
+    start_text = f"td = {start.td:.6g}" + ("" if trade_off.asked else " saves the most")
     if start.best is None:
-        what = f"{named} has no acceptable tr"
-        return what if step is None else f"{what}; {_away(start, step, unit)} has one"
-    what = (
-        f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
-    )
+        quality_text = f"{start_text} has no acceptable tr"
+        return (
+            quality_text
+            if step is None
+            else f"{quality_text}; {_away(start, step, unit)} has one"
+        )
+    if not trade_off.asked:
+        quality_text = f"{start_text}, {_error(start)}"
+    else:
+        quality_text = f"{start_text}: {_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return (
-            f"{what}; no other td in the window {'is better' if small else _NOT_HALVED}"
-        )
-    return f"{what}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
+        return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
+    return f"{quality_text}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
 
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", "number?", "the td that was asked for", lambda found: found.asked and found.asked.td),
+    Field("td", "number?", "the td that was asked for", lambda trade_off: trade_off.asked and trade_off.asked.td),
     Field("td_window", "span",
           "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
-    *keys.MECHANICS.of_part(lambda found: found.situation, ("flight", "oscillator", "modes")),
+    *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
     Field("answer", "text", "the shortest sensible answer", answer),
     Field("recommended", maybe(keys.TIMES)),
     Field("start", "number?",
           "td of the offer that the answer starts from: the one asked for, else the one that saves most",
-          lambda found: found.start and found.start.td),
+          lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
           "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
-          lambda found: found.step and found.step.td),
+          lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
 ))  # fmt: skip
 
 
 def _away(start: Offer, step: Offer, unit: str) -> str:
-    """Where the step leads."""
+    """Return how far the other td is away, and its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
 
 
 def _less(start: Offer, step: Offer) -> str:
-    """What the step does to the error."""
+    """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
         return "brings the level below twice the mean energy"
@@ -166,7 +177,7 @@ def _less(start: Offer, step: Offer) -> str:
 
 
 def _cost(start: Offer, step: Offer) -> str:
-    """What the step does to the run time, or to the rigid time where the cost of the parts is not known."""
+    """Return how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
@@ -177,62 +188,71 @@ def _cost(start: Offer, step: Offer) -> str:
     change = step.rigid_time / start.rigid_time - 1
     if abs(change) < _NO_CHANGE:
         return "costs no rigid time"
-    return (
-        f"costs {-change:.1%} of the rigid time"
-        if change < 0
-        else f"makes the rigid time {change:.1%} longer"
-    )
+    if change < 0:
+        return f"costs {-change:.1%} of the rigid time"
+    return f"makes the rigid time {change:.1%} longer"
 
 
-def _error(one: Offer) -> str:
-    """The error of an offer, with its name."""
-    if one.error is None:
+def _error(offer: Offer) -> str:
+    """Return the error of an offer with its name."""
+    if offer.error is None:
         return "a level above twice the mean energy"
-    if one.basis == "energy":
-        return f"error {tables.measure(one.error)} (shortfall of the level at td)"
-    return f"residual {tables.measure(one.error)}"
+    if offer.basis == "energy":
+        return f"error {tables.measure(offer.error)} (shortfall of the level at td)"
+    return f"residual {tables.measure(offer.error)}"
 
 
-def some_of(found: TradeOff, limit: int) -> list[Offer]:
-    """Offers that the answer names, and evenly over those that nothing beats as many as make ``limit``."""
-    named = {
-        one.td
-        for one in (found.asked, found.recommended, found.start, found.step)
-        if one
+def some_of(trade_off: TradeOff, limit: int) -> list[Offer]:
+    """Return the offers that the answer names, and Pareto-optimal ones at even distances, up to ``limit`` in all."""
+    named_td = {
+        offer.td
+        for offer in (
+            trade_off.asked,
+            trade_off.recommended,
+            trade_off.start,
+            trade_off.step,
+        )
+        if offer
     }
-    best = [one.td for one in found.offers if one.unbeaten and one.td not in named]
-    room = min(max(limit - len(named), 0), len(best))
-    named.update(
-        best[round((place + 0.5) * len(best) / room - 0.5)] for place in range(room)
+    best = [
+        offer.td
+        for offer in trade_off.offers
+        if offer.unbeaten and offer.td not in named_td
+    ]
+    room = min(max(limit - len(named_td), 0), len(best))
+    named_td.update(
+        best[round((index + 0.5) * len(best) / room - 0.5)] for index in range(room)
     )
-    return [one for one in found.offers if one.td in named]
+    return [offer for offer in trade_off.offers if offer.td in named_td]
 
 
 def table(offers: Sequence[Offer]) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of some offers; the recommended one has a star."""
+    """Return the column names and cells of some offers; the recommended offer has a star."""
     return tables.filled(_COLUMNS, offers)
 
 
 def _of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
-    """Show a measure of the best pair of an offer."""
-    return lambda one: tables.shown(getattr(one.best, key), form) if one.best else None
+    """Return a function that formats a measure of the best pair of an offer."""
+    return lambda offer: (
+        tables.shown(getattr(offer.best, key), form) if offer.best else None
+    )
 
 
 _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
-    "": lambda one: "*" if one.recommended else " ",
-    "td": lambda one: one.td,
-    "peak": lambda one: "peak" if one.peak else "",
-    "tr": lambda one: one.tr,
-    "error": lambda one: tables.measure(one.error),
-    "level error": lambda one: tables.measure(
-        one.best.level_error if one.best else None
+    "": lambda offer: "*" if offer.recommended else " ",
+    "td": lambda offer: offer.td,
+    "peak": lambda offer: "peak" if offer.peak else "",
+    "tr": lambda offer: offer.tr,
+    "error": lambda offer: tables.measure(offer.error),
+    "level error": lambda offer: tables.measure(
+        offer.best.level_error if offer.best else None
     ),
-    "kinetic fraction": lambda one: tables.measure(one.kinetic_share),
-    "rigid for": lambda one: one.rigid_time,
+    "kinetic fraction": lambda offer: tables.measure(offer.kinetic_share),
+    "rigid for": lambda offer: offer.rigid_time,
     "of simulated time": _of_best("rigid_fraction", ".1%"),
     "processor time": _of_best("run_time_share", ".0%"),
     "timing tolerance": _of_best("timing_tolerance", ".1e"),
-    "verdict": lambda one: (
-        in_short(one.decision) if one.decision else one.answer.why_none
+    "verdict": lambda offer: (
+        in_short(offer.decision) if offer.decision else offer.answer.why_none
     ),
 }

@@ -1,4 +1,4 @@
-"""The answer of ``verify`` as table, JSON, CSV and Markdown."""
+"""Write the result of ``verify`` as a table, JSON, CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.report.formats import Shown
 
-# The pair that was judged, its measures and what they come to.
+# the judged pair, its measures and the verdict
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -59,28 +59,28 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
 COMPARED = ("", "switched", "reference")
 
 
-def as_table(answer: Verdict, shown: Shown) -> str:
-    """The verdict, why, and what would be better; then what it rests on, and the measures of the pair."""
+def as_table(answer: Verdict, display: Shown) -> str:
+    """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
     decided = answer.decision.reason
-    remarks = [("note", what) for what in answer.reasons if what not in decided]
-    above = heading(answer.situation, verbose=shown.verbose)
+    remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
+    above = heading(answer.situation, verbose=display.verbose)
     lines = tables.in_line(verdict(answer))
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     listed = [*facts(answer), *above, *remarks]
-    said = [(name, make_printable(text)) for name, text in listed]
+    printable = [(name, make_printable(text)) for name, text in listed]
     return "\n".join(
-        [*lines, "", *tables.in_line(said), "", *tables.in_line(measured(answer))]
+        [*lines, "", *tables.in_line(printable), "", *tables.in_line(measured(answer))]
     )
 
 
 def verdict(answer: Verdict) -> list[tuple[str, str]]:
-    """What to do with the pair, why, and what would be better; a name and a sentence each."""
+    """Return what to do with the pair, why, and what would be better, as pairs of a name and a sentence."""
     return headed(answer.decision, answer.candidate.tr, answer.td)
 
 
 def facts(answer: Verdict) -> list[tuple[str, str]]:
-    """What the verdict rests on, how long the parts are rigid, and how exactly tr is known."""
+    """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.candidate
     lines = [*statements(answer.decision), ("rigid for", rigid_for(best))]
     if best.run_time_share is not None:
@@ -91,10 +91,10 @@ def facts(answer: Verdict) -> list[tuple[str, str]]:
 
 
 def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
-    """The measures of the pair by names for people, without those that are not known."""
+    """Return the known measures of the pair with their names for people."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
-    found: list[tuple[str, tables.Cell]] = [
+    rows: list[tuple[str, tables.Cell]] = [
         ("energy at tr", best.energy),
         ("energy at td", answer.energy_td),
         ("energy at tr / at td", best.level_ratio),
@@ -109,28 +109,27 @@ def measured(answer: Verdict) -> list[tuple[str, tables.Cell]]:
         ("timing tolerance", best.timing_tolerance),
         ("position error", best.position_error),
     ]
-    return [one for one in found if one[1] is not None]
+    return [row for row in rows if row[1] is not None]
 
 
 def as_markdown(answer: Verdict, _: Shown) -> str:
-    """The verdict, and the measures as a Markdown table of two columns."""
-    said = tables.listed((*verdict(answer), *facts(answer)))
+    """Return the verdict, and the measures as a Markdown table of two columns."""
+    paragraphs = tables.listed((*verdict(answer), *facts(answer)))
     table = tables.as_markdown(("measure", "value"), measured(answer))
     switched = answer.switched
-    compared = (
-        [
+    if switched:
+        compared = [
             tables.as_markdown(COMPARED, comparison(switched)),
             *tables.listed(deviations(switched)),
         ]
-        if switched
-        else []
-    )
+    else:
+        compared = []
     reasons = [f"* {tables.in_markdown(reason)}" for reason in answer.reasons]
-    return "\n\n".join([*said, table, *compared, *reasons])
+    return "\n\n".join([*paragraphs, table, *compared, *reasons])
 
 
 def measures(answer: Verdict) -> dict[str, Any]:
-    """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
+    """Return each measure by its key, those of a switched run with the prefix ``switched_``; reasons are one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -148,13 +147,13 @@ def measures(answer: Verdict) -> dict[str, Any]:
 
 
 def as_csv(answer: Verdict, _: Shown) -> str:
-    """One row, a column for each key of `measures`."""
-    found = measures(answer)
-    return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
+    """Return one row of CSV with a column for each key of `measures`."""
+    values = measures(answer)
+    return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Rows of numbers that both runs have, below ``COMPARED``."""
+    """Return the numbers that both runs have as rows of name, reference and switched run, below `COMPARED`."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
@@ -167,22 +166,22 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
 
 
 def deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """How far the switched run moves off the reference after td."""
-    error, displacement = switched.momentum_error, switched.displacement
-    off = (
-        []
-        if error is None
-        else [("largest error of the momentum after td", f"{error:.2g} of its maximum")]
-    )
-    return (
-        off
-        if displacement is None
-        else [*off, ("largest displacement after td", f"{displacement:.3g}")]
-    )
+    """Return how far the switched run deviates from the reference after td, as pairs of a name and a text."""
+    error = switched.momentum_error
+    displacement = switched.displacement
+    if error is None:
+        rows = []
+    else:
+        rows = [
+            ("largest error of the momentum after td", f"{error:.2g} of its maximum")
+        ]
+    if displacement is None:
+        return rows
+    return [*rows, ("largest displacement after td", f"{displacement:.3g}")]
 
 
 def _comparison(switched: Comparison) -> list[str]:
-    """Lines that hold the switched run against the reference."""
+    """Return the lines that compare the switched run with the reference."""
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
@@ -192,14 +191,14 @@ def _comparison(switched: Comparison) -> list[str]:
 
 
 def _of_switched(answer: Verdict) -> dict[str, Any]:
-    """Measures of the switched run under names of their own; empty where there is none."""
-    found = SWITCHED.plain(answer.switched) if answer.switched else {}
-    found = {
+    """Return the measures of the switched run under their own names, empty without a switched run."""
+    values = SWITCHED.plain(answer.switched) if answer.switched else {}
+    values = {
         name: "; ".join(value) if name == "objections" else value
-        for name, value in found.items()
+        for name, value in values.items()
     }
     return {
         f"switched_{name}": value
-        for name, value in found.items()
+        for name, value in values.items()
         if name not in ("source", "notes")
     }

@@ -1,4 +1,4 @@
-"""What one looks at to see a choice: the flight around td, how high the energy stands there, the motion behind it."""
+"""Select what a figure shows of a choice: the flight around td, the range of its energy, and the motion after td."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Shown beyond each end of the flight, as a share of it: enough to see load and landing begin.
+# Time shown beyond each end of the flight, as a share of it: enough to see the load and the landing begin.
 _BEYOND = 0.06
-# Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis; a logarithmic one ends
-# at this part of the level.
+# If the highest energy is more than this ratio above the level, the axis is logarithmic, since the level would vanish
+# on a linear one; a logarithmic axis ends at the level divided by this ratio.
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# Room above and below the curve, as a share of its height.
+# space above and below the curve, as a share of its height
 _ROOM = 0.08
-# By this share of a flight its ends may be off: the load or the landing may stand there already.
+# Possible error of the ends of a flight, as a share of it: the load or the landing may act there.
 _UNSURE = 0.01
-# Points of a curve: some dozens for each swing.
+# points of a curve: some dozens per oscillation cycle
 _POINTS = 2000
 
 
 class View(NamedTuple):
-    """From ``start`` to ``end`` [time]; there the flight has energies from ``low`` to ``high``.
+    """The visible range from ``start`` to ``end`` [time], in which the flight has energies from ``low`` to ``high``.
 
-    ``above`` names what stands above the flight in that time, "load" and "landing", and how high [energy].
+    ``above`` holds name ("load", "landing") and height [energy] of what is higher than the flight in this range.
     """
 
     start: float
@@ -46,7 +46,7 @@ class View(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Lowest and highest value in sight, with some room [energy]; ``logarithmic``: how the axis between them runs."""
+    """Lowest and highest visible value, with some room [energy]; ``logarithmic`` is True for a logarithmic axis."""
 
     low: float
     high: float
@@ -56,7 +56,7 @@ class Scale(NamedTuple):
 def merged(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
-    """Join windows, ascending, that are less than ``gap`` apart [time]: noise makes hundreds that no eye tells apart.
+    """Join windows in ascending order that are less than ``gap`` apart [time]: noise makes hundreds of short ones.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def merged(
 
 
 def scale_of(low: float, high: float, level: float) -> Scale:
-    """Give the scale that shows values from ``low`` to ``high``, and a ``level`` on which the eye must rest [energy].
+    """Return the scale for values from ``low`` to ``high`` on which ``level`` is easy to see [energy].
 
     Examples
     --------
@@ -88,76 +88,79 @@ def scale_of(low: float, high: float, level: float) -> Scale:
     return Scale(low - room, high + room, logarithmic=False)
 
 
-def scale_in(situation: Situation, seen: View, levels: Sequence[float]) -> Scale:
-    """Give the scale for a flight and its levels; where nothing vibrates, beside what the whole run has [energy]."""
+def scale_in(situation: Situation, view: View, levels: Sequence[float]) -> Scale:
+    """Return the scale for a flight and its levels; if nothing vibrates, for the energy of the whole run [energy]."""
     if situation.at_rest:
         return scale_of(
             0.0,
             max(float(situation.history.energy.max()), round_off(situation.history)),
             0.0,
         )
-    return scale_of(min(seen.low, *levels), max(seen.high, *levels), median(levels))
+    return scale_of(min(view.low, *levels), max(view.high, *levels), median(levels))
 
 
 def view_of(situation: Situation, *times: float) -> View:
-    """Give what shows the flight of a situation, its td and other ``times`` [time]."""
+    """Return the view of the flight of a situation, its td and other ``times`` [time]."""
     span = situation.evidence.span
-    known = max(span.end, situation.td) if span else None
-    return view(situation.history, situation.flight, [situation.td, *times], known)
+    last_known = max(span.end, situation.td) if span else None
+    return view(situation.history, situation.flight, [situation.td, *times], last_known)
 
 
 def view(
-    history: History, flight: Flight, times: list[float], known: float | None = None
+    history: History,
+    flight: Flight,
+    times: list[float],
+    last_known: float | None = None,
 ) -> View:
-    """Give what shows a flight and ``times`` [time]; a flight whose end was not seen lasts to ``known``, or the last.
+    """Return the view of a flight and ``times`` [time]; a flight of unknown end lasts to ``known`` or the last time.
 
-    Where no flight is known, the whole record is shown.
+    If no flight is known, the view is the whole record.
     """
-    first, last = float(history.time[0]), float(history.time[-1])
+    first = float(history.time[0])
+    last = float(history.time[-1])
     if flight.start is None:
         inner = first, last
     else:
-        end = (
-            flight.end
-            if flight.end is not None
-            else known
-            if known is not None
-            else last
-        )
+        if flight.end is not None:
+            end = flight.end
+        else:
+            end = last_known if last_known is not None else last
         inner = max(first, min(flight.start, *times)), min(last, max(end, *times))
         inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
-    start, end = max(first, inner[0] - beyond), min(last, inner[1] + beyond)
+    start = max(first, inner[0] - beyond)
+    end = min(last, inner[1] + beyond)
     begin = inner[0] if flight.start is None else flight.start
     stop = inner[1] if flight.end is None else flight.end
     flown = _flown(history, begin, stop, inner)
-    low, high = float(flown.min()), float(flown.max())
+    low = float(flown.min())
+    high = float(flown.max())
     middle = min(max(start, (begin + stop) / 2), end)
     sides = (("load", start, middle), ("landing", middle, end))
     highest = [
-        (what, float(history.between(*side)[1].max(initial=high)))
-        for what, *side in sides
+        (peak_name, float(history.between(*side)[1].max(initial=high)))
+        for peak_name, *side in sides
     ]
     return View(
         start,
         end,
         low,
         high,
-        tuple((what, energy) for what, energy in highest if energy > high),
+        tuple((peak_name, energy) for peak_name, energy in highest if energy > high),
     )
 
 
 def _flown(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
-    """Energies in the flight, but for its ends; where it has no state, those between which it lies."""
-    off = _UNSURE * (end - start)
-    flown = history.between(start + off, end - off)[1]
+    """Return the energies in the flight without its ends, or the adjacent states if the flight contains none."""
+    margin = _UNSURE * (end - start)
+    flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))
 
 
 class Motion(NamedTuple):
-    """Deformations over ``time`` [time], without switching and ``switched``, of one shape [square root of energy]."""
+    """Deformations over ``time`` [time] of one shape, without switching and ``switched`` [square root of energy]."""
 
     time: Samples
     reference: Samples
@@ -175,19 +178,17 @@ def replayed_motion(
     tr : float
         When the parts are switched to rigid [time].
     time : array of shape (n,), optional
-        Where the deformation is wanted [time], from the start of the window that the oscillator describes on; by
-        default all of that window, up to td at least.
+        Times of the deformation [time], not before the window that the oscillator describes; by default all of that
+        window, up to td at least.
 
     Returns
     -------
     Motion or None
-        None where no single oscillator describes the record at tr.
+        None if no single oscillator describes the record at tr.
     """
-    mode, span, td = (
-        situation.vibration.whole.mode,
-        situation.evidence.span,
-        situation.td,
-    )
+    mode = situation.vibration.whole.mode
+    span = situation.evidence.span
+    td = situation.td
     if not (
         isinstance(mode, Mode) and span and situation.vibration.whole.described(tr)
     ):
@@ -206,12 +207,12 @@ def replayed_motion(
 
 
 class Response(NamedTuple):
-    """What any pair of switch times makes of the one oscillator that describes a record.
+    """The motion of the one oscillator that describes a record, from which the motion for any switch times follows.
 
-    On an even grid of ``time`` (n,) [time]: ``reference``, the deformation without switching, and ``release``, by what
-    share a deformation is left as long after td as ``time`` is after its first.  Deformations swing about ``preload``
-    [square root of energy]: switched they are the reference until tr, then what it is there until td, then that share
-    of it.
+    On an even grid of ``time`` (n,) [time], ``reference`` is the deformation without switching; ``release`` is the
+    share of a released deformation that remains after the time since the first grid point.  Deformations vibrate about
+    ``preload`` [square root of energy].  A switched deformation is the reference until tr, then constant until td, then
+    that constant times ``release``.
     """
 
     time: Samples
@@ -221,12 +222,10 @@ class Response(NamedTuple):
 
 
 def response(situation: Situation) -> Response | None:
-    """Give the response of the one oscillator that describes the record; None where none does."""
-    mode, span, td = (
-        situation.vibration.whole.mode,
-        situation.evidence.span,
-        situation.td,
-    )
+    """Return the response of the one oscillator that describes the record, None if no oscillator does."""
+    mode = situation.vibration.whole.mode
+    span = situation.evidence.span
+    td = situation.td
     if not (isinstance(mode, Mode) and span):
         return None
     time = np.linspace(span.start, max(span.end, td), _POINTS)
@@ -241,14 +240,11 @@ def response(situation: Situation) -> Response | None:
 
 
 def locked_in(situation: Situation, tr: float | None) -> float | None:
-    """Deformation that tr locks in [square root of energy]; None where no single oscillator describes it."""
-    mode = (
-        None
-        if tr is None or not situation.vibration.whole.described(tr)
-        else situation.vibration.whole.mode
-    )
-    return (
-        float(mode.deformation(tr))
-        if tr is not None and isinstance(mode, Mode)
-        else None
-    )
+    """Return the deformation locked in at tr [square root of energy], None if no single oscillator describes it."""
+    if tr is None or not situation.vibration.whole.described(tr):
+        mode = None
+    else:
+        mode = situation.vibration.whole.mode
+    if tr is not None and isinstance(mode, Mode):
+        return float(mode.deformation(tr))
+    return None

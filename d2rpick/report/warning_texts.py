@@ -1,4 +1,4 @@
-"""What each warning means for the decision, and what to do about it; `d2rpick rule CODE` prints it."""
+"""Explain what each warning means for the decision, and what to do about it; ``d2rpick rule CODE`` prints the text."""
 
 from __future__ import annotations
 
@@ -355,6 +355,6 @@ EXPLANATIONS: Final = {
 
 
 def explain_warning(code: str) -> str:
-    """Explain a warning by its code, one of `EXPLANATIONS`."""
+    """Return the explanation of a warning by its code, one of `EXPLANATIONS`."""
     means, fix = EXPLANATIONS[code]
     return f"{code} (warning): {means}\n\nFix: {fix}"

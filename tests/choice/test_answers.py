@@ -347,7 +347,7 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     box = suggest_of(reference, 0.37, PLAIN, fits=fits)
     fits_made = fits.made
     assert fits_made > 0
-    judge = partial(verify_of, reference, settings=PLAIN, known=box.situation)
+    judge = partial(verify_of, reference, settings=PLAIN, earlier=box.situation)
     assert judged_card(
         [require(box.recommended)[:2]],
         box.situation.history,

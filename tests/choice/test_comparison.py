@@ -12,7 +12,12 @@ import pytest
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import Verdict, compare_with, verify_of
-from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
+from d2rpick.choice.comparison import (
+    MOST_MOMENTUM_ERROR,
+    Comparison,
+    compare_runs,
+    times_of,
+)
 from d2rpick.choice.question import Settings
 from d2rpick.choice.switched_run import rigid_parts, switched_history
 from d2rpick.histories.history import History, Samples, Track
@@ -112,13 +117,25 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     )
     assert (verified_at["tr"], verified_at["td"]) == (verdict["tr"], 0.37)
     assert (
-        "its energy stands still nowhere, or that of the reference does so too; give --tr and --td"
+        "the energies of the switched run and of the reference run are the same; give --tr and --td"
         in read_refusal("verify", "--part", "box", "--switched", BOX, BOX)
     )
     assert (
         "give the time of the switch as --td"
         in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
     )
+
+
+def test_a_run_without_rigid_times_is_refused_with_the_cause() -> None:
+    swinging = make_history(2.0 + np.sin(40 * TIME) ** 2)
+    other = make_history(2.0 + np.sin(41 * TIME) ** 2)
+    constant = make_history(np.full_like(TIME, 2.0))
+    with pytest.raises(RangeError, match="never stays constant"):
+        times_of(other, swinging)
+    with pytest.raises(RangeError, match="from 0 to 1, but that of the reference run"):
+        times_of(constant, make_history(np.full_like(TIME, 3.0)))
+    with pytest.raises(RangeError, match="are the same"):
+        times_of(swinging, make_history(swinging.energy))
 
 
 def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(

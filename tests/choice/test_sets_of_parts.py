@@ -208,7 +208,7 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     return rank_sets(
         locate_stored("carT01.gz"),
         str(deck),
-        given=[12, 13, 14],
+        given_ids=[12, 13, 14],
         times=(0.0496, 0.1464),
     )
 

@@ -56,7 +56,7 @@ def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None
 
 def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
     assert view(
-        make_record(), Flight(2.0, None, "oscillator"), [3.0], known=6.0
+        make_record(), Flight(2.0, None, "oscillator"), [3.0], last_known=6.0
     ).end == pytest.approx(6.24)
     assert view(make_record(), Flight(2.0, None, "momentum"), [3.0]).end == 10
 
