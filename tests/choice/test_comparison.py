@@ -100,7 +100,9 @@ def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
     assert share < 0.7
     assert not verdict["verified"]
     (reason,) = verdict["switched"]["objections"]
-    assert f"{share:.2g} times that of the reference, 0.7 to 1.3 were expected" in reason
+    assert (
+        f"{share:.2g} times that of the reference, 0.7 to 1.3 were expected" in reason
+    )
     assert verify_rollover("--min-mean-energy", "0.6")["verified"]
 
 
