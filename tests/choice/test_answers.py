@@ -345,7 +345,7 @@ def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     reference, fits = read([T01], BOX), CountedFits()
     box = suggest_of(reference, 0.37, PLAIN, fits=fits)
-    fits_made = fits.made
+    fits_made = fits.computed
     assert fits_made > 0
     judge = partial(verify_of, reference, settings=PLAIN, earlier=box.situation)
     assert judged_card(
@@ -354,4 +354,4 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
         judge,
         CardRequest("ls-dyna"),
     )
-    assert fits.made == fits_made
+    assert fits.computed == fits_made

@@ -137,10 +137,10 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> N
     for td in (0.30, 0.3175, 0.335):
         suggest_at(examine(history, td, late, fits))
         examine(history, td, late, fits, quick=True)
-    fits_made = fits.made
+    fits_made = fits.computed
     assert fits_made > 0
     assert suggest_in_window(history, (0.30, 0.335), late, fits).recommended is None
-    assert fits.made == fits_made
+    assert fits.computed == fits_made
 
 
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:

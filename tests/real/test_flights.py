@@ -60,6 +60,6 @@ def test_a_driven_model_does_not_fly(name: str) -> None:
     assert flights_of(history, Settings(replay=False)) == ()
     for share in (0.25, 0.5, 0.75):
         td = float(history.time[0] + share * np.ptp(history.time))
-        found = suggest(history, td, Settings(replay=False))
-        assert found.recommended is None
+        suggestion = suggest(history, td, Settings(replay=False))
+        assert suggestion.recommended is None
         assert not verify(history, td / 2, td, Settings(replay=False)).verified

@@ -22,8 +22,8 @@ PICK_UP: Final = (25.5, 6.5)
 _CAPPED: Final = 20.00 / 21.54
 
 
-class Run(NamedTuple):
-    """Run whose processor time was measured with and without switching.
+class MeasuredRun(NamedTuple):
+    """MeasuredRun whose processor time was measured with and without switching.
 
     ``rigid`` are elements by formulation, and their integration points beside those of one layer.
     """
@@ -85,8 +85,8 @@ _BODY: Final = {
 }
 _CAR: Final = {**_BODY, "BT": 258 + 309}
 RUNS: Final = (
-    Run("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
-    Run(
+    MeasuredRun("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
+    MeasuredRun(
         "all but the part that lands first",
         _RIGID,
         {**_BODY, "QBAT": 92, POINT: 3356},
@@ -94,7 +94,7 @@ RUNS: Final = (
         1.0,
         0.270,
     ),
-    Run(
+    MeasuredRun(
         "parts that have stopped deforming",
         _RIGID,
         {"QEPH": 764, "beam": 60, POINT: 1528},
@@ -102,7 +102,7 @@ RUNS: Final = (
         1.0,
         0.126,
     ),
-    Run(
+    MeasuredRun(
         "heavy parts",
         _RIGID,
         {"solid": 160, "beam": 18, "QEPH": 48, POINT: 96},
