@@ -20,7 +20,7 @@ _TURNS_PER_PERIOD: Final = 2
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
-def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
+def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     """Yield a warning if the states up to td are too few for the level at td: fewer than 10 per visible period.
 
     If no period is visible, all periods may have been missed, since a d3plot has some hundred states at most.
