@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import pytest
 
-from d2rpick.choice.plan import plan_run
 from d2rpick.choice.question import Settings, read_reference
+from d2rpick.choice.td.plan import plan_run
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate

@@ -16,8 +16,8 @@ import numpy as np
 
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import read_timing
 from d2rpick.histories.opening import Selection, open_run

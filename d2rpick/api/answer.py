@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
     from d2rpick.choice.judged_card import SolverInput
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.report.formats import DisplayOptions
     from d2rpick.report.page import PageContext
 

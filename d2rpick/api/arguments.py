@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
-from d2rpick.choice.grades import GRADES
+from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -419,7 +419,7 @@ def check_weights(value: object) -> Any:
         return None
     if isinstance(value, str | os.PathLike):
         return check_path("weights", value)
-    from d2rpick.choice.cost import (
+    from d2rpick.choice.parts.cost import (
         Weights,
     )  # imported here since weights are rarely given
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import CostModel, Weights
+    from d2rpick.choice.parts.cost import CostModel, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories import run as histories
 
@@ -142,7 +142,10 @@ def ask_run(
         _check_recommended(request, files)
     foreign = False
     if model is not None:
-        from d2rpick.choice.deck_of_run import add_surroundings, check_model_of_deck
+        from d2rpick.choice.parts.deck_of_run import (
+            add_surroundings,
+            check_model_of_deck,
+        )
 
         foreign = check_model_of_deck(files, model.inventory) is not None
         files = add_surroundings(files, model.inventory)
@@ -155,7 +158,7 @@ def ask_run(
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
-        from d2rpick.choice.deck_of_run import add_deck_to_settings
+        from d2rpick.choice.parts.deck_of_run import add_deck_to_settings
 
         settings, cautions = add_deck_to_settings(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
@@ -183,7 +186,7 @@ def read_cost_model(request: Request) -> CostModel | None:
     """
     if request.deck is None:
         return None
-    from d2rpick.choice.cost import CostModel, read_weights
+    from d2rpick.choice.parts.cost import CostModel, read_weights
     from d2rpick.deck import read_inventory
 
     weights = request.weights
@@ -203,8 +206,8 @@ def complete_selection(
     FormatError
         If no set can be recommended.
     """
-    from d2rpick.choice.deck_of_run import check_model_of_deck
-    from d2rpick.choice.sets_of_parts import recommend_parts
+    from d2rpick.choice.parts.deck_of_run import check_model_of_deck
+    from d2rpick.choice.parts.sets_of_parts import recommend_parts
     from d2rpick.deck.model import DISCRETE
 
     if foreign := check_model_of_deck(run, model.inventory):
@@ -238,7 +241,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
 
 def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
     """Make the parts one rigid body, with a caution if nothing connects them."""
-    from d2rpick.choice.deck_of_run import merge_into_one_body
+    from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts
     if not parts:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.judged_card import CardRequest
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed

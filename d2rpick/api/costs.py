@@ -10,8 +10,8 @@ from d2rpick.api.answer import Answer, Paged, build_frame, write_page
 from d2rpick.api.asked import make_request, read_cost_model
 from d2rpick.api.deck_in_folder import name_deck
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice import calibration, sets_of_parts
-from d2rpick.choice.cost import Weights, format_weights_as_toml
+from d2rpick.choice.parts import calibration, sets_of_parts
+from d2rpick.choice.parts.cost import Weights, format_weights_as_toml
 from d2rpick.report.tables import make_positional
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

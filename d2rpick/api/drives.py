@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards, parse_numbers
 from d2rpick.base.errors import ConfigurationError, D2RPickError
-from d2rpick.choice.cost import CostModel
-from d2rpick.choice.deck_of_run import warn_about_solver
+from d2rpick.choice.parts.cost import CostModel
+from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.writing import read_driven_deck
 from d2rpick.histories.opening import open_run

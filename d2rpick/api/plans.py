@@ -11,7 +11,7 @@ from d2rpick.api.asked import RunQuestion, ask_run, make_request
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, print_judged_card
 from d2rpick.api.request import NOT_NEGATIVE, check_window
 from d2rpick.base.errors import ArgumentError, DeckError
-from d2rpick.choice import plan as planning, trade_off
+from d2rpick.choice.td import plan as planning, trade_off
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.checking import Findings
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.switched.switched_run import Times
 
 _STEPS: Final = 200  # number of td that are explored
 

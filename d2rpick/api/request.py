@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.grades import GRADES
+from d2rpick.choice.pair.grades import GRADES
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
-    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator

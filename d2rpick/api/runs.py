@@ -411,8 +411,8 @@ def extract_columns(
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum that shows the flight, each of shape (n,).
     """
-    from d2rpick.choice.flights import list_momentum_columns
     from d2rpick.choice.question import Reference
+    from d2rpick.choice.td.flights import list_momentum_columns
 
     history = Reference.of(run, selection).history
     table = {"time": history.time, "internal_energy": history.energy}

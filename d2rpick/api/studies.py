@@ -21,8 +21,8 @@ from d2rpick.api.request import Request, choose_time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
 from d2rpick.base.workers import Farm, choose_farm
-from d2rpick.choice import study as core
-from d2rpick.choice.study import (
+from d2rpick.choice.runs import study as core
+from d2rpick.choice.runs.study import (
     FAILED,
     UNREADABLE,
     Question,
@@ -133,7 +133,7 @@ def study(
         input_format=check_format(input_format),
     )  # fmt: skip
     question = make_question(request, td_or_window, curve=True)
-    with choose_farm(min(processes, len(names)), "d2rpick.choice.study") as farm:
+    with choose_farm(min(processes, len(names)), "d2rpick.choice.runs.study") as farm:
         return compare_rows(
             request, question, names, list(compute_rows(question, names, farm))
         )

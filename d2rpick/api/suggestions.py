@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.candidates import Pair
-    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.parts.cost import Weights
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -92,7 +92,7 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
         cards: Cards | None = None,
     ) -> str:
         """Return the page, with the card of the recommended pair."""
-        from d2rpick.choice.trade_off import explore_around
+        from d2rpick.choice.td.trade_off import explore_around
         from d2rpick.report.pages import suggestion_page
 
         chosen = (self.situation, self.recommended.tr) if self.recommended else None
@@ -149,7 +149,7 @@ class Verdict(RunAnswer, answers.PairVerdict):
         cards: Cards | None = None,
     ) -> str:
         """Return the page, with the card of the pair if it is good."""
-        from d2rpick.choice.trade_off import explore_around
+        from d2rpick.choice.td.trade_off import explore_around
         from d2rpick.report.pages import verdict_page
 
         chosen = (self.situation, self.tr) if self.verified else None
@@ -330,7 +330,7 @@ def judge_pair(
         switched.files, question.selection
     )
     if switched_reference and (tr is None or td is None):
-        from d2rpick.choice.comparison import find_switch_times
+        from d2rpick.choice.switched.comparison import find_switch_times
 
         switch_times = find_switch_times(
             switched_reference.history, question.reference.history

@@ -12,10 +12,6 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import Kept, bound_mean_energy
-from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge_times
-from d2rpick.choice.decision import Decision, decide
-from d2rpick.choice.grades import POOR
 from d2rpick.choice.health import (
     OF_THE_MODEL,
     assess_health,
@@ -23,15 +19,19 @@ from d2rpick.choice.health import (
     warn_about_engine,
     warn_about_health,
 )
-from d2rpick.choice.quality import (
+from d2rpick.choice.pair.aftermath import Kept, bound_mean_energy
+from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_times
+from d2rpick.choice.pair.decision import Decision, decide
+from d2rpick.choice.pair.grades import POOR
+from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     ROUNDING,
     Quality,
     list_exceeded_limits,
     rank_candidates,
 )
-from d2rpick.choice.situation import AnswerAtTd, Situation, examine_td
-from d2rpick.choice.warnings import (
+from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
+from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
     Expectation,
@@ -48,9 +48,9 @@ from d2rpick.histories.digits import round_as_read
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
+    from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.span import Fits
@@ -240,7 +240,7 @@ class PairSuggestion(AnswerAtTd):
         if not self.situation.in_flight:
             return ()
         # imported here: an oscillator does not need it
-        from d2rpick.choice.windows import (
+        from d2rpick.choice.pair.windows import (
             find_acceptable_windows,
         )
 
@@ -471,7 +471,7 @@ def suggest_in_run(
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
         # imported here: a given td needs no search
-        from d2rpick.choice.suggest_td import (
+        from d2rpick.choice.td.suggest_td import (
             choose_td,
         )
 
@@ -517,7 +517,7 @@ def compare_with(
     RangeError
         If one of the two runs does not continue after td.
     """
-    from d2rpick.choice.comparison import compare_with_reference
+    from d2rpick.choice.switched.comparison import compare_with_reference
 
     comparison = compare_with_reference(
         verdict.situation, verdict.candidate.tr, reference, switched, min_mean

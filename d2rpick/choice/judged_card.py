@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_run
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.answers import PairVerdict
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
 
 

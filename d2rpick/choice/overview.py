@@ -15,8 +15,6 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.flights import find_flights
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.health import (
     Health,
     assess_health,
@@ -25,8 +23,14 @@ from d2rpick.choice.health import (
     warn_about_engine,
     warn_about_health,
 )
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.switched_run import Times, find_rigid_times, select_model_momenta
+from d2rpick.choice.switched.switched_run import (
+    Times,
+    find_rigid_times,
+    select_model_momenta,
+)
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import read_balance
@@ -246,7 +250,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
     """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
     # imported here: few runs are given with a deck
-    from d2rpick.choice.deck_of_run import (
+    from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
         check_model_of_deck,
         warn_about_solver,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.grades import FAIR
+from d2rpick.choice.pair.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
@@ -14,7 +14,7 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.cost import ByDeck
+    from d2rpick.choice.parts.cost import ByDeck
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import History

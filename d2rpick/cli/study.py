@@ -223,7 +223,7 @@ def _choose_farm(
             tell(f"note: {scheduler}: no workers yet, waiting for some")
         return cluster
     return workers.choose_farm(
-        min(jobs or workers.count_cores(), calls), "d2rpick.choice.study"
+        min(jobs or workers.count_cores(), calls), "d2rpick.choice.runs.study"
     )
 
 

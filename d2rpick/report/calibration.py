@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.cost import MEASURED, format_weights_as_toml
+from d2rpick.choice.parts.cost import MEASURED, format_weights_as_toml
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
 
 if TYPE_CHECKING:
-    from d2rpick.choice.calibration import FittedWeights
+    from d2rpick.choice.parts.calibration import FittedWeights
     from d2rpick.report.formats import DisplayOptions
 
 _LEG: Final = row(

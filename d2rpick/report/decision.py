@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.grades import GOOD
+from d2rpick.choice.pair.grades import GOOD
 
 if TYPE_CHECKING:
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.quality import Grade
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Grade
 
     Lines = list[tuple[str, str]]
 

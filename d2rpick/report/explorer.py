@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.choice.decision import format_bounds
+from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
 from d2rpick.report.decision import format_saved_share
 from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import Offer, TradeOff
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from d2rpick.choice.study import (
+from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
     find_outliers,
@@ -46,12 +46,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from d2rpick.choice.answers import PairSuggestion, PairVerdict
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.plan import RunPlan
-    from d2rpick.choice.sets_of_parts import Parts
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.sets_of_parts import Parts
+    from d2rpick.choice.switched.switched_run import Times
+    from d2rpick.choice.td.plan import RunPlan
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History, Samples
 
 

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report.fields import Field, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.plan import RunPlan
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.td.plan import RunPlan
 
 SHARE: Final = get_kind("number", minimum=0, maximum=1)
 BASIS: Final = one_of(*MODELS)

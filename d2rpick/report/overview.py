@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
 from d2rpick.report.situation import (

@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report.decision import list_verdict_lines
 from d2rpick.report.situation import list_health_measures, list_situation_heading
 from d2rpick.report.tables import Cell, format_short, quote_shell_line
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.base.errors import Caution
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.decision import Decision
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read

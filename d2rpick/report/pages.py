@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import give_if_written
-from d2rpick.choice.grades import POOR, VERDICTS
-from d2rpick.choice.study import StudyOfRuns, format_number_of_runs
+from d2rpick.choice.pair.grades import POOR, VERDICTS
+from d2rpick.choice.runs.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
     drive,
     overview,
@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from d2rpick.choice.answers import PairSuggestion, PairVerdict
-    from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.plan import PlannedFlight, RunPlan
-    from d2rpick.choice.sets_of_parts import Parts, PartSet
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.switched.comparison import Comparison
+    from d2rpick.choice.td.plan import PlannedFlight, RunPlan
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.run import OpenedRun
     from d2rpick.histories.source import Source
     from d2rpick.running.drive import Driven

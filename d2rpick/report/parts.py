@@ -22,8 +22,8 @@ from d2rpick.report.fields import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from d2rpick.choice.sets_of_parts import Parts, PartSet
-    from d2rpick.choice.switchable_parts import PartRow
+    from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
 # Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.

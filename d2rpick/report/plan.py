@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.grades import USE
+from d2rpick.choice.pair.grades import USE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import format_in_full, format_saved_share
 from d2rpick.report.fields import (
@@ -24,8 +24,8 @@ from d2rpick.report.suggestion import describe_given_up_time
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.choice.plan import PlannedFlight, RunPlan
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.plan import PlannedFlight, RunPlan
     from d2rpick.report.formats import DisplayOptions
 
 

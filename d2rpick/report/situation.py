@@ -12,7 +12,7 @@ from d2rpick.report.tables import format_measure
 
 if TYPE_CHECKING:
     from d2rpick.choice.health import Health
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History
 
 

@@ -6,8 +6,8 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.grades import VERDICTS
-from d2rpick.choice.study import (
+from d2rpick.choice.pair.grades import VERDICTS
+from d2rpick.choice.runs.study import (
     OK,
     StudyOfRuns,
     StudyRow,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow, PairSuggestion
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.decision import Decision
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions
 
 # largest number of windows of acceptable tr that a line names

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.quality import EQUALLY_GOOD
+from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import format_in_short, list_verdict_lines
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
@@ -14,7 +14,7 @@ from d2rpick.report.situation import describe_input
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.trade_off import Offer, TradeOff
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.report.formats import DisplayOptions
 
 OFFER: Final = row(

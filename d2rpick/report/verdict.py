@@ -18,7 +18,7 @@ from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
-    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions
 
 # the judged pair, its measures and the verdict

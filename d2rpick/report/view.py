@@ -14,7 +14,7 @@ from d2rpick.vibration.oscillator import Replay, State, make_from_mode
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 

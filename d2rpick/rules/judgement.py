@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
-from d2rpick.choice.deck_of_run import add_surroundings
 from d2rpick.choice.health import WRONG_ENERGY
-from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.warnings import (
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     describe_end_of_flight,
     describe_end_of_load,
 )
+from d2rpick.choice.parts.deck_of_run import add_surroundings
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.deck import read_inventory
 from d2rpick.flight.contact_times import (
     ContactTimes,
@@ -37,7 +37,7 @@ from d2rpick.histories.surroundings import UNKNOWN
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.choice.deck_of_run import add_surroundings
+from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Source, open_run, open_sources

@@ -10,9 +10,9 @@ import pytest
 
 from d2rpick.api.studies import Ledger, compute_fingerprint, write_row
 from d2rpick.base.errors import FormatError
-from d2rpick.choice import study
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import Question, StudyRow, judge_run
+from d2rpick.choice.runs import study
+from d2rpick.choice.runs.study import Question, StudyRow, judge_run
 from d2rpick.histories.opening import Selection
 from tests import variants
 from tests.command import put

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import D2RPickError
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings, read_reference
-from d2rpick.choice.situation import examine_td
 from tests.benchmarks.chains import Chains, apply_to_first, integrate_chains
 from tests.written_runs import FALL_WRITERS, Written
 

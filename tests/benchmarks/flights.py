@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
 from tests.records import round_as_printed

@@ -17,8 +17,8 @@ import numpy as np
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest_in_run
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.question import Settings, read_reference
+from d2rpick.choice.td.flights import find_flights
 from tests.benchmarks.chains import (
     Chains,
     Run,

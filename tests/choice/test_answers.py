@@ -15,10 +15,10 @@ from d2rpick.choice.answers import (
     verify_in_history,
     verify_run,
 )
-from d2rpick.choice.candidates import Pair
 from d2rpick.choice.judged_card import CardRequest, print_judged_card
+from d2rpick.choice.pair.candidates import Pair
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Reference, Settings, read_reference
-from d2rpick.choice.situation import examine_td
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
-from d2rpick.choice.calibration import (
+from d2rpick.choice.parts.calibration import (
     Observation,
     fit_weights,
     read_observations,
     read_observations_of_runs,
 )
-from d2rpick.choice.cost import MEASURED
+from d2rpick.choice.parts.cost import MEASURED
 from tests.deck.test_radioss_inventory import BEGIN, PROPS, write_nodes
 from tests.decks import pad
 

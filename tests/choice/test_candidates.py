@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.candidates import judge_candidates
-from d2rpick.choice.quality import rank_candidates, rank_judged
+from d2rpick.choice.pair.candidates import judge_candidates
+from d2rpick.choice.pair.quality import rank_candidates, rank_judged
+from d2rpick.choice.pair.situation import make_look
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import make_look
 from d2rpick.vibration import measures
 from tests import paper
 from tests.energies import (

@@ -12,14 +12,17 @@ import pytest
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import PairVerdict, compare_with, verify_run
-from d2rpick.choice.comparison import (
+from d2rpick.choice.question import Settings
+from d2rpick.choice.switched.comparison import (
     MOST_MOMENTUM_ERROR,
     Comparison,
     compare_runs,
     find_switch_times,
 )
-from d2rpick.choice.question import Settings
-from d2rpick.choice.switched_run import detect_rigid_parts, prepare_switched_history
+from d2rpick.choice.switched.switched_run import (
+    detect_rigid_parts,
+    prepare_switched_history,
+)
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import (

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.choice.cost import (
+from d2rpick.choice.parts.cost import (
     CostModel,
     Weights,
     compute_saved_share,

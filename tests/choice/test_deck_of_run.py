@@ -11,10 +11,10 @@ import pytest
 import d2rpick as d2
 from d2rpick.base.errors import Caution, D2RPickError
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.deck_of_run import warn_about_solver
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck import read_inventory
 from d2rpick.flight.momentum import find_flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta

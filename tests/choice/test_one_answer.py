@@ -16,9 +16,9 @@ from d2rpick.choice.answers import (
     verify_at,
     verify_in_history,
 )
-from d2rpick.choice.plan import plan_run
+from d2rpick.choice.pair.windows import find_acceptable_windows
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.windows import find_acceptable_windows
+from d2rpick.choice.td.plan import plan_run
 from d2rpick.flight.flight import find_all_seen, find_seen_flight
 from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History

@@ -10,9 +10,9 @@ from hypothesis import example, given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import suggest_in_run
-from d2rpick.choice.plan import RunPlan, plan_run
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.trade_off import explore_flights
+from d2rpick.choice.td.plan import RunPlan, plan_run
+from d2rpick.choice.td.trade_off import explore_flights
 from d2rpick.histories.digits import round_to_first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import locate_stored

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest_in_history, verify_in_history
-from d2rpick.choice.grades import GRADES
-from d2rpick.choice.quality import (
+from d2rpick.choice.pair.grades import GRADES
+from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     Grade,
     Quality,
@@ -21,8 +21,8 @@ from d2rpick.choice.quality import (
     rank_candidates,
     rank_judged,
 )
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.histories.history import History
 from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.suggestion import as_table

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import PairSuggestion, suggest_in_history, suggest_in_run
-from d2rpick.choice.candidates import Pair
+from d2rpick.choice.pair.candidates import Pair
 from d2rpick.choice.question import Settings, read_reference
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection

@@ -9,10 +9,13 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.question import Settings
-from d2rpick.choice.sets_of_parts import Parts, compare_sets_of_parts, recommend_parts
-from d2rpick.choice.switchable_parts import (
+from d2rpick.choice.parts.cost import CostModel, Weights
+from d2rpick.choice.parts.sets_of_parts import (
+    Parts,
+    compare_sets_of_parts,
+    recommend_parts,
+)
+from d2rpick.choice.parts.switchable_parts import (
     InFlight,
     PartFacts,
     PartRow,
@@ -21,6 +24,7 @@ from d2rpick.choice.switchable_parts import (
     find_landing_alone,
     judge_parts,
 )
+from d2rpick.choice.question import Settings
 from d2rpick.deck import read_inventory
 from d2rpick.histories.formats import radioss_th
 from d2rpick.histories.opening import open_run

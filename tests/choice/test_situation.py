@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_at, suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection

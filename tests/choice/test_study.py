@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from d2rpick.api.studies import find_runs
 from d2rpick.choice.answers import verify_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import (
+from d2rpick.choice.runs.study import (
     NONE,
     OK,
     UNREADABLE,

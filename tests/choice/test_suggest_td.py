@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.aftermath import bound_mean_energy
 from d2rpick.choice.answers import suggest_at, suggest_in_history
-from d2rpick.choice.candidates import judge_times
-from d2rpick.choice.quality import rank_candidates
+from d2rpick.choice.pair.aftermath import bound_mean_energy
+from d2rpick.choice.pair.candidates import judge_times
+from d2rpick.choice.pair.quality import rank_candidates
+from d2rpick.choice.pair.situation import Situation, examine_td
+from d2rpick.choice.pair.warnings import compute_shortfall, estimate_time_after
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Situation, examine_td
-from d2rpick.choice.suggest_td import bound_rigid_times
-from d2rpick.choice.warnings import compute_shortfall, estimate_time_after
+from d2rpick.choice.td.suggest_td import bound_rigid_times
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection

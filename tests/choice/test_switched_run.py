@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.question import read_reference
-from d2rpick.choice.switched_run import prepare_switched_history
+from d2rpick.choice.switched.switched_run import prepare_switched_history
 from d2rpick.histories.formats import glstat, matsum
 from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import Selection

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest_at, suggest_in_history, suggest_in_run
-from d2rpick.choice.quality import rank_candidates
+from d2rpick.choice.pair.quality import rank_candidates
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.trade_off import Offer, TradeOff, explore_run
+from d2rpick.choice.td.trade_off import Offer, TradeOff, explore_run
 from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection

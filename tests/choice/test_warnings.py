@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_at, verify_at
-from d2rpick.choice.candidates import judge_times
+from d2rpick.choice.pair.candidates import judge_times
+from d2rpick.choice.pair.situation import Situation, examine_td
+from d2rpick.choice.pair.warnings import (
+    MOST_KEPT,
+    estimate_time_after,
+    find_largest_energy,
+)
+from d2rpick.choice.pair.windows import find_acceptable_windows
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Situation, examine_td
-from d2rpick.choice.trade_off import make_offers
-from d2rpick.choice.warnings import MOST_KEPT, estimate_time_after, find_largest_energy
-from d2rpick.choice.windows import find_acceptable_windows
+from d2rpick.choice.td.trade_off import make_offers
 from d2rpick.rules.judgement import find_faults
 from tests.energies import make_energy_history, require
 

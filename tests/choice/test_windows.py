@@ -14,10 +14,8 @@ from d2rpick.choice.answers import (
     verify_at,
     verify_in_history,
 )
-from d2rpick.choice.flights import find_flights
-from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.windows import (
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.windows import (
     count_coverage,
     cut_before_td,
     find_acceptable_windows,
@@ -26,6 +24,8 @@ from d2rpick.choice.windows import (
     interpolate_error,
     make_error_profile,
 )
+from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
     SHARE,

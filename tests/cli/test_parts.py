@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.warnings import warn_about_td
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from tests.command import (

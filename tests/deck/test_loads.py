@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.choice.deck_of_run import add_surroundings
+from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import find_supports

@@ -5,10 +5,10 @@ import pytest
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.flights import find_flights, find_longest_flight
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.warnings import warn_about_td
+from d2rpick.choice.td.flights import find_flights, find_longest_flight
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
 from tests.records import make_table
 

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from d2rpick.choice.answers import suggest_in_history, verify_at
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import find_seen_flight
 from d2rpick.flight.internal_energy import find_quiet_time
 from d2rpick.histories.digits import format_window

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import find_end_of_load
 from d2rpick.histories.history import History

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
-from d2rpick.choice.warnings import warn_about_td
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import (
     find_settled_time,

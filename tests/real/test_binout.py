@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
+from d2rpick.choice.parts.sets_of_parts import compare_sets_of_parts
 from d2rpick.choice.question import Settings
-from d2rpick.choice.sets_of_parts import compare_sets_of_parts
 from d2rpick.histories.opening import Selection, open_run
 from tests.histories.formats.test_binout import open_binout
 from tests.real.files import content, real, rows_of

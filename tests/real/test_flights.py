@@ -7,8 +7,8 @@ import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest_in_history, suggest_in_run, verify_in_history
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.opening import Selection, open_run
 from tests.real.files import real
 from tests.real.test_files import MORE, PAIRS, READABLE, REFUSED

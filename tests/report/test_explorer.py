@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pytest
 
-from d2rpick.choice.suggest_td import STEPS
+from d2rpick.choice.td.suggest_td import STEPS
 from d2rpick.histories.digits import format_window
 from d2rpick.report.page import read_resource
 from d2rpick.report.tables import format_measure, format_short

@@ -11,7 +11,7 @@ from matplotlib.transforms import Bbox
 import d2rpick as d2
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import Common, StudyOfRuns, StudyRow
+from d2rpick.choice.runs.study import Common, StudyOfRuns, StudyRow
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
 from d2rpick.report.study import shorten_names

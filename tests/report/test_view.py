@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
 from d2rpick.report.view import make_view, replay_motion

@@ -11,8 +11,8 @@ from hypothesis.strategies import floats, integers, lists, sampled_from
 from numpy.typing import NDArray
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given, strategies as st
 
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.candidates import judge_times
+from d2rpick.choice.pair.candidates import judge_times
+from d2rpick.choice.pair.situation import Situation, examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Situation, examine_td
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine_td
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode

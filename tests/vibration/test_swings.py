@@ -9,8 +9,8 @@ from hypothesis import example, given, strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.together import VibratingTogether
 from d2rpick.choice.question import Settings
-from d2rpick.choice.together import VibratingTogether
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import Memory, Samples
 from d2rpick.report.situation import list_situation_heading

@@ -10,7 +10,7 @@ import numpy as np
 
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import choose_common_tr, make_row
+from d2rpick.choice.runs.study import choose_common_tr, make_row
 from d2rpick.models.box_run import (
     BOX,
     RigidWindow,
@@ -23,7 +23,7 @@ from validation.published.exhibits import Curve, Exhibit, Panel, Shape
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from d2rpick.choice.study import StudyRow
+    from d2rpick.choice.runs.study import StudyRow
     from d2rpick.histories.history import Samples
     from d2rpick.models.box_model import Parameters, Plane
     from d2rpick.models.box_run import Record

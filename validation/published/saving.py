@@ -1,6 +1,7 @@
 """Savings of switching: the cost model compared with the published saving and with measured runs.
 
-The formulas are in `d2rpick.choice.cost` (share c of a time step) and `d2rpick.vibration.measures.run_time_share`.
+The formulas are in `d2rpick.choice.parts.cost` (share c of a time step) and
+`d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.cost import POINT, Weights, compute_saved_share
+from d2rpick.choice.parts.cost import POINT, Weights, compute_saved_share
 from d2rpick.vibration.measures import run_time_share
 from validation.published.exhibits import Curve, Exhibit, Panel
 

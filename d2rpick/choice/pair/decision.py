@@ -8,18 +8,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import bound_mean_energy
-from d2rpick.choice.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.quality import grade_pair
+from d2rpick.choice.pair.aftermath import bound_mean_energy
+from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.quality import grade_pair
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.aftermath import Kept
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.quality import Quality
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.quality import Quality
+    from d2rpick.choice.pair.situation import Situation
 
 # A worst case within this difference of the expected residual is shown as the same [-].
 _ALIKE: Final = 5e-3

@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, list_names, name_units
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.few_states import warn_about_few_states
+from d2rpick.choice.pair.few_states import warn_about_few_states
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
 from d2rpick.histories.digits import (
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Part

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import FormatError, give_if_written, name_units
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import count_pieces
@@ -21,7 +21,7 @@ from d2rpick.histories.samples import find_window
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.parts.cost import CostModel
     from d2rpick.choice.question import Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples

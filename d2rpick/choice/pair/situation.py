@@ -11,8 +11,8 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.margins import find_drift_of_bodies, find_margin
-from d2rpick.choice.together import VibratingTogether
+from d2rpick.choice.pair.together import VibratingTogether
+from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off

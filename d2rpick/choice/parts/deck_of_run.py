@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.base.errors import Caution, choose_verb, give_if_written, name_units
-from d2rpick.choice.cost import ByDeck, CostModel, Share
+from d2rpick.choice.parts.cost import ByDeck, CostModel, Share
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import count_pieces, find_supports
 from d2rpick.deck.radioss_files import LEFT_RIGID, RUINS

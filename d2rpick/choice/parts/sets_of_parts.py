@@ -16,8 +16,9 @@ from d2rpick.base.errors import (
     name_units,
 )
 from d2rpick.choice.answers import suggest_in_run, verify_run
-from d2rpick.choice.candidates import ONE_BODY
-from d2rpick.choice.deck_of_run import (
+from d2rpick.choice.pair.candidates import ONE_BODY
+from d2rpick.choice.pair.warnings import warn_about_place
+from d2rpick.choice.parts.deck_of_run import (
     add_surroundings,
     check_model_of_deck,
     find_rigid_bodies,
@@ -27,15 +28,14 @@ from d2rpick.choice.deck_of_run import (
     warn_about_solver,
     warn_about_titles,
 )
-from d2rpick.choice.question import Reference
-from d2rpick.choice.switchable_parts import (
+from d2rpick.choice.parts.switchable_parts import (
     PartRow,
     RunFacts,
     collect_facts,
     compute_step_growth,
     judge_parts,
 )
-from d2rpick.choice.warnings import warn_about_place
+from d2rpick.choice.question import Reference
 from d2rpick.deck.geometry import Placement
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.histories.listings import find_printed_steps
@@ -45,10 +45,10 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.cost import CostModel, Share, Weights
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 

@@ -22,10 +22,9 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.choice.answers import suggest_in_run
-from d2rpick.choice.grades import GRADES
-from d2rpick.choice.quality import EQUALLY_GOOD, grade_residual
-from d2rpick.choice.question import read_reference
-from d2rpick.choice.windows import (
+from d2rpick.choice.pair.grades import GRADES
+from d2rpick.choice.pair.quality import EQUALLY_GOOD, grade_residual
+from d2rpick.choice.pair.windows import (
     count_coverage,
     cut_before_td,
     find_acceptable_windows,
@@ -34,6 +33,7 @@ from d2rpick.choice.windows import (
     interpolate_error,
     make_error_profile,
 )
+from d2rpick.choice.question import read_reference
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import draw_outline
 from d2rpick.histories.source import expand
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.answers import PairSuggestion
-    from d2rpick.choice.decision import Decision
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import compare_error_with_contact
-from d2rpick.choice.candidates import Candidates, judge_candidates
-from d2rpick.choice.grades import FAIR, GOOD, GRADES, POOR
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
+from d2rpick.choice.pair.aftermath import compare_error_with_contact
+from d2rpick.choice.pair.candidates import Candidates, judge_candidates
+from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
+from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.aftermath import Worth
-    from d2rpick.choice.candidates import Candidate, Judged
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.aftermath import Worth
+    from d2rpick.choice.pair.candidates import Candidate, Judged
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 # Errors of a deformation within this difference of the smallest are equally good [-]; the earliest safe tr wins then.

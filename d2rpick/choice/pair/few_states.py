@@ -13,7 +13,7 @@ from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
 # Files that LS-DYNA usually writes more often than a d3plot.

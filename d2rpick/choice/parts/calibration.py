@@ -21,7 +21,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
-from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
+from d2rpick.choice.parts.cost import (
+    ELEMENT_SHARE,
+    MEASURED,
+    POINT,
+    RIGID_NODE,
+    Weights,
+)
 from d2rpick.deck import find_main_decks, ls_dyna_inventory, radioss_inventory
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_files import list_run_files

@@ -18,15 +18,15 @@ import numpy as np
 from d2rpick.base.errors import Caution
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_in_run
-from d2rpick.choice.flights import compute_last_td, find_flights
 from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engine
-from d2rpick.choice.margins import find_margin
-from d2rpick.choice.switched_run import (
+from d2rpick.choice.parts.margins import find_margin
+from d2rpick.choice.switched.switched_run import (
     DoneWindow,
     Times,
     find_done_windows,
     prepare_switched_history,
 )
+from d2rpick.choice.td.flights import compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.span import Fits
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.answers import PairSuggestion
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.margin import Margin

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.margins import find_margin
+from d2rpick.choice.parts.margins import find_margin
 from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
 from d2rpick.flight.window import list_moments
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -116,7 +116,7 @@ def find_flights(
             for flight in flights
         )
         return _add_given_start(history, settings, flights, fits)
-    from d2rpick.choice.situation import examine_td
+    from d2rpick.choice.pair.situation import examine_td
 
     landing_flight = examine_td(history, landing, settings, fits).flight
     if landing_flight.end == landing and not landing_flight.refusal:
@@ -133,7 +133,7 @@ def _add_given_start(
     windows = [flight.within(history.time) for flight in flights]
     if load_end is None or any(start <= load_end < end for start, end in windows):
         return flights
-    from d2rpick.choice.situation import examine_td
+    from d2rpick.choice.pair.situation import examine_td
 
     end = min((start for start, _ in windows if start > load_end), default=last)
     end = end if settings.landing is None else min(end, settings.landing)
@@ -193,7 +193,7 @@ def _find_flights_without_landing(
             for source, window in witnessed
         )
     # imported here: evidence better than the energy does not need it
-    from d2rpick.choice.situation import (
+    from d2rpick.choice.pair.situation import (
         make_look,
     )
 

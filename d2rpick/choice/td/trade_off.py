@@ -11,31 +11,31 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
-from d2rpick.choice.candidates import judge_candidates
-from d2rpick.choice.flights import find_longest_flight
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.quality import EQUALLY_GOOD, rank_candidates, rank_judged
-from d2rpick.choice.situation import AnswerAtTd, Situation, make_look
-from d2rpick.choice.suggest_td import (
+from d2rpick.choice.pair.candidates import judge_candidates
+from d2rpick.choice.pair.quality import EQUALLY_GOOD, rank_candidates, rank_judged
+from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
+from d2rpick.choice.pair.warnings import warn_about_td
+from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.suggest_td import (
     STEPS,
     find_best_known,
     get_error_of_pair,
     list_offered_times,
     round_error,
 )
-from d2rpick.choice.warnings import warn_about_td
 from d2rpick.histories.digits import round_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
-    from d2rpick.choice.aftermath import Kept
-    from d2rpick.choice.candidates import Candidate, Candidates, Pair
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.plan import RunPlan
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.question import Reference, Settings
+    from d2rpick.choice.td.plan import RunPlan
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.flights import find_longest_flight
-from d2rpick.choice.quality import (
+from d2rpick.choice.pair.quality import (
     LIKE_LEVELS,
     MOST_GOOD,
     ROUNDING,
@@ -18,8 +17,9 @@ from d2rpick.choice.quality import (
     rank_candidates,
     rate_certainty_of_tr,
 )
-from d2rpick.choice.situation import Situation, make_look
-from d2rpick.choice.warnings import compute_mean_in_flight, compute_shortfall
+from d2rpick.choice.pair.situation import Situation, make_look
+from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
+from d2rpick.choice.td.flights import find_longest_flight
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -30,9 +30,9 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.choice.candidates import Pair
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.situation import Look
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.measures import Profile
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.candidates import Candidate, Candidates, judge_times
-from d2rpick.choice.warnings import find_largest_energy
+from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
+from d2rpick.choice.pair.warnings import find_largest_energy
 from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched_run import FEWEST, SAME, choose_same_parts
+from d2rpick.choice.switched.switched_run import FEWEST, SAME, choose_same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
@@ -18,8 +18,8 @@ from d2rpick.vibration import measures
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History, Samples, Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import OpenedRun

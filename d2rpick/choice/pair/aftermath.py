@@ -19,8 +19,8 @@ from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 # Relative accuracy of vibration energies from spectral lines, swings or signs of parts [-].

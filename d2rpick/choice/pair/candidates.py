@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.choice.warnings import POOR_RESIDUAL, Objection, list_objections
+from d2rpick.choice.pair.warnings import POOR_RESIDUAL, Objection, list_objections
 from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
@@ -24,7 +24,7 @@ from d2rpick.vibration.moments import Moments
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.position_error import Off
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Columns
