@@ -66,7 +66,7 @@ def scan(run_name: str) -> dict[str, float]:
         delimiter=",",
         names=True,
         dtype=None,
-        encoding="utf-8",  # older versions of numpy take bytes, with a warning
+        encoding="utf-8",  # older numpy returns bytes and warns
     )
     assert table.dtype.names
     (row,) = table[table["run"].astype(str) == run_name]
@@ -82,15 +82,15 @@ def verify_rollover(*options: str) -> dict[str, Any]:
 
 
 def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> None:
-    reference, expected = verify_rollover(), scan("r100")
-    check_by_schema(reference)
-    switched = reference["switched"]
+    verdict, expected = verify_rollover(), scan("r100")
+    check_by_schema(verdict)
+    switched = verdict["switched"]
     assert [name[-6:] for name in switched["source"]] == ["T01.gz", "T02.gz", "T03.gz"]
     assert switched["energy_frozen"] == pytest.approx(expected["IEfrozen_J"], rel=1e-5)
-    # between two of every tenth state; of all of them 1.7492
+    # Interpolated between every tenth state; between all states it is 1.7492.
     assert switched["energy_td"] == pytest.approx(1.7515, abs=1e-4)
     assert switched["level_ratio"] == switched["energy_frozen"] / switched["energy_td"]
-    # that table's means reach to 380 ms and were taken of every tenth state; contact is at 381.9 ms
+    # The means of the table reach to 380 ms and use every tenth state; the contact is at 381.9 ms.
     assert switched["mean_after"] == pytest.approx(
         expected["IEmean_td_to_380ms_J"], rel=0.01
     )
@@ -98,26 +98,25 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
         expected["IEmean_ref_J"], rel=0.06
     )
     assert switched["spread_after"] < switched["spread_after_reference"]
-    assert switched["end"] == pytest.approx(0.3819, abs=5e-4)  # a state each 0.5 ms
+    assert switched["end"] == pytest.approx(0.3819, abs=5e-4)  # one state each 0.5 ms
     assert switched["momentum_error"] < 1e-6
-    # of the centre at td, in mm; the largest distance afterwards is no smaller
+    # Distance of the centre at td [mm]; the largest distance afterwards is no smaller.
     at_td = np.hypot(expected["dx_td_mm"], expected["dz_td_mm"]) / 1e3
     assert switched["displacement"] == pytest.approx(at_td, rel=0.15)
     assert switched["notes"] == []
 
 
 def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
-    reference, expected = verify_rollover(), scan("r100")
+    verdict, expected = verify_rollover(), scan("r100")
     share = (
-        reference["switched"]["mean_after"]
-        / reference["switched"]["mean_after_reference"]
+        verdict["switched"]["mean_after"] / verdict["switched"]["mean_after_reference"]
     )
     assert share == pytest.approx(
         expected["IEmean_td_to_380ms_J"] / expected["IEmean_ref_J"], rel=0.06
     )
     assert share < 0.7
-    assert not reference["verified"]
-    (reason,) = reference["switched"]["objections"]
+    assert not verdict["verified"]
+    (reason,) = verdict["switched"]["objections"]
     assert (
         f"{share:.2g} times that of the reference, 0.7 to 1.3 were expected" in reason
     )
@@ -208,7 +207,7 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
             "0.37",
             (*RIGHT[:-1], BOX),
             "does not stand still",
-        ),  # it was never rigid
+        ),  # this run was never rigid
         ("0.02", "0.37", AT_20, "locked in, 11.1"),
     ],
 )
@@ -239,7 +238,7 @@ def test_the_option_is_repeated_for_further_files_of_the_switched_run() -> None:
     assert document["history"]["source"] == [BOX]
 
 
-# The floating oscillator of the paper, computed by a solver, as tables without momentum.
+# The floating oscillator of the paper, computed by a solver and written as tables without momentum.
 
 
 @pytest.mark.parametrize(
@@ -279,7 +278,7 @@ def test_a_switched_table_is_compared_by_its_energy(
     assert switched["notes"] == []
 
 
-# The closed form, written as a solver would.
+# The closed form, written in the format of a solver.
 
 
 @pytest.fixture
@@ -525,7 +524,7 @@ def test_what_has_come_to_rest_is_not_off_by_its_noise() -> None:
 @pytest.mark.parametrize(
     ("momenta", "error"),
     [
-        # before td and at its first state it does not count
+        # states before td, and the first state at td, are not compared
         ((track(0 * TIME + 10), track(np.where(TIME <= 0.5, 0.0, 10.0))), 0),
         (NONE, None), ((track(TIME), None), None), ((None, track(TIME)), None),
         ((track(0 * TIME), track(TIME)), None),

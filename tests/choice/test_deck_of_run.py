@@ -110,7 +110,7 @@ def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
         ("plan",),
         ("parts",),
     ):
-        if args[0] != "parts":  # which asks for parts with energies
+        if args[0] != "parts":  # parts requires energies of parts
             assert list_warnings(*args, "--deck", deck, ENERGY)[code] == deck_message
     assert list_doubts(place_example(tmp_path, RULES[rule].passing[0])) == {}
 
@@ -167,7 +167,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
     for rule, expected in (
         ("D2R406", 1),
         ("D2R408", 0),
-    ):  # the latter's deck has a wheel whose main node is 1809
+    ):  # the deck of the other run has a wheel with main node 1809
         example = RULES[rule].failing[0]
         files = {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n"}
         deck = write(tmp_path, example.deck, files, example.name)
@@ -191,7 +191,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
         assert [leg.count("1809") for leg in legs] == [1] * len(legs)
 
 
-# An engine that reports wrong energies.
+# Engine versions that report wrong energies.
 
 
 @pytest.mark.slow
@@ -223,11 +223,13 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(
             "CAR_0002.out: built in 2025" in list_warnings(*args)["engine-wrong-energy"]
         ), args
     codes = [warning["code"] for warning in run_json("plan", history)["warnings"]]
-    assert codes.count("engine-wrong-energy") == 1  # however many flights there are
+    assert (
+        codes.count("engine-wrong-energy") == 1
+    )  # one warning for any number of flights
     assert "engine-wrong-energy" not in list_warnings("suggest", *TD, ENERGY)
 
 
-# Bodies that no leg switches.
+# Bodies that no engine file switches.
 
 
 @pytest.mark.parametrize(
@@ -253,10 +255,7 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     listed = run_json("check", deck, "--history", history, "--select", "D2R408,D2R409")[
         "findings"
     ]
-    assert [
-        f"{listed_message['rule']} {listed_message['severity']}"
-        for listed_message in listed
-    ] == found
+    assert [f"{finding['rule']} {finding['severity']}" for finding in listed] == found
 
 
 @pytest.fixture(params=OTHER)
@@ -264,8 +263,8 @@ def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return str(put(tmp_path / "main.k", OTHER[request.param]))
 
 
-def list_messages(message_words: dict[str, Any]) -> dict[str, Any]:
-    return {**message_words, "command": None, "warnings": None}
+def drop_warnings(document: dict[str, Any]) -> dict[str, Any]:
+    return {**document, "command": None, "warnings": None}
 
 
 @pytest.mark.slow
@@ -274,7 +273,7 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     args = command, *ASKED[command], "--deck", foreign, MATSUM
     without = command, *ASKED[command], MATSUM
     document, plain = run_json(*args), run_json(*without)
-    assert list_messages(document) == list_messages(plain)
+    assert drop_warnings(document) == drop_warnings(plain)
     assert list_warning_codes(document) == list_warning_codes(plain) | {
         "deck-of-another-model"
     }
@@ -317,7 +316,7 @@ def test_the_library_leaves_it_out_too(foreign: str) -> None:
         d2.suggest(d2.read(MATSUM), **arguments, deck=foreign),
         d2.suggest(d2.read(MATSUM), **arguments),
     )
-    assert list_messages(suggestion.to_dict()) == list_messages(without.to_dict())
+    assert drop_warnings(suggestion.to_dict()) == drop_warnings(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:
@@ -418,7 +417,7 @@ def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
     assert find_flight_around(make_falling_momenta(0.0, make_gravity(0.0)), 0.6)
     assert find_flight_around(
         make_falling_momenta(0.0, make_gravity(0.0, 9.81)), 0.6
-    )  # it acts for a time only
+    )  # it acts for a limited time only
     assert (
         find_flight_around(make_falling_momenta(0.0, make_gravity(9.81)), 0.6) is None
     )
@@ -530,7 +529,7 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
         d2.suggest(reference, parts=options[1:] or None, deck=deck, replay=False)
     d2.suggest(
         reference, 0.12, parts=options[1:] or None, replay=False
-    )  # the run that was read is as it was
+    )  # the run that was read is unchanged
 
 
 @pytest.mark.slow

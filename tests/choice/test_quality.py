@@ -66,7 +66,7 @@ def test_the_order_of_candidates(
         np.array([row[0] for row in candidate_rows]),
         np.array([row[1] for row in candidate_rows]),
     )
-    # what they differ by in further decimals is rounding
+    # differences in further decimals are rounding
     candidate_rows = [
         (row[0], float(np.round(row[1], 4)), *row[2:]) for row in candidate_rows
     ]
@@ -271,7 +271,7 @@ def test_states_per_period_are_counted_over_whole_periods(
     noisy = count_states_per_period(wave + noise)
     assert noisy == pytest.approx(
         states, rel=2 / periods
-    )  # noise about the mean is not taken for periods
+    )  # noise about the mean must not be treated as periods
 
 
 def test_without_a_period_there_are_no_states_of_one() -> None:
@@ -315,7 +315,7 @@ def make_crushed_energy(vibration: float) -> np.ndarray:
         (make_crushed_energy(0.05), UNIT, 0.9, 0.15, False), (make_crushed_energy(2.6), UNIT, 0.9, 0.15, False),
         (make_crushed_energy(0.0), UNIT, 0.9, 0.15, True),
         (DAMPED, FINE, 0.9, 0.5, True), (DAMPED, FINE, 0.9, 0.05, False),
-        # one state and td in the same output interval say nothing of what happens between them
+        # One state, with td in the same output interval, says nothing about the time between them.
         (np.tile([1.5, 2.5, 1.0, 2.5], 10), np.linspace(0, 3.9, 40), 2.2, 2.15, False),
         (EARLY, 0.1 * STATES, 0.85, 0.0, False), (EARLY, 0.1 * STATES, 1.05, 0.0, True),
     ],
@@ -377,7 +377,7 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
     quiet = suggest_in_history(
         make_energy_history(energy, time), 0.4, Settings(after=0.25)
     ).situation
-    assert quiet.at_rest  # of what comes after td nothing is known
+    assert quiet.at_rest  # nothing after td is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
     assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
 

@@ -161,7 +161,9 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     margin = compute_margin(history, flight, place=0.02)
     assert is_grazing(history, flight, 0.02) is grazed
     assert (margin.source == "grazing") is grazed
-    if grazed:  # gravity alone opens a gap of 20 mm, and of the vibration, in that time
+    if (
+        grazed
+    ):  # in that time, gravity alone opens a gap of 20 mm, and the vibration another
         assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
         assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
 
@@ -181,11 +183,11 @@ def make_tapped_body(impulse: float, length: float) -> tuple[History, Flight]:
 @pytest.mark.parametrize(
     ("impulse", "length", "grazed"),
     [
-        (0.5, 0.004, True),  # 125 of force, above a hundredth of 2000
+        (0.5, 0.004, True),  # a force of 125, above 1 % of 2000
         (1.1, 0.004, True),
         (1.3, 0.004, False),
-        (11.8, 0.004, False),  # it stops
-        (11.8, 0.1, False),  # softly, in much longer than the margin
+        (11.8, 0.004, False),  # the body stops
+        (11.8, 0.1, False),  # softly, over a time much longer than the margin
     ],
 )
 def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
@@ -293,7 +295,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     assert max(moved) == pytest.approx(1.1e-3, abs=1e-4)
     assert max(moved) < margin.time
     assert require(margin.spread) == pytest.approx(1.25e-3, abs=1e-5)
-    assert max(moved) < require(margin.spread)  # by the formula alone, too
+    assert max(moved) < require(margin.spread)  # the formula alone covers them too
 
 
 @pytest.mark.parametrize(
@@ -344,7 +346,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert all(
         verify_at(situation, t).admissible for t in [*ends.ravel(), *inside.ravel()]
     )
-    # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
+    # Other times that ``verify`` accepts lie on the cycle of td, where no time outside the tolerance is listed.
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
     anywhere = (
         rng.uniform(history.time[0], last, 8) if last > history.time[0] else np.zeros(0)
@@ -356,7 +358,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert [verify_at(situation, t).admissible for t in clear] == are_in_windows(
         windows, clear
     ).tolist()
-    # the errors in the windows are those of ``verify``; where nothing vibrates there are none
+    # The errors in the windows are those of ``verify``; there are none if nothing vibrates.
     profile = make_error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
         error = 0.0 if situation.at_rest else verify_at(situation, t).candidate.error
@@ -481,7 +483,7 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
 @pytest.mark.parametrize(
     "settings_asked",
     [
-        Settings(max_kinetic_share=0.5),  # 0.917 there
+        Settings(max_kinetic_share=0.5),  # it is 0.917 there
         Settings(max_residual=0.9),
         Settings(tolerance=0.0, replay=False),
     ],

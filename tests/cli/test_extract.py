@@ -28,7 +28,7 @@ from tests.command import (
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]
-# all but the sign of zeros, which sums lose
+# Equal except for the sign of zeros, which sums lose.
 NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
 
 BOX = {"csv": (), "h5": (), "glstat": (), "matsum": ("--part", "box")}
@@ -117,7 +117,7 @@ def test_one_part_needs_no_column_beside_the_energy() -> None:
     )
 
 
-# What a flight is seen by goes with the energy.
+# Evidence of flights is extracted with the energy.
 
 
 @pytest.fixture(scope="module")

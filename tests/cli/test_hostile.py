@@ -377,7 +377,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         "deep.h5": make_deep_file(100),
         "still.gz": gzip.compress(
             small + (b"#" * 4095 + b"\n") * (1 << 11)
-        ),  # 1,000 times as many bytes, few all the same
+        ),  # 1,000 times as many bytes, but still few
         "line.csv": small + b"#" * 1_000_000,
     }.items():
         (tmp_path / name).write_bytes(content)
@@ -484,7 +484,7 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
         "other": make_glstat_text(times, [0, 10, 21, 30, 40]),
         "restart": make_glstat_text(
             times[2:], [20, 35, 45]
-        ),  # another way from the state it begins with
+        ),  # continues differently from its first state
         "restart of another": make_glstat_text(times[2:], [25, 35, 45]),
         "parts": make_matsum_text(
             times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]

@@ -13,12 +13,12 @@ from tests.drops import drop, write_run_files
 from tests.json_schemas import check_by_schema, run_json_checked
 
 pytestmark = pytest.mark.slow
-FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
+FINE = 4e-4  # time between states [s], fine enough to show a landing that comes slightly later
 PART = (
     "--part",
     "box",
     "--no-verify",
-)  # no oscillator describes it, and none is sought
+)  # no oscillator describes the run, and none is searched
 
 DECK = """*KEYWORD
 *CONTROL_TERMINATION

@@ -28,7 +28,7 @@ PIECES = [
 
 
 @dataclass(frozen=True)
-class Written:
+class DeckWithWindows:
     """Windows, and how their deck is written."""
 
     windows: list[tuple[int, float, float | None]] = field(default_factory=list)
@@ -41,13 +41,13 @@ class Written:
 
 
 @st.composite
-def draw_deck(draw: st.DrawFn) -> Written:
+def draw_deck(draw: st.DrawFn) -> DeckWithWindows:
     windows: list[tuple[int, float, float | None]] = []
     for part in sorted(draw(st.sets(st.integers(1, 9999), max_size=4))):
         times = sorted(draw(st.sets(TIMES, min_size=1, max_size=6)))
         pairs = list(zip(times[::2], [*times[1::2], None], strict=False))
         windows += [(part, tr, td) for tr, td in pairs]
-    return Written(
+    return DeckWithWindows(
         windows,
         draw(st.sampled_from(["fixed", "comma", "long"])),
         draw(st.sampled_from(["\n", "\r\n"])),
@@ -58,7 +58,7 @@ def draw_deck(draw: st.DrawFn) -> Written:
     )
 
 
-def write_text(written: Written) -> str:
+def write_text(written: DeckWithWindows) -> str:
     """Return the deck with one card per switch."""
     width = 20 if written.style == "long" else 10
     lines = ["*KEYWORD" + (" LONG=Y" if written.style == "long" else "")]
@@ -90,7 +90,7 @@ def write_text(written: Written) -> str:
 
 
 @given(draw_deck())
-def test_what_is_written_is_read(written: Written) -> None:
+def test_what_is_written_is_read(written: DeckWithWindows) -> None:
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), write_text(written))
         assert list_spans(deck) == written.windows
@@ -99,7 +99,7 @@ def test_what_is_written_is_read(written: Written) -> None:
 
 
 @given(draw_deck())
-def test_offsets_move_every_window(written: Written) -> None:
+def test_offsets_move_every_window(written: DeckWithWindows) -> None:
     outer = f"*INCLUDE_TRANSFORM\ninner.k\n{0:10d}{0:10d}{written.offset:10d}\n"
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), outer, {"inner.k": write_text(written)})

@@ -203,7 +203,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
         history, (rolled.start + rolled.end) / 2, Settings(replay=False)
     ).flight
     assert flight.source == "energy-balance"
-    # damping bends the parabola of the work of gravity: less than the flight is found then, never more
+    # Damping bends the parabola of the work of gravity: the flight found is shorter, never longer.
     start, end = require(flight.start), require(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
     assert find_seen_flight(history, rolled.end + 0.02).refusal
@@ -319,7 +319,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
     contact = 80 * np.exp(
         -(((time - 0.8) / 0.01) ** 2)
-    )  # brief, in the last quarter before td
+    )  # short, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
     quiet = require(
         find_quiet_time(make_table(time, np.where(time < 0.1, 0, energy)), 0.95)

@@ -68,12 +68,15 @@ def test_read(file: str) -> None:
     digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(
         history.format, 0.0
     )  # sums depend on their order
-    for place, state in (
+    for position, state in (
         ("first", 0),
         ("middle", history.time.size // 2),
         ("last", -1),
     ):
-        written = float(expected[f"{place}_time"]), float(expected[f"{place}_energy"])
+        written = (
+            float(expected[f"{position}_time"]),
+            float(expected[f"{position}_energy"]),
+        )
         assert (history.time[state], history.energy[state]) == pytest.approx(
             written, rel=digits, abs=0.0
         )

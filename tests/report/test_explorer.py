@@ -46,7 +46,7 @@ _OPTIONS = (
     "--no-first-run",
     "--disable-background-networking",
 )
-# Everything that shows on the page, reaches over its right edge, and lies in nothing that scrolls.
+# Visible elements that reach beyond the right edge of the page and are not inside a scrolling element.
 _CUT = """
 const scrolls = (one) => one.closest(".scroll, pre") !== null;
 return [...document.body.querySelectorAll("*")]
@@ -400,7 +400,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     td_known = [row["td"] for row in list_numbers(paper)]
     handle = browser.find(".handle")
     for keys, td in (("", 0.064), (Keys.END, td_known[-1]), (Keys.HOME, td_known[0])):
-        handle.send_keys(keys)  # which it takes, so it can be reached
+        handle.send_keys(keys)  # it takes the focus, so it can be reached by keyboard
         (slider,) = browser.spoken({"slider"}, td)
         property_values = {
             property_["name"]: property_["value"].get("value")
@@ -411,7 +411,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
             property_values["valuemax"],
         ) == pytest.approx((td_known[0], td_known[-1]), rel=1e-6)
         assert property_values["focusable"]
-        # the words instead of the number: the tree of some versions passes over them, what speaks it does not
+        # Texts instead of numbers: some versions leave them out of the tree, but screen readers speak them.
         assert handle.get_attribute("aria-valuetext") == describe_td(
             run_suggested(browser.value("command"))
         )
@@ -423,7 +423,7 @@ def test_nothing_is_cut_with_and_without_scripts(
     paper: Path, box: Path, browser: Browser, width: int
 ) -> None:
     for page in (paper, box):
-        plain = page.with_name("plain.html")  # to a browser that runs no scripts
+        plain = page.with_name("plain.html")  # for a browser without scripts
         plain.write_text(
             re.sub(
                 r"<script>.*?</script>", "", page.read_text("utf-8"), flags=re.DOTALL

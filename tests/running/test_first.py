@@ -56,7 +56,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert "springs" in prepared.reason
     assert not any(
         "stays active" in note for note in prepared.notes
-    )  # it goes off: runs computed with OpenRadioss
+    )  # the body is deactivated, as in runs computed with OpenRadioss
     assert any("a momentum of 511 after it, for 365" in note for note in prepared.notes)
     starter = Path(prepared.files[0]).read_text()
     kinds = re.findall(r"/SENSOR/(\w+)/(\d+)", starter)
@@ -71,7 +71,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert [line.split()[0] for line in re.findall(r".*NF.*", starter)] == [
         "6",
         "8",
-    ]  # not the tied one
+    ]  # not the tied contact
     assert read_leg_states(prepared.files) == [*4 * [(False, 6), (True, 3)], (False, 0)]
     legs = [Path(name).read_text() for name in prepared.files[1:]]
     assert all(text.count("/RUN/box/") == 1 and "/TFILE" in text for text in legs)

@@ -1,4 +1,4 @@
-"""What ``d2rpick reproduce`` does: the figures and tables of the sections that are asked for."""
+"""The command ``d2rpick reproduce``: figures and tables of the requested sections."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def reproduce(
     tables: Tables,
     output: Output,
 ) -> None:
-    """Write the figures and tables of these sections, of all without any, and the answer.
+    """Write the figures and tables of the requested sections (default: all), and the answer.
 
     ``tables``: the columns of a solver's table beside its times, by what it is.
     """
@@ -65,7 +65,7 @@ def reproduce(
 def _make_exhibits(
     sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
 ) -> Iterator[Exhibit]:
-    """Give the figures of these sections, of all without any, in the order of the paper."""
+    """Yield the figures of the requested sections (default: all), in the order of the paper."""
     makers = [
         *box.list_box_exhibits(Parameters()),
         *exhibits.list_exhibits(solver),
@@ -80,7 +80,7 @@ def _make_exhibits(
 def _read_solver_tables(
     names: Sequence[str], tables: Tables
 ) -> dict[str, dict[str, Samples]]:
-    """Read each table by the columns that it has."""
+    """Read each table of a solver, which is recognised by its columns."""
     tables_by_name = {}
     for name in names:
         (database,) = open_run([name], Selection(energy=("2",))).databases
@@ -105,7 +105,7 @@ def _read_solver_tables(
 
 
 def _make_folder(folder: str) -> Path:
-    """Create the folder where it is missing; D2RPickError where that cannot be done."""
+    """Create the folder if it is missing; raise D2RPickError if that fails."""
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -117,7 +117,7 @@ def _make_folder(folder: str) -> Path:
 
 
 def _write(output: Output, folder: Path, answer: Reproduction) -> list[str]:
-    """Write all files, or none where one may not be written; give their names."""
+    """Write all files, or none if one of them may not be written; return their names."""
     index, values = (
         reproduction.as_markdown(answer, DisplayOptions(), pictures=True),
         reproduction.as_csv(answer, DisplayOptions()),

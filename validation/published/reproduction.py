@@ -90,7 +90,7 @@ class Reproduction(NamedTuple):
 
 
 def as_table(answer: Reproduction, is_shown: DisplayOptions) -> str:
-    """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
+    """Return published numbers and reference values beside computed ones, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
     lines = [
         tables.as_text(HEAD, [list_cells(row) for row in rows], is_shown.width),
@@ -115,7 +115,7 @@ def as_table(answer: Reproduction, is_shown: DisplayOptions) -> str:
 def as_markdown(
     answer: Reproduction, _: DisplayOptions, *, pictures: bool = False
 ) -> str:
-    """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
+    """Return the answer as Markdown, with figures if ``pictures`` are in the same folder."""
     rows, exhibits = answer[:2]
     blocks = [
         "# Analysis of switched-rigid floating oscillator, reproduced",
@@ -143,7 +143,7 @@ def as_markdown(
 
 
 def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
-    """Give the rows at full precision."""
+    """Return the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
     body = [
@@ -163,7 +163,7 @@ def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
 
 
 def list_cells(row: PublishedValue) -> list[tables.Cell]:
-    """Give a row in digits that are the same on every machine."""
+    """Return a row in digits that are the same on every machine."""
     cell_texts = (
         None if value is None else f"{round(value, _DECIMALS):.12g}"
         for value in (row.published, row.reference)
@@ -186,7 +186,7 @@ def list_cells(row: PublishedValue) -> list[tables.Cell]:
 
 
 def write_heading(exhibit: Exhibit) -> str:
-    """Give the figure of the paper and what it shows."""
+    """Return the number of the figure in the paper and what it shows."""
     figure_label = (
         exhibit.figure
         if exhibit.figure.startswith("section")
@@ -196,12 +196,12 @@ def write_heading(exhibit: Exhibit) -> str:
 
 
 def write_verdict(exhibit: Exhibit) -> str:
-    """Say whether what is found is what the paper shows."""
+    """Return if the computed figure agrees with the paper."""
     return {True: "yes", False: "no", None: "nothing to compare"}[exhibit.agrees]
 
 
 def describe_pairs() -> list[str]:
-    """Say how good the published and the better pair are."""
+    """Describe how good the published and the better pair are."""
     return [
         f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {compute_residual(pair):.3f}"
         for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak()))
@@ -209,7 +209,7 @@ def describe_pairs() -> list[str]:
 
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
-    """Write the page: every figure with what the paper shows and what is found, then the table."""
+    """Return the page: every figure with the paper's statement and the computed result, then the table."""
     published = build_scrolling_table(
         "Published and here", HEAD, [list_cells(row) for row in answer.rows]
     )

@@ -1,6 +1,7 @@
-"""What switching saves: the one cost model, held against the published saving and against runs that were measured.
+"""Savings of switching: the cost model compared with the published saving and with measured runs.
 
-The formulas stand in `d2rpick.choice.parts.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
+The formulas are in `d2rpick.choice.parts.cost` (share c of a time step) and
+`d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ _BODY: Final = {
 _CAR: Final = {**_BODY, "BT": 258 + 309}
 
 
-class Run(NamedTuple):
-    """A run whose processor time was measured with and without switching.
+class MeasuredRun(NamedTuple):
+    """MeasuredRun whose processor time was measured with and without switching.
 
     ``rigid`` are elements by formulation, and their integration points beside those of one layer.
     """
@@ -51,7 +52,7 @@ class Run(NamedTuple):
     measured: float
 
     def predicted(self, share: float) -> float:
-        """Saving when ``share`` of the cost of a step is saved [-]."""
+        """Return the saving if ``share`` of the cost of a time step is saved [-]."""
         return 1 - run_time_share(self.rigid_fraction, share, self.step_ratio)
 
     @property
@@ -61,7 +62,7 @@ class Run(NamedTuple):
 
     @property
     def cost_share(self) -> float:
-        """Share of a step that is saved, by the cost model [-]."""
+        """Share of the cost of a time step that is saved, by the cost model [-]."""
         return compute_saved_share(
             _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
         )
@@ -73,7 +74,7 @@ class Run(NamedTuple):
 
     @property
     def by_count(self) -> float:
-        """Saving when the share of the elements is taken for that of the cost [-]."""
+        """Saving if the cost is proportional to the number of elements [-]."""
         return self.predicted(self.element_share)
 
 
@@ -86,8 +87,8 @@ def _number(elements: Mapping[str, int]) -> int:
 
 
 RUNS: Final = (
-    Run("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
-    Run(
+    MeasuredRun("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
+    MeasuredRun(
         "all but the part that lands first",
         _RIGID,
         {**_BODY, "QBAT": 92, POINT: 3356},
@@ -95,7 +96,7 @@ RUNS: Final = (
         1.0,
         0.270,
     ),
-    Run(
+    MeasuredRun(
         "parts that have stopped deforming",
         _RIGID,
         {"QEPH": 764, "beam": 60, POINT: 1528},
@@ -103,7 +104,7 @@ RUNS: Final = (
         1.0,
         0.126,
     ),
-    Run(
+    MeasuredRun(
         "heavy parts",
         _RIGID,
         {"solid": 160, "beam": 18, "QEPH": 48, POINT: 96},
@@ -115,7 +116,7 @@ RUNS: Final = (
 
 
 def find_needed_fraction(share: float) -> float:
-    """Rigid fraction with which the pick-up truck's saving needs this share of the cost [-].
+    """Return the rigid fraction at which the pick-up truck's saving requires this share of the cost [-].
 
     Examples
     --------
@@ -126,7 +127,7 @@ def find_needed_fraction(share: float) -> float:
 
 
 def make_saving_exhibit() -> Exhibit:
-    """Predicted savings beside the measured ones, and what the published saving asks for."""
+    """Return predicted savings beside measured ones, and what the published saving requires."""
     published = 1 - PICK_UP[1] / PICK_UP[0]
     share = np.linspace(published, 1.0, 51)  # with less, no rigid fraction is enough
     number = np.arange(1.0, len(RUNS) + 1)
