@@ -82,7 +82,12 @@ CMD = ("program", "CMD")
     forms=FORMATS["drive"],
 )
 def drive(
-    deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **driving_options: Any
+    deck: str,
+    folder: str,
+    resume: bool,
+    dry_run: bool,
+    output: Output,
+    **driving_options: Any,
 ) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
