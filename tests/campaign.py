@@ -1,11 +1,12 @@
-"""A campaign of damaged inputs over all formats: ``python -m tests.campaign --inputs 1000000 --seed 1``.
+"""Feed damaged inputs of all formats to the readers: ``python -m tests.campaign --inputs 1000000 --seed 1``.
 
-Each input is made from the seed and its number alone.  Whatever the damage, a reader gives the numbers that stand in
-the file or an error of d2rpick in one line; anything else, a warning and the death of the process among them, is a
-fault.  Counts are printed for each format; exit code 1 when there is a fault.  ``--only FORMAT NUMBER`` repeats one.
+Each input depends only on the seed and its number.  For any damage a reader must either return numbers that are in the
+file or raise a d2rpick error of one line.  Anything else is a fault, including a warning and the death of the process.
+The campaign prints counts for each format; the exit code is 1 if there is a fault.  ``--only FORMAT NUMBER`` repeats
+one input.
 
-``--relations`` compares answers instead: a history is changed in a way that must not matter, or must matter in a known
-way (`tests.relations`).  A fault is an answer that does not follow.
+``--relations`` compares answers instead: it changes a history in a way that must not change the answer, or must change
+it in a known way (`tests.relations`).  An answer that does not follow is a fault.
 """
 
 import argparse
@@ -30,28 +31,26 @@ from d2rpick.histories.opening import Selection, Source, open_run
 from tests.command import DECK
 from tests.damaged_files import FILES
 from tests.faults import Fault, damage
-from tests.hdf5_files import plain, written
+from tests.hdf5_files import plain, write_hdf5
 from tests.histories.formats import test_curves, test_faults_text
-from tests.made_d3plot import D3plotWriter, states
-from tests.reading import run_of, states_of
+from tests.made_d3plot import D3plotWriter, make_states
+from tests.reading import list_states, open_contents
 from tests.relations import RELATIONS, check_relation
 
-_CHUNK: Final = 200  # inputs of one task
-_FEW: Final = (
-    20  # histories of one task of a relation, each of which is chosen from twice
-)
-_SHOWN: Final = 5  # faults of a format that are printed
+_CHUNK: Final = 200  # inputs for each task
+_FEW: Final = 20  # histories for each task of a relation; each is read and asked twice
+_SHOWN: Final = 5  # faults printed for each format
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
-_D3PLOT_STATES: Final = states([0.125 * state for state in range(6)], walls=1)
+_D3PLOT_STATES: Final = make_states([0.125 * state for state in range(6)], walls=1)
 _CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
     b"%.3f,%.5e,%.4f\n" % (state / 8, state**3 - 10, state) for state in range(40)
 )
 
 
-def faults(random: Random) -> list[Fault]:
-    """One to three faults anywhere."""
+def draw_faults(random: Random) -> list[Fault]:
+    """Draw one to three faults at random places of a file."""
     return [
         (
             random.choice(_KINDS),
@@ -64,56 +63,56 @@ def faults(random: Random) -> list[Fault]:
 
 
 def glstat(random: Random) -> bool:
-    """Damage a glstat; whether it could be read."""
-    return test_faults_text.check_glstat(faults(random))
+    """Damage a glstat; return True if it could be read."""
+    return test_faults_text.check_glstat(draw_faults(random))
 
 
 def matsum(random: Random) -> bool:
-    """Damage a matsum of three or four lines for each part."""
-    return test_faults_text.check_matsum(faults(random), random.choice((3, 4)))
+    """Damage a matsum with three or four lines for each part; return True if it could be read."""
+    return test_faults_text.check_matsum(draw_faults(random), random.choice((3, 4)))
 
 
 def binout(random: Random) -> bool:
-    """Damage the structure of a binout, or lose, double and move its records."""
+    """Damage the structure of a binout, or lose, duplicate and move its records; return True if it could be read."""
     return restructured(random, "binout", "long binout")
 
 
 def time_history(random: Random) -> bool:
-    """Damage a T01 like that."""
+    """Damage a T01 in the same way as a binout; return True if it could be read."""
     return restructured(random, "T01", "T01 as text")
 
 
 def restructured(random: Random, *names: str) -> bool:
-    """Damage one of these files of records."""
+    """Damage the structure of one of the files with these names; return True if it could be read."""
     file = FILES[random.choice(names)]
     return bool(file.true(file.restructured(random)))
 
 
 def csv(random: Random) -> bool:
-    """Damage a table; what is read stands in one line."""
-    return _table(damage(_CSV, faults(random), []))
+    """Damage a table; return True if it could be read. Each state that is read must be in one line of the table."""
+    return _table(damage(_CSV, draw_faults(random), []))
 
 
 def curves(random: Random) -> bool:
-    """Damage a file of curves."""
+    """Damage a file of curves; return True if it could be read."""
     text = random.choice((test_curves.CURVEPLOT, test_curves.T_HIS)).encode()
-    return _table(damage(text, faults(random), []))
+    return _table(damage(text, draw_faults(random), []))
 
 
 def hdf5(random: Random) -> bool:
-    """Damage an HDF5 file; its numbers bear no mark of their own."""
-    data = damage(_hdf5(), faults(random), [])
-    return bool(_read(lambda: run_of(hdf5_file, data).history(Selection())))
+    """Damage an HDF5 file; return True if it could be read. Its numbers carry no mark, so they are not checked."""
+    data = damage(_hdf5(), draw_faults(random), [])
+    return bool(_read(lambda: open_contents(hdf5_file, data).history(Selection())))
 
 
 def d3plot(random: Random) -> bool:
-    """Damage a d3plot of one file or two; the numbers bear no mark of their own, but there are not more states."""
+    """Damage a d3plot of one or two files; return True if it could be read. Only the number of states is checked."""
     contents = [
         _d3plot().together(_D3PLOT_STATES[:3]),
         _d3plot().file(_D3PLOT_STATES[3:]),
     ]
-    place = random.randrange(2)
-    contents[place] = damage(contents[place], faults(random), [])
+    file_number = random.randrange(2)
+    contents[file_number] = damage(contents[file_number], draw_faults(random), [])
     sources = [
         Source(name, data)
         for name, data in zip(("d3plot", "d3plot01"), contents, strict=True)
@@ -130,22 +129,22 @@ def d3plot(random: Random) -> bool:
 
 
 def deck(random: Random) -> bool:
-    """Damage a deck."""
+    """Damage a deck; return True if it could be read."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "deck.k")
-        file.write_bytes(damage(Path(DECK).read_bytes(), faults(random), []))
+        file.write_bytes(damage(Path(DECK).read_bytes(), draw_faults(random), []))
         return bool(_read(lambda: list(read_deck(str(file)).cards)))
 
 
 def companions(random: Random) -> bool:
-    """Damage one or both of a glstat and the matsum of the same run."""
+    """Damage one or both of a glstat and the matsum of the same run; return True if they could be read."""
     with TemporaryDirectory() as folder:
         contents = {
             "glstat": test_faults_text.GLSTAT,
             "matsum": test_faults_text.MATSUM[4],
         }
         for name in random.choice((("glstat",), ("matsum",), ("glstat", "matsum"))):
-            contents[name] = damage(contents[name], faults(random), [])
+            contents[name] = damage(contents[name], draw_faults(random), [])
         for name, content in contents.items():
             Path(folder, name).write_bytes(content)
         parts = random.choice(((), ("12",), ("1", "12", "13")))
@@ -165,29 +164,29 @@ CHECKS: Final[dict[str, Callable[[Random], bool]]] = {
 }
 
 
-def case(form: str, seed: int, number: int) -> str:
-    """What became of one input, or of one history and a relation: ``read``, ``refused``, or the fault."""
-    return outcome(CHECKS[form], Random(f"{form} {seed} {number}"), number)
+def run_case(form: str, seed: int, number: int) -> str:
+    """Return the outcome of one input, or of one history and a relation: ``read``, ``refused``, or the fault."""
+    return find_outcome(CHECKS[form], Random(f"{form} {seed} {number}"), number)
 
 
-def outcome(read: Callable[[Random], bool], random: Random, number: int) -> str:
-    """The same of an input that is made from random numbers and read."""
+def find_outcome(check: Callable[[Random], bool], random: Random, number: int) -> str:
+    """Return the outcome of one check, which draws an input from random numbers and reads it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return "read" if read(random) else "refused"
+            return "read" if check(random) else "refused"
         except Exception as error:  # noqa: BLE001  whatever it is, it is a fault
             return f"number {number}: {type(error).__name__}: {' '.join(str(error).split())[:150]}"
 
 
-def chunk(seed: int, task: tuple[str, range]) -> tuple[str, Counter[str]]:
-    """Outcomes of some inputs of one format."""
+def count_outcomes(seed: int, task: tuple[str, range]) -> tuple[str, Counter[str]]:
+    """Count the outcomes of some inputs of one format."""
     form, numbers = task
-    return form, Counter(case(form, seed, number) for number in numbers)
+    return form, Counter(run_case(form, seed, number) for number in numbers)
 
 
 def main() -> int:
-    """Run the campaign."""
+    """Run the campaign and return its exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
@@ -195,21 +194,21 @@ def main() -> int:
     parser.add_argument("--relations", action="store_true")
     options = parser.parse_args()
     if options.only:
-        print(case(options.only[0], options.seed, int(options.only[1])))
+        print(run_case(options.only[0], options.seed, int(options.only[1])))
         return 0
     forms = [*(RELATIONS if options.relations else FORMATS)]
-    each = -(-options.inputs // len(forms))
+    inputs_per_format = -(-options.inputs // len(forms))
     size = _FEW if options.relations else _CHUNK
     tasks = [
-        (form, range(at, min(at + size, each)))
-        for at in range(0, each, size)
+        (form, range(first_number, min(first_number + size, inputs_per_format)))
+        for first_number in range(0, inputs_per_format, size)
         for form in forms
     ]
-    found: dict[str, Counter[str]] = {form: Counter() for form in forms}
+    outcomes: dict[str, Counter[str]] = {form: Counter() for form in forms}
     with choose_farm(count_cores(), "tests.faults") as farm:
-        for answer in farm.answers(partial(chunk, options.seed), tasks):
+        for answer in farm.answers(partial(count_outcomes, options.seed), tasks):
             form, numbers = tasks[answer.number]
-            found[form] += (
+            outcomes[form] += (
                 Counter({f"{numbers}: {answer.error}": 1})
                 if answer.error
                 else answer.result[1]
@@ -220,23 +219,27 @@ def main() -> int:
         else ("format", "inputs", "read", "refused")
     )
     print(f"{heads[0]:<22} {heads[1]:>9} {heads[2]:>9} {heads[3]:>9} {'faults':>9}")
-    for form, counts in found.items():
-        wrong = [what for what in counts if what not in ("read", "refused")]
+    for form, counts in outcomes.items():
+        fault_kinds = [
+            outcome_name
+            for outcome_name in counts
+            if outcome_name not in ("read", "refused")
+        ]
         print(
-            f"{form:<22} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}"
+            f"{form:<22} {inputs_per_format:>9} {counts['read']:>9} {counts['refused']:>9} {len(fault_kinds):>9}"
         )
         print(
-            *(f"  {what}" for what in wrong[:_SHOWN]),
+            *(f"  {outcome_name}" for outcome_name in fault_kinds[:_SHOWN]),
             sep="\n",
-            end="\n" if wrong else "",
+            end="\n" if fault_kinds else "",
         )
-    return int(any(counts.keys() - {"read", "refused"} for counts in found.values()))
+    return int(any(counts.keys() - {"read", "refused"} for counts in outcomes.values()))
 
 
-def _read(read: Callable[[], object]) -> object:
-    """What is read; None for an error of ours in one line."""
+def _read(reader: Callable[[], object]) -> object:
+    """Return the result of ``reader``, or None if it raises a d2rpick error of one line."""
     try:
-        return read() or True
+        return reader() or True
     except D2RPickError as error:
         message = str(error)
     assert "\n" not in message, "an error of several lines"
@@ -244,13 +247,13 @@ def _read(read: Callable[[], object]) -> object:
 
 
 def _table(data: bytes) -> bool:
-    """Read a table; whether it could be.  A state must stand in one line, whatever the decimal sign."""
-    history = _read(lambda: run_of(csv_table, data).history(Selection()))
+    """Return True if a table could be read; each state must be in one line, with either decimal sign."""
+    history = _read(lambda: open_contents(csv_table, data).history(Selection()))
     if not isinstance(history, History):
         return False
     text = data.decode("latin-1")
     lines = [set(_numbers(line)) for line in re.split(r"[\r\n]+", text)]
-    for time, energy in states_of(history):
+    for time, energy in list_states(history):
         assert any({time, energy} <= line for line in lines), (
             f"({time}, {energy}) stands in no line"
         )
@@ -269,7 +272,7 @@ def _d3plot() -> D3plotWriter:
 
 @cache
 def _hdf5() -> bytes:
-    return written(plain).getvalue()
+    return write_hdf5(plain).getvalue()
 
 
 if __name__ == "__main__":

@@ -1,28 +1,28 @@
-"""A chain of three masses and two springs, run by a real solver with and without switching."""
+"""Chain of three masses and two springs, computed by a solver with and without switching."""
 
 import csv
 from functools import cache
 
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
-from tests.computed import results, stored
+from tests.computed import locate_results, locate_stored
 from tests.reading import read_history
 
 TD_PEAK, TD_LATE = 0.13505, 0.238
 
 
 @cache
-def history(*energies: str) -> History:
-    """Record of the run without switching, by default with the energies of both springs."""
+def read_chain_history(*energies: str) -> History:
+    """Read the energy history of the reference run, by default the sum of the energies of both springs."""
     energies = energies or ("IE_spring1_J", "IE_spring2_J")
-    return read_history([stored("chain_ref.csv.gz")], Selection(energy=energies))
+    return read_history([locate_stored("chain_ref.csv.gz")], Selection(energy=energies))
 
 
 @cache
 def scan() -> tuple[dict[str, float], ...]:
-    """Switched runs: times, true signs of both springs, and the computed residual."""
+    """Read the table of the switched runs: times, true signs of both springs, and the computed residual."""
     names = ("tr_s", "td_s", "sign1", "sign2", "R_sim")
-    with results("chain_scan.csv").open(encoding="ascii") as lines:
+    with locate_results("chain_scan.csv").open(encoding="ascii") as lines:
         return tuple(
             {name: float(row[name]) for name in names} for row in csv.DictReader(lines)
         )

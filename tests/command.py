@@ -1,4 +1,4 @@
-"""The command line called inside this process, with its output streams apart."""
+"""Call the command line inside the test process, with stdout and stderr kept apart."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from click.testing import CliRunner, Result
 
 from d2rpick.cli import d2rpick
 
-TIME_LIMIT = 60  # [s] after which a child that hangs is ended
+TIME_LIMIT = 60  # a child process that takes longer is ended [s]
 ROOT = Path(__file__).resolve().parents[1]
 ENERGY = str(ROOT / "sample_data" / "energy.csv")
 GLSTAT = str(ROOT / "sample_data" / "energy.glstat")
@@ -35,14 +35,14 @@ INTERRUPTIBLE = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom "
     "d2rpick.__main__ import main; main()"
 )
-# No colour variables and no options that the tester's own environment may set.
+# Environment without colour variables and without options of d2rpick that a developer may have set.
 _ENVIRONMENT = {
     "NO_COLOR": None,
     "FORCE_COLOR": None,
     "COLUMNS": None,
     "D2RPICK_SUGGEST_TD": None,
 }
-# Before 8.2, click's runner mixes the streams unless it is told not to.
+# Click before 8.2 mixes stdout and stderr by default.
 _APART: dict[str, Any] = (
     {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 )
@@ -54,43 +54,43 @@ def run(
     color: bool = False,
     env: Mapping[str, str | None] | None = None,
 ) -> Result:
-    """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here.
+    """Call ``d2rpick`` with these arguments; raise every exception except the regular exit.
 
-    What was asked before of files of the clone alone is not computed again.
+    Results for files of the repository are cached, because these files do not change.
     """
-    given = {**_ENVIRONMENT, **(env or {})}
+    environment = {**_ENVIRONMENT, **(env or {})}
     around = frozenset(
         (name, value)
         for name, value in os.environ.items()
         if name != "PYTEST_CURRENT_TEST"
     )
-    asked = (args, stdin, color, *given.items(), around, Path.cwd())
-    if asked in _ANSWERED:
-        return _ANSWERED[asked]
+    key = (args, stdin, color, *environment.items(), around, Path.cwd())
+    if key in _ANSWERED:
+        return _ANSWERED[key]
     result = CliRunner(**_APART).invoke(
-        d2rpick, args, input=stdin, color=color, env=given
+        d2rpick, args, input=stdin, color=color, env=environment
     )
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     if not any(
-        _changes(folder)
+        _is_temporary(folder)
         for folder in (
             Path.cwd(),
             *(Path(arg).absolute() for arg in args if "/" in arg),
         )
     ):
-        _ANSWERED[asked] = result
+        _ANSWERED[key] = result
     return result
 
 
 def put(path: Path, content: str | bytes) -> Path:
-    """Write a file, and give its path."""
+    """Write a file and return its path."""
     path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
     return path
 
 
-def refused(*args: str) -> str:
-    """Give the message of a command that could not run; it is one line on stderr and all there is."""
+def read_refusal(*args: str) -> str:
+    """Return the error message of a command that failed; it must be one line on stderr and the only output."""
     result = run(*args)
     assert (result.exit_code, result.stdout) == (2, ""), result.stderr
     assert result.stderr.count("\n") == 1
@@ -98,63 +98,63 @@ def refused(*args: str) -> str:
     return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
 
 
-def _changes(path: Path) -> bool:
-    """Whether a file is temporary, or of a temporary folder; those of the clone stay as they are."""
+def _is_temporary(path: Path) -> bool:
+    """Return True if a file may change: it is in a temporary folder, not in the repository."""
     path = Path(os.path.normpath(path))
     return not path.is_relative_to(ROOT) and (
         path == _TEMPORARY or _TEMPORARY in path.parents
     )
 
 
-def unwrapped(text: str) -> str:
-    """A text in one line, however it was wrapped."""
+def join_wrapped_lines(text: str) -> str:
+    """Join the lines of a text that was wrapped."""
     return " ".join(text.split())
 
 
 @contextmanager
-def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """Start the program in a session of its own; what is left of it after the block, or the time limit, is ended.
+def start_program(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
+    """Start the program in a session of its own, and end it after the block or the time limit.
 
-    It can be interrupted also where this process cannot, as in the background of a shell.
+    It can be interrupted even if this process cannot, for example in the background of a shell.
     """
     command = [sys.executable, "-c", INTERRUPTIBLE, *args]
-    given = {
+    popen_options = {
         "stdout": subprocess.PIPE,
         "stderr": subprocess.PIPE,
         "cwd": ROOT,
         **options,
     }
-    with subprocess.Popen(command, start_new_session=True, **given) as process:
-        watch = Timer(TIME_LIMIT, _end, [process.pid])
+    with subprocess.Popen(command, start_new_session=True, **popen_options) as process:
+        watch = Timer(TIME_LIMIT, _end_group, [process.pid])
         watch.start()
         try:
             yield process
         finally:
             watch.cancel()
-            _end(process.pid)
+            _end_group(process.pid)
 
 
-def _end(group: int) -> None:
+def _end_group(group: int) -> None:
     with suppress(ProcessLookupError):
         os.killpg(group, signal.SIGKILL)
 
 
-def answer(*args: str) -> dict[str, Any]:
-    """Run a command with JSON output and give what it says, be it an objection or not."""
+def run_json(*args: str) -> dict[str, Any]:
+    """Run a command with JSON output and return the document; exit code 1 (problems found) is allowed."""
     result = run(*args, "-f", "json")
     assert result.exit_code in (0, 1), result.stderr
-    found: dict[str, Any] = json.loads(result.stdout)
-    return found
+    document: dict[str, Any] = json.loads(result.stdout)
+    return document
 
 
-def replayed(form: str, *options: str, v0: str = "6") -> bytes:
-    """The oscillator of the paper for 0.15 s, a state each 0.1 ms, as a file of this format has it."""
+def make_replay_file(form: str, *options: str, v0: str = "6") -> bytes:
+    """Return the content of a file with 0.15 s of the paper's oscillator, one state each 0.1 ms, in this format."""
     times = ("--t-end", "0.15", "--dt", "1e-4", "--write-as", form)
     result = run("replay", *OSCILLATOR[:-1], v0, *times, *options)
     assert result.exit_code == 0, result.stderr
     return result.stdout_bytes
 
 
-def codes(found: dict[str, Any]) -> set[str]:
-    """Codes of the warnings of an answer."""
-    return {warning["code"] for warning in found["warnings"]}
+def list_warning_codes(document: dict[str, Any]) -> set[str]:
+    """Return the codes of the warnings of an answer."""
+    return {warning["code"] for warning in document["warnings"]}

@@ -1,4 +1,4 @@
-"""Runs that a solver computed: small copies of them in tests/data, and what the validation keeps."""
+"""Runs computed by a solver: small copies in tests/data, and the tables of results of the validation."""
 
 import gzip
 from pathlib import Path
@@ -11,27 +11,27 @@ from tests.command import ROOT
 DATA = ROOT / "tests" / "data"
 
 
-def stored(name: str) -> str:
-    """Name of a file in tests/data."""
+def locate_stored(name: str) -> str:
+    """Return the path of a file in tests/data."""
     return str(DATA / name)
 
 
-def results(name: str) -> Path:
-    """Path of a table in which switched runs were evaluated when they were computed."""
+def locate_results(name: str) -> Path:
+    """Return the path of the table with the results of the switched runs."""
     return ROOT / "validation" / "results" / name
 
 
-def starter(model: str) -> bytes:
-    """Starter deck of a model."""
-    return unpacked(str(ROOT / "validation" / "decks" / f"{model}_0000.rad.gz"))
+def read_starter(model: str) -> bytes:
+    """Return the content of the starter deck of a model."""
+    return read_unpacked(str(ROOT / "validation" / "decks" / f"{model}_0000.rad.gz"))
 
 
-def unpacked(name: str) -> bytes:
-    """Content of a packed file."""
+def read_unpacked(name: str) -> bytes:
+    """Return the content of a gzip file."""
     return gzip.decompress(Path(name).read_bytes())
 
 
-def columns(name: str, energy: str) -> tuple[Samples, Samples]:
-    """Columns ``time_s`` and ``energy`` of a table."""
+def read_columns(name: str, energy: str) -> tuple[Samples, Samples]:
+    """Read the columns ``time_s`` and ``energy`` of a table."""
     table = np.genfromtxt(name, delimiter=",", names=True)
     return table["time_s"], table[energy]

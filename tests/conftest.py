@@ -1,4 +1,4 @@
-"""Settings that must hold before any test module is imported, and what all tests of a process share."""
+"""Settings for all tests of a process, made before any test module is imported."""
 
 import gc
 import os
@@ -7,11 +7,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-# As on the command line: the systems here are small, and threads of several test processes would fight over cores.
+# One thread, as on the command line: the systems are small, and threads of several workers would compete for cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# The program is started again and again: that it is compiled each time is no part of any test.
+# Tests start the program many times and must not compile it each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# What other libraries plug into hypothesis takes a tenth of a second to import, in each process.
+# Importing the hypothesis plugins of other libraries takes 0.1 s in each process.
 os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
 
 import pytest
@@ -19,11 +19,11 @@ from hypothesis import settings
 
 from d2rpick.base.workers import count_cores
 
-# A busy machine is no finding.  Each run asks other examples: a fifth of the usual hundred are as good as all.
+# No deadline, because a busy machine is no error. Every run draws new examples, so 20 instead of 100 are enough.
 settings.register_profile("d2rpick", deadline=None, max_examples=20)
 settings.load_profile("d2rpick")
 
-# Nor is it that each process of the tests compiles them anew.
+# Workers must not compile the tests again either.
 sys.dont_write_bytecode = False
 
 
@@ -32,7 +32,7 @@ _now = time.time_ns
 
 @pytest.fixture(scope="session", autouse=True)
 def _old_files() -> Iterator[None]:
-    """Let all files look old: most tests read what they have just written, and no write of theirs is under way."""
+    """Make all files look old, so that d2rpick does not wait for a writer of files that a test has just written."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(time, "time_ns", lambda: _now() + 3_600_000_000_000)
         yield
@@ -40,24 +40,23 @@ def _old_files() -> Iterator[None]:
 
 @pytest.fixture
 def new_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let files look as new as they are, but make no pause: what is under way in these tests ends by itself."""
+    """Show files with their true age, but do not pause: nothing else writes the files of these tests."""
     monkeypatch.setattr(time, "time_ns", _now)
     monkeypatch.setattr(time, "sleep", lambda _: None)
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder of its own."""
+    """Change to an empty folder and return its path."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.fixture
 def by_level(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge by the energy level alone on the command line: looking for a vibration takes most of its time.
+    """Judge by the energy level alone on the command line, because fitting a vibration takes most of the time.
 
-    What the level alone shows is poor, and is not to be a problem.
-    """
+    What the level alone shows is poor, and is not to be a problem."""
     for command in ("SUGGEST", "VERIFY", "PLAN", "EXPLORE", "PARTS"):
         monkeypatch.setenv(f"D2RPICK_{command}_NO_VERIFY", "1")
         monkeypatch.setenv(f"D2RPICK_{command}_MIN_QUALITY", "poor")
@@ -65,21 +64,21 @@ def by_level(monkeypatch: pytest.MonkeyPatch) -> None:
 
 pytest_plugins = ["tests.alone"]
 
-# Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
+# The default frequency of garbage collection takes 10 % of the time of all tests.
 gc.set_threshold(20_000, 20, 50)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Run a process on each core: each collects all tests, and what waits for a child leaves its core to that."""
+    """Use one worker per core: a worker that waits for a child process leaves its core to the child."""
     return count_cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the slow folder that would come last: at the end one process would wait for the other."""
+    """Run the slow folder first; at the end, one worker would wait for the other."""
     items.sort(key=lambda item: not item.nodeid.startswith("tests/vibration/"))
 
 
 def pytest_collection_finish() -> None:
-    """Look for no garbage among the modules and the collected tests, which are needed to the end."""
+    """Exclude the modules and the collected tests from garbage collection; they are needed to the end."""
     gc.freeze()

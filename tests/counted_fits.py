@@ -1,4 +1,4 @@
-"""Fits to windows of a record that are counted."""
+"""Memory of fits that counts how often a fit had to be computed."""
 
 from collections.abc import Callable, Hashable
 from typing import TypeVar
@@ -9,7 +9,7 @@ _Found = TypeVar("_Found")
 
 
 class CountedFits(Fits):
-    """What was found in a record, and how often something had to be made."""
+    """Fits of a record, with the number of results that were computed rather than remembered."""
 
     made = 0
 

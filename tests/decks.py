@@ -1,4 +1,4 @@
-"""Decks on disk for a test: write texts into a folder, read them back, check them."""
+"""Write deck texts into a folder, read them back, and check them."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ from d2rpick.rules import check_deck
 MAIN = "main.k"
 
 
-def wide(*fields: object, width: int = 10) -> str:
-    """A line of fields, each at the right of its columns."""
+def pad(*fields: object, width: int = 10) -> str:
+    """Return a line of fields, each right-aligned in its columns."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
-def row(*ids: int, width: int = 8) -> str:
-    """A line of a mesh of LS-DYNA."""
-    return wide(*ids, width=width)
+def make_row(*ids: int, width: int = 8) -> str:
+    """Return a line of a mesh of LS-DYNA."""
+    return pad(*ids, width=width)
 
 
 def write(
@@ -28,10 +28,10 @@ def write(
     files: Mapping[str, str] | None = None,
     name: str = MAIN,
 ) -> str:
-    """Path of the main deck, written with the files it includes."""
-    for other, text in (files or {}).items():
-        (folder / other).parent.mkdir(parents=True, exist_ok=True)
-        (folder / other).write_bytes(text.encode("latin-1"))
+    """Write the main deck and the files that it includes; return the path of the main deck."""
+    for file_name, text in (files or {}).items():
+        (folder / file_name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file_name).write_bytes(text.encode("latin-1"))
     path = folder / name
     path.write_bytes(deck if isinstance(deck, bytes) else deck.encode("latin-1"))
     return str(path)
@@ -47,15 +47,15 @@ def windows(deck: Deck) -> Windows:
     return find_windows(read_switching(deck), read_parts(deck))
 
 
-def spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
-    """Part, tr and td of every window."""
+def list_spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
+    """Return part, tr and td of every window of a deck."""
     return [(window.part, window.tr, window.td) for window in windows(deck).windows]
 
 
-def found(
+def count_findings(
     folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None
 ) -> Counter[str]:
-    """How often each rule objects."""
+    """Count the findings of each rule."""
     return Counter(
         finding.rule for finding in check_deck(write(folder, deck, files)).findings
     )

@@ -1,4 +1,4 @@
-"""Runs of the planar box that falls and bounces, as files of LS-DYNA."""
+"""Runs of the falling planar box, as LS-DYNA files."""
 
 from functools import cache
 from pathlib import Path
@@ -7,7 +7,7 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, RigidWindow, simulate
 from d2rpick.report import history_files
 
-MESH = 6  # coarse, for speed
+MESH = 6  # elements per edge; coarse, for speed
 T_END = 1.2
 
 
@@ -18,15 +18,18 @@ def drop(
     tilt: float = 30.0,
     interval: float = 8e-4,
 ) -> Record:
-    """Compute a run that is switched in ``windows`` [s]."""
+    """Compute a run that is rigid in ``windows`` (tr, td) [s]."""
     parameters = Parameters(speed=0.0, drop=height, tilt=tilt, mesh=MESH)
     return simulate(
-        parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval
+        parameters,
+        T_END,
+        *(RigidWindow(*window) for window in windows),
+        interval=interval,
     )
 
 
-def written(record: Record, folder: Path) -> list[str]:
-    """Write matsum and glstat of a run, and give their names."""
+def write_run_files(record: Record, folder: Path) -> list[str]:
+    """Write the matsum and glstat of a run and return their names."""
     folder.mkdir(parents=True, exist_ok=True)
     names = []
     for form in ("matsum", "glstat"):

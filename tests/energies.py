@@ -1,4 +1,4 @@
-"""Histories that several tests choose from, what is chosen in a window of one, and what is warned of in an answer."""
+"""Energy histories that several tests use, and helpers to choose times in them and read the warnings."""
 
 from types import SimpleNamespace
 from typing import TypeVar, cast
@@ -15,33 +15,35 @@ from tests.command import ROLLOVER
 T = TypeVar("T")
 
 
-def sure(value: T | None) -> T:
-    """Give what must be there."""
+def require(value: T | None) -> T:
+    """Return ``value``, which must not be None."""
     assert value is not None
     return value
 
 
-def codes(answer: Suggestion) -> set[str]:
+def list_codes(answer: Suggestion) -> set[str]:
     return {caution.code for caution in answer.cautions}
 
 
-def of(energy: np.ndarray, time: np.ndarray) -> History:
+def make_energy_history(energy: np.ndarray, time: np.ndarray) -> History:
     return History(time, energy, source=("test",), format="csv", channel="E")
 
 
-def rollover() -> History:
+def read_rollover() -> History:
     table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
-    return of(table["boxIE_J"], table["time_s"])
+    return make_energy_history(table["boxIE_J"], table["time_s"])
 
 
-def vibration(step: float = 0.01, decay: float = 0.0) -> History:
-    """Energy of one mode with period 1 of the deformation, undamped unless told otherwise."""
+def make_vibration_energy(step: float = 0.01, decay: float = 0.0) -> History:
+    """Return the energy of one mode whose deformation has period 1, undamped by default."""
     time = np.arange(0, 4, step)
-    return of(np.exp(-decay * time) * np.sin(2 * np.pi * time) ** 2, time)
+    return make_energy_history(
+        np.exp(-decay * time) * np.sin(2 * np.pi * time) ** 2, time
+    )
 
 
-def reference(history: History) -> Reference:
-    """Give a record that was made in memory as if it had been read: a run without databases."""
+def make_reference(history: History) -> Reference:
+    """Wrap a history made in memory as a reference run without databases."""
     bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
     return Reference(cast("Run", bare), history)
 
@@ -52,5 +54,5 @@ def suggest_in_window(
     settings: Settings,
     fits: Fits | None = None,
 ) -> Suggestion:
-    """Choose both times in a record that was made in memory."""
-    return suggest_of(reference(history), window, settings, fits=fits)
+    """Choose tr and td in a history made in memory."""
+    return suggest_of(make_reference(history), window, settings, fits=fits)

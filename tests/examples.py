@@ -1,7 +1,7 @@
-"""The examples in README.md and docs: found, and run as a reader would type them.
+"""Find the examples in README.md and docs, and run them as a reader would type them.
 
-``python -m tests.examples`` runs all sessions and writes what they print into the pages; read the difference before
-you commit it.
+``python -m tests.examples`` runs all sessions and writes their output into the pages.  Check the difference before you
+commit it.
 """
 
 import contextlib
@@ -23,92 +23,96 @@ PAGES = {
 
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 _PROMPT = "$ d2rpick "  # lines of a card begin with "$ " too
-# A command, continued where its lines end with a backslash, and what is shown up to the next prompt.
+# A command, continued if its line ends with a backslash, and the output down to the next prompt.
 _SESSION = re.compile(
     r"^\$ (d2rpick (?:.*\\\n)*.*)\n((?:(?!\$ d2rpick ).*\n)*)", flags=re.MULTILINE
 )
-# The last digits of a number at full precision differ from machine to machine.
+# The last digits of a number at full precision depend on the machine.
 _FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
 _NEXT_TO_NOTHING = re.compile(r"\b\d\.\d+e-(?:0[5-9]|[1-9]\d)\b")
 
 
 class Session(NamedTuple):
-    """A command line, and below it what a terminal shows: first stderr, then stdout."""
+    """Command line, and the output that a page shows below it: first stderr, then stdout."""
 
     command: str
     shown: str
 
 
-def text_of(page: str) -> str:
-    """Text of a page, by its name from the root of the repository."""
+def read_page(page: str) -> str:
+    """Return the text of a page, given its path from the root of the repository."""
     return PAGES[page].read_text("utf-8")
 
 
-def blocks(text: str, language: str) -> list[str]:
-    """Fenced blocks in a language."""
-    return [block for found, block in _FENCED.findall(text) if found == language]
+def find_blocks(text: str, language: str) -> list[str]:
+    """Return the fenced blocks in a language."""
+    return [
+        block
+        for block_language, block in _FENCED.findall(text)
+        if block_language == language
+    ]
 
 
-def languages(text: str) -> set[str]:
-    """Languages of the fenced blocks."""
-    return {found for found, _ in _FENCED.findall(text)}
+def find_languages(text: str) -> set[str]:
+    """Return the languages of the fenced blocks."""
+    return {block_language for block_language, _ in _FENCED.findall(text)}
 
 
-def prose(text: str) -> str:
-    """Text without its fenced blocks."""
+def strip_blocks(text: str) -> str:
+    """Return the text without its fenced blocks."""
     return _FENCED.sub("", text)
 
 
-def sessions(text: str) -> Iterator[Session]:
-    """Sessions of a page in their order."""
-    for block in blocks(text, "console"):
+def find_sessions(text: str) -> Iterator[Session]:
+    """Yield the sessions of a page in order."""
+    for block in find_blocks(text, "console"):
         assert block.startswith(_PROMPT), block
         yield from (
-            Session(command, shown.rstrip("\n"))
-            for command, shown in _SESSION.findall(block)
+            Session(command, shown_output.rstrip("\n"))
+            for command, shown_output in _SESSION.findall(block)
         )
 
 
-def printed(command: str) -> str:
-    """What a command line prints here."""
+def run_shown_command(command: str) -> str:
+    """Run a command line and return its output."""
     _, *args = shlex.split(command.replace("\\\n", ""))
     result = run(*args)
     return f"{result.stderr}{result.stdout}".rstrip("\n")
 
 
-def rounded(text: str) -> str:
-    """Text with its numbers cut to what every machine gives: those at full precision, and errors next to nothing."""
+def round_numbers(text: str) -> str:
+    """Drop the digits that depend on the machine: the last ones at full precision, and errors close to zero."""
     text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.11g}", text)
     return _NEXT_TO_NOTHING.sub(lambda number: f"{float(number[0]):.3g}", text)
 
 
 def renewed(text: str) -> str:
-    """Text of a page with what its sessions print here; digits that differ by machine stay."""
+    """Replace the shown output of the sessions by today's, except for digits that depend on the machine."""
 
-    def run_again(found: re.Match[str]) -> str:
-        command, shown = found[1], found[2]
-        now = printed(command)
-        if rounded(now) == rounded(shown.rstrip("\n")):
-            return found[0]
-        return f"$ {command}\n{now}\n" if now else f"$ {command}\n"
+    def run_again(match: re.Match[str]) -> str:
+        command, shown_output = match[1], match[2]
+        printed_now = run_shown_command(command)
+        if round_numbers(printed_now) == round_numbers(shown_output.rstrip("\n")):
+            return match[0]
+        return f"$ {command}\n{printed_now}\n" if printed_now else f"$ {command}\n"
 
-    def of_block(found: re.Match[str]) -> str:
-        return _SESSION.sub(run_again, found[0]) if found[1] == "console" else found[0]
+    def of_block(match: re.Match[str]) -> str:
+        return _SESSION.sub(run_again, match[0]) if match[1] == "console" else match[0]
 
     return _FENCED.sub(of_block, text)
 
 
 @contextlib.contextmanager
-def folder_of_a_reader() -> Iterator[None]:
-    """Work in a folder that holds the sample data alone."""
-    with tempfile.TemporaryDirectory() as place:
-        shutil.copytree(ROOT / "sample_data", Path(place) / "sample_data")
-        with contextlib.chdir(place):
+def enter_reader_folder() -> Iterator[None]:
+    """Change to a folder that contains only the sample data."""
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "sample_data", Path(folder) / "sample_data")
+        with contextlib.chdir(folder):
             yield
 
 
 if __name__ == "__main__":
     for path in PAGES.values():
-        with folder_of_a_reader():
+        with enter_reader_folder():
             new = renewed(path.read_text("utf-8"))
         path.write_text(new, "utf-8")

@@ -1,6 +1,6 @@
-"""Damage done to files, and plain line-by-line readers that say what the numbers in a damaged text are.
+"""Damage files, and read damaged texts line by line to know which numbers they contain.
 
-With ``D2RPICK_THOROUGH=20`` the tests of damage run twenty times as many cases, the exhaustive ones all of theirs.
+With ``D2RPICK_THOROUGH=20`` the damage tests run 20 times as many cases, and the exhaustive tests run all of them.
 """
 
 import os
@@ -14,8 +14,8 @@ Item = TypeVar("Item")
 _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))
 
 
-def cases(count: int) -> settings:
-    """So many examples of hypothesis, slow or large as they are."""
+def make_settings(count: int) -> settings:
+    """Return hypothesis settings for this number of examples, which may be slow and large."""
     return settings(
         max_examples=count * _MORE,
         deadline=None,
@@ -23,27 +23,27 @@ def cases(count: int) -> settings:
     )
 
 
-def inputs(count: int) -> int:
-    """So many inputs in a thorough run of twenty, in proportion in others; the usual run has few of them."""
+def count_inputs(count: int) -> int:
+    """Return the number of inputs: ``count`` in a thorough run of 20, proportionally fewer in other runs."""
     return count * _MORE // 20 if _MORE > 1 else count // 3000
 
 
-def some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
-    """Each item in a thorough run, else one of ``step``: no multiple of what repeats in a file."""
+def choose_some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
+    """Return all items in a thorough run, otherwise every ``step``-th; ``step`` must not divide the file's period."""
     return items if _MORE > 1 else items[::step]
 
 
-def cuts(text: bytes) -> list[int]:
-    """Where to cut a text: next to all ends of its lines and at some places between, everywhere in a thorough run."""
+def list_cuts(text: bytes) -> list[int]:
+    """Return offsets to cut a text at: near all line ends and some between; every offset in a thorough run."""
     ends = {
-        found.end() + shift
-        for found in re.finditer(rb"\n|$", text)
+        line_end.end() + shift
+        for line_end in re.finditer(rb"\n|$", text)
         for shift in (-2, -1, 0, 1)
     }
-    return sorted({*some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
+    return sorted({*choose_some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
 
 
-# A fault: what is done, where it begins (as a share of the file), how much of it, and with which byte.
+# A fault: its kind, its start and its size (as shares of the file), and the byte it writes.
 Fault = tuple[str, float, float, int]
 FAULTS = st.lists(
     st.tuples(
@@ -57,29 +57,32 @@ FAULTS = st.lists(
 )
 State = tuple[
     float | None, list[float | None]
-]  # time and energies; None for what is no number
+]  # time and energies; None for text that is not a number
 
 
 def damage(text: bytes, faults: list[Fault], borders: list[int]) -> bytes:
-    """Apply ``faults``; spans of odd ``byte`` begin and end at ``borders``, those of even ones anywhere."""
+    """Apply ``faults``. A fault with an odd ``byte`` begins and ends at ``borders``, one with an even byte anywhere."""
     for kind, where, much, byte in faults:
-        at = int(where * len(text))
-        end = min(len(text), at + 1 + int(much**4 * len(text)))
+        offset = int(where * len(text))
+        end = min(len(text), offset + 1 + int(much**4 * len(text)))
         if byte % 2 and borders:
             first = int(where * (len(borders) - 1))
-            at, end = (
+            offset, end = (
                 borders[first],
                 borders[min(len(borders) - 1, first + 1 + int(3 * much))],
             )
-        span = text[at:end]
+        span = text[offset:end]
         text = {
-            "flip": text[:at] + bytes([byte]) + text[at + 1 :],
-            "cut": text[:at],
-            "drop": text[:at] + text[end:],
+            "flip": text[:offset] + bytes([byte]) + text[offset + 1 :],
+            "cut": text[:offset],
+            "drop": text[:offset] + text[end:],
             "double": text[:end] + span + text[end:],
-            "swap": text[:at] + text[end : 2 * end - at] + span + text[2 * end - at :],
-            "insert": text[:at] + bytes([byte]) + text[at:],
-            "blank": text[:at] + bytes(len(span)) + text[end:],
+            "swap": text[:offset]
+            + text[end : 2 * end - offset]
+            + span
+            + text[2 * end - offset :],
+            "insert": text[:offset] + bytes([byte]) + text[offset:],
+            "blank": text[:offset] + bytes(len(span)) + text[end:],
         }[kind]
     return text
 
@@ -92,8 +95,10 @@ def number(field: bytes) -> float | None:
     return value if abs(value) < float("inf") else None
 
 
-def states_of(text: bytes, start: bytes, width: int) -> list[tuple[bytes, list[bytes]]]:
-    """Field of the time and lines of each state, from whole lines."""
+def split_states(
+    text: bytes, start: bytes, width: int
+) -> list[tuple[bytes, list[bytes]]]:
+    """Return the time field and the lines of each state, from complete lines only."""
     lines = text[: text.rfind(b"\n") + 1].split(b"\n")[:-1]
     if len(lines) > 1 and b"ls-dyna" in lines[1]:
         lines = lines[2:]
@@ -109,14 +114,14 @@ def states_of(text: bytes, start: bytes, width: int) -> list[tuple[bytes, list[b
     ]
 
 
-def value(field: bytes, width: int) -> float | None:
-    """The number at the beginning of ``field``, if its columns are right."""
+def parse_value(field: bytes, width: int) -> float | None:
+    """Return the number at the beginning of ``field``, or None if its columns are wrong."""
     if len(field) < width or field[width : width + 1].strip():
         return None
     return number(field[:width])
 
 
-def glstat_states(text: bytes) -> list[State]:
+def read_glstat_states(text: bytes) -> list[State]:
     def is_energy(line: bytes) -> bool:
         return (
             line[31:32] == b"."
@@ -124,31 +129,34 @@ def glstat_states(text: bytes) -> list[State]:
         )
 
     return [
-        (value(time, 14), [value(line[32:], 14) for line in lines if is_energy(line)])
-        for time, lines in states_of(text, b" time".ljust(32, b"."), 14)
+        (
+            parse_value(time, 14),
+            [parse_value(line[32:], 14) for line in lines if is_energy(line)],
+        )
+        for time, lines in split_states(text, b" time".ljust(32, b"."), 14)
     ]
 
 
-def matsum_states(text: bytes, id_: int) -> list[State]:
+def read_matsum_states(text: bytes, id_: int) -> list[State]:
     label = b" mat.#=%5d             inten=" % id_
     return [
         (
-            value(time, 13),
-            [value(line[31:], 13) for line in lines if line.startswith(label)],
+            parse_value(time, 13),
+            [parse_value(line[31:], 13) for line in lines if line.startswith(label)],
         )
-        for time, lines in states_of(text, b" time =", 13)
+        for time, lines in split_states(text, b" time =", 13)
     ]
 
 
 def is_within(
-    found: list[tuple[float, float]], states: list[State], most: int = 1
+    read_states: list[tuple[float, float]], states: list[State], most_lost: int = 1
 ) -> bool:
-    """Whether ``found`` stand in ``states``, in their order, each in a state with ``most`` such lines."""
-    rest = iter(states)
+    """Return True if the states read are in ``states`` in the same order; each may lack ``most_lost`` lines at most."""
+    remaining_states = iter(states)
     return all(
         any(
-            time == here and energy in energies and len(energies) <= most
-            for here, energies in rest
+            time == state_time and energy in energies and len(energies) <= most_lost
+            for state_time, energies in remaining_states
         )
-        for time, energy in found
+        for time, energy in read_states
     )

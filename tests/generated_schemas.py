@@ -1,7 +1,7 @@
-"""The schemas that ship with the package, made from the fields of its results.
+"""JSON schemas of the results, generated from their fields.
 
-Each schema stands alone, so that a validator needs no other file.  ``python -m tests.generated_schemas`` writes them;
-read the difference before you commit it: keys are only added.
+Each schema is self-contained, so that a validator needs no other file.  ``python -m tests.generated_schemas`` writes
+them.  Check the difference before you commit it: keys may only be added.
 """
 
 import json
@@ -18,27 +18,30 @@ SCHEMAS = ROOT / "d2rpick" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def documents() -> dict[str, Document]:
-    """Give the documents of all results by the names of their schemas, as ``suggest-1``."""
-    found = (
+def list_documents() -> dict[str, Document]:
+    """Return the documents of all results by the names of their schemas, for example ``suggest-1``."""
+    document_types = (
         reproduction.DOCUMENT,
         *(import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS),
     )
-    return {one.name.removeprefix("d2rpick/").replace("/", "-"): one for one in found}
+    return {
+        document_type.name.removeprefix("d2rpick/").replace("/", "-"): document_type
+        for document_type in document_types
+    }
 
 
-def shipped(name: str) -> dict[str, Any]:
-    """Read a schema as it ships."""
-    found: dict[str, Any] = json.loads((SCHEMAS / f"{name}.json").read_text("utf-8"))
-    return found
+def read_shipped(name: str) -> dict[str, Any]:
+    """Read a schema of the package."""
+    schema: dict[str, Any] = json.loads((SCHEMAS / f"{name}.json").read_text("utf-8"))
+    return schema
 
 
-def schema_of(document: Document) -> dict[str, Any]:
-    """Write the schema of a document, with the definitions that it needs."""
+def make_schema(document: Document) -> dict[str, Any]:
+    """Generate the schema of a document, including the definitions it refers to."""
     defined: dict[str, Any] = {}
-    whole = _plain(document.whole.schema, defined, document.closed)
+    whole = _make_plain(document.whole.schema, defined, document.closed)
     for kind in document.also:
-        _plain(kind, defined, document.closed)
+        _make_plain(kind, defined, document.closed)
     about = {
         "$schema": DRAFT,
         "title": f"d2rpick {document.name.split('/')[1]}",
@@ -47,39 +50,41 @@ def schema_of(document: Document) -> dict[str, Any]:
     return {**about, **whole, **({"$defs": defined} if defined else {})}
 
 
-def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
-    """Put schemas in the place of kinds and fields; what has a name is defined once and referred to."""
+def _make_plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
+    """Convert kinds and fields to JSON schema; put each named kind into ``defined`` and refer to it."""
     if isinstance(schema, Field):
-        found = _plain(kind_of(schema.kind), defined, closed)
+        plain = _make_plain(kind_of(schema.kind), defined, closed)
         described = (
-            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else found
+            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else plain
         )
         described.update({"description": schema.meaning} if schema.meaning else {})
-        return found
+        return plain
     if isinstance(schema, Kind):
         if not schema.name:
-            return _plain(schema.schema, defined, closed)
+            return _make_plain(schema.schema, defined, closed)
         defined[schema.name] = {
-            **_plain(schema.schema, defined, closed),
+            **_make_plain(schema.schema, defined, closed),
             **defined.get(schema.name, {}),
         }
         return {"$ref": f"#/$defs/{schema.name}"}
     if isinstance(schema, Mapping):
-        found = {key: _plain(value, defined, closed) for key, value in schema.items()}
+        plain = {
+            key: _make_plain(value, defined, closed) for key, value in schema.items()
+        }
         return (
-            {**found, "additionalProperties": False}
-            if closed and "properties" in found
-            else found
+            {**plain, "additionalProperties": False}
+            if closed and "properties" in plain
+            else plain
         )
     return (
-        [_plain(one, defined, closed) for one in schema]
+        [_make_plain(element, defined, closed) for element in schema]
         if isinstance(schema, (list, tuple))
         else schema
     )
 
 
 if __name__ == "__main__":
-    for name, document in documents().items():
+    for name, document in list_documents().items():
         (SCHEMAS / f"{name}.json").write_text(
-            f"{json.dumps(schema_of(document), indent=1)}\n", "utf-8"
+            f"{json.dumps(make_schema(document), indent=1)}\n", "utf-8"
         )

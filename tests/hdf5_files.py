@@ -1,4 +1,4 @@
-"""Small HDF5 files of the layouts that users write."""
+"""Small HDF5 files in the layouts that users write."""
 
 import io
 from collections.abc import Callable
@@ -12,7 +12,7 @@ KINETIC = np.array([4.0, 3.0, 2.0, 1.0])
 PARTS = np.array([[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]])
 
 
-def written(write: Callable[[h5py.File], None]) -> io.BytesIO:
+def write_hdf5(write: Callable[[h5py.File], None]) -> io.BytesIO:
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         write(file)
@@ -59,7 +59,7 @@ def matlab(file: h5py.File) -> None:
 
 
 def pandas_values_block(file: h5py.File) -> None:
-    """A table without data columns: names are in a pickled attribute only."""
+    """Write a pandas table without data columns: the column names are in a pickled attribute only."""
     rows = np.zeros(4, [("index", "f8"), ("values_block_0", "f8", (2,))])
     rows["index"], rows["values_block_0"] = TIME, np.column_stack([KINETIC, ENERGY])
     file["run/table"] = rows
@@ -73,7 +73,7 @@ def pandas_values_block(file: h5py.File) -> None:
 
 
 def pandas_frame(file: h5py.File) -> None:
-    """The "fixed" store: an index, and a block of columns of each type."""
+    """Write a pandas table in the "fixed" format: an index, and a block of columns for each type."""
     file.create_group("run")
     file["run"].attrs["pandas_type"], file["run"].attrs["nblocks"] = (
         np.bytes_(b"frame"),

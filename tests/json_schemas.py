@@ -1,4 +1,4 @@
-"""Answers held against the JSON schemas that ship, findings against those of others; each schema is read once."""
+"""Validate answers by the JSON schemas of the package, and findings by public schemas; each schema is read once."""
 
 import json
 from functools import cache
@@ -8,31 +8,31 @@ from typing import Any
 
 import jsonschema
 
-from tests.command import answer
+from tests.command import run_json
 
 
-def check_by_schema(found: dict[str, Any]) -> None:
-    """Hold an answer against the schema that ships with the package under its name."""
-    _, command, version = found["schema"].split("/")
-    _holder(f"{command}-{version}").validate(found)
+def check_by_schema(document: dict[str, Any]) -> None:
+    """Validate an answer by the schema of the package that it names."""
+    _, command, version = document["schema"].split("/")
+    _make_validator(f"{command}-{version}").validate(document)
 
 
-def checked(*args: str) -> dict[str, Any]:
-    """Run a command as `answer` does, and hold what it says against its schema."""
-    check_by_schema(found := answer(*args))
-    return found
+def run_json_checked(*args: str) -> dict[str, Any]:
+    """Run a command as `answer` does, and validate the document."""
+    check_by_schema(document := run_json(*args))
+    return document
 
 
-def check_by_definition(found: Any, schema: str, definition: str) -> None:
-    """Hold a part of an answer against a definition of the schema ``schema``."""
-    _holder(schema, definition).validate(found)
+def check_by_definition(document: Any, schema: str, definition: str) -> None:
+    """Validate a part of an answer by a definition of the schema ``schema``."""
+    _make_validator(schema, definition).validate(document)
 
 
-def junit_is_valid(text: str) -> None:
+def check_junit(text: str) -> None:
     _junit().validate(text)
 
 
-def sarif_is_valid(text: str) -> None:
+def check_sarif(text: str) -> None:
     _sarif().validate(json.loads(text))
 
 
@@ -54,16 +54,16 @@ def _sarif() -> jsonschema.Draft4Validator:
 
 
 @cache
-def _holder(
+def _make_validator(
     name: str, definition: str | None = None
 ) -> jsonschema.Draft202012Validator:
     schema = json.loads(
         (files("d2rpick") / "schemas" / f"{name}.json").read_text("utf-8")
     )
     jsonschema.Draft202012Validator.check_schema(schema)
-    asked = (
+    reference = (
         {"$ref": f"#/$defs/{definition}", "$defs": schema["$defs"]}
         if definition
         else schema
     )
-    return jsonschema.Draft202012Validator(asked)
+    return jsonschema.Draft202012Validator(reference)

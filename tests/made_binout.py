@@ -1,4 +1,4 @@
-"""Writes binouts for tests and benchmarks: LSDA with any byte order and field sizes, with symbol tables."""
+"""Write binouts for tests and benchmarks: LSDA with any byte order and field sizes, with or without symbol tables."""
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 _FIELDS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES = {"i1": 1, "i2": 2, "i4": 3, "i8": 4, "f4": 9, "f8": 10}
 
-# The variables of a state as R12 writes them.
+# Variables of a glstat state as LS-DYNA R12 writes them.
 GLSTAT = (
     "time", "time_step", "kinetic_energy", "internal_energy", "stonewall_energy", "spring_and_damper_energy",
     "hourglass_energy", "system_damping_energy", "sliding_interface_energy", "external_work",
@@ -25,7 +25,7 @@ MATSUM = (
 
 @dataclass(frozen=True)
 class Style:
-    """Byte order, bytes of length, offset, command and type fields, and the type of real numbers."""
+    """Byte order, sizes of the length, offset, command and type fields [bytes], and the type of real numbers."""
 
     order: str = "<"
     length: int = 8
@@ -37,7 +37,7 @@ class Style:
 
 @dataclass
 class LsdaWriter:
-    """Appends records to ``data``; ``marks`` are the bytes where they begin."""
+    """Writer that appends records to ``data``; ``marks`` are the offsets at which records begin."""
 
     style: Style = Style()
     data: bytearray = field(default_factory=bytearray)
@@ -84,7 +84,7 @@ class LsdaWriter:
         self.record(3, code + bytes([len(name)]) + name.encode() + raw)
 
     def table(self) -> None:
-        """Write a symbol table and link it to the last one."""
+        """Write a symbol table and link the previous one to it."""
         body = b""
         for path, entries in self._dirty.items():
             body += (
@@ -99,15 +99,15 @@ class LsdaWriter:
         self._dirty = {}
 
 
-def values(name: str, state: int, part: int = 0) -> float:
-    """A number that belongs to one variable, state and part only, exact in single precision to state 4000."""
+def compute_value(name: str, state: int, part: int = 0) -> float:
+    """Return a number that is unique to a variable, state and part, and exact in single precision up to state 4000."""
     names = [*GLSTAT, *MATSUM]
     return (
         names.index(name) * 8192.0 + state + part / 64 if name != "time" else state / 8
     )
 
 
-def binout(
+def make_binout(
     states: Sequence[int],
     parts: Sequence[int] = (7, 3),
     *,
@@ -120,46 +120,48 @@ def binout(
     glstat: bool = True,
     shift: int = 0,
 ) -> LsdaWriter:
-    """Write states of glstat and matsum; ``parts_of`` gives each state a list of ids of its own.
+    """Write states of glstat and matsum; ``parts_of`` gives the part ids of each state.
 
-    State n has the numbers of state n + ``shift``, as the first states of a restart have.
+    State n has the numbers of state n + ``shift``, like the first states after a restart.
     """
-    made = LsdaWriter(style)
+    writer = LsdaWriter(style)
     titles = titles or {id_: f"part {id_}" for id_ in parts}
     for branch in ("glstat", "matsum") if glstat else ("matsum",):
-        made.cd(f"/{branch}/metadata")
-        made.put("title", b"made for tests".ljust(80), "i1")
-        made.put("version", b"smp s R12   ", "i1")
-        made.put("revision", bytes(10), "i1")
+        writer.cd(f"/{branch}/metadata")
+        writer.put("title", b"made for tests".ljust(80), "i1")
+        writer.put("version", b"smp s R12   ", "i1")
+        writer.put("revision", bytes(10), "i1")
     if not parts_of:
-        made.put("ids", parts, "i4")
-    made.put(
+        writer.put("ids", parts, "i4")
+    writer.put(
         "legend", b"".join(title.encode().ljust(70) for title in titles.values()), "i1"
     )
-    made.put("legend_ids", list(titles), "i4")
+    writer.put("legend_ids", list(titles), "i4")
     for state in states:
         if glstat:
-            made.cd(
+            writer.cd(
                 f"/glstat/d{state:06d}",
                 f"../../glstat/d{state:06d}" if relative else None,
             )
-            made.put("cycle", [state], "i4")
+            writer.put("cycle", [state], "i4")
             for name in GLSTAT:
-                made.put(name, [values(name, state + shift)], style.real)
+                writer.put(name, [compute_value(name, state + shift)], style.real)
         if state % matsum_every == 0:
             number = state // matsum_every  # each branch counts its own states
-            made.cd(
+            writer.cd(
                 f"/matsum/d{number:06d}",
                 f"../../matsum/d{number:06d}" if relative else None,
             )
-            made.put("time", [values("time", state + shift)], style.real)
-            here = parts_of(state) if parts_of else parts
+            writer.put("time", [compute_value("time", state + shift)], style.real)
+            state_parts = parts_of(state) if parts_of else parts
             if parts_of:
-                made.put("ids", here, "i4")
+                writer.put("ids", state_parts, "i4")
             for name in MATSUM:
-                made.put(
-                    name, [values(name, state + shift, id_) for id_ in here], style.real
+                writer.put(
+                    name,
+                    [compute_value(name, state + shift, id_) for id_ in state_parts],
+                    style.real,
                 )
         if tables:
-            made.table()
-    return made
+            writer.table()
+    return writer

@@ -1,4 +1,4 @@
-"""Writes families of d3plot files for tests and benchmarks: either precision and byte order, any states a file."""
+"""Write families of d3plot files for tests and benchmarks, in both precisions and byte orders."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 END = -999999.0
-BLOCK = 512  # words that files are filled up to
+BLOCK = 512  # files are filled up to a multiple of this number of words
 
-# Control words that are not 0 in every file here, by their places.
+# Indices of the control words that are not 0 in every file.
 _PLACES = {
     "filetype": 11, "ndim": 15, "numnp": 16, "icode": 17, "nglbv": 18, "it": 19, "iu": 20, "iv": 21, "ia": 22,
     "nel8": 23, "nummat8": 24, "nv3d": 27, "nel2": 28, "nummat2": 29, "nv1d": 30, "nel4": 31, "nummat4": 32,
@@ -21,7 +21,7 @@ _PLACES = {
 
 @dataclass(frozen=True)
 class State:
-    """Time and values of the model and its parts; ``velocities`` are of shape (parts, 3)."""
+    """Time and values of the model and its parts; ``velocities`` has shape (parts, 3)."""
 
     time: float
     kinetic: Sequence[float]
@@ -33,7 +33,7 @@ class State:
     walls: Sequence[float] = ()
 
     def values(self) -> list[float]:
-        """Give what the state begins with."""
+        """Return the global values, which begin a state."""
         whole = [
             sum(self.kinetic),
             sum(self.internal),
@@ -51,33 +51,33 @@ class State:
         return [self.time, *whole, *parts, *self.walls]
 
 
-def states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
-    """Make states whose values are all different."""
-    made = []
+def make_states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
+    """Make states whose values all differ."""
+    states_made = []
     for number, time in enumerate(times, start=1):
-        each = np.arange(1, parts + 1)
-        velocities = np.outer(each, [1.0, -2.0, 0.5]) * number
+        part_values = np.arange(1, parts + 1)
+        velocities = np.outer(part_values, [1.0, -2.0, 0.5]) * number
         forces = [7.0 * number + wall for wall in range(4 * walls)]
-        made.append(
+        states_made.append(
             State(
                 time=time,
-                kinetic=(each * 10 + number).tolist(),
-                internal=(each * 100 + number).tolist(),
+                kinetic=(part_values * 10 + number).tolist(),
+                internal=(part_values * 100 + number).tolist(),
                 velocities=velocities,
-                masses=(each * 2.5).tolist(),
-                hourglass=(each * 0.25 * number).tolist(),
+                masses=(part_values * 2.5).tolist(),
+                hourglass=(part_values * 0.25 * number).tolist(),
                 model=(0.1 * number, 0.2 * number, -0.3 * number),
                 walls=forces,
             )
         )
-    return made
+    return states_made
 
 
 @dataclass
 class D3plotWriter:
-    """Writes a family: ``control`` words, ids and titles of parts, and states.
+    """Writer of a family: ``control`` words, ids and titles of parts, and states.
 
-    ``sections`` are put in by the names of the sections that they follow: "control", "elements", "ids".
+    ``sections`` are inserted after the sections they are named for: "control", "elements" or "ids".
     """
 
     width: int = 4
@@ -92,19 +92,19 @@ class D3plotWriter:
     numbered: bool = True
     family: int = 1
     name: str = "R920"
-    release: float = 960.0  # as all named ones say
+    release: float = 960.0  # the release that every file with part names has
     values_of_part: int = 7
 
     def real(self, values: Sequence[float]) -> bytes:
-        """Write reals."""
+        """Return the bytes of real numbers."""
         return np.asarray(values, f"{self.order}f{self.width}").tobytes()
 
     def whole(self, values: Sequence[int]) -> bytes:
-        """Write integers."""
+        """Return the bytes of integers."""
         return np.asarray(values, f"{self.order}i{self.width}").tobytes()
 
     def words(self) -> dict[str, int]:
-        """Give the control words by their names."""
+        """Return the control words by name."""
         parts = len(self.ids)
         sizes = {
             "numnp": 5,
@@ -128,7 +128,7 @@ class D3plotWriter:
         }
         of_wall = 4 if self.name.strip().startswith("R") or self.release >= 971 else 1
         values = 6 + self.values_of_part * parts + of_wall * self.walls
-        found = {
+        words_by_name = {
             **sizes,
             **switches,
             "nglbv": values,
@@ -137,10 +137,13 @@ class D3plotWriter:
             "extra": 64,
             **self.control,
         }
-        return {"narbs": self._numbers(found).size if self.numbered else 0, **found}
+        return {
+            "narbs": self._numbers(words_by_name).size if self.numbered else 0,
+            **words_by_name,
+        }
 
     def head(self) -> bytes:
-        """Write the control words, the geometry and the titles."""
+        """Return the control words, the geometry and the titles."""
         words, plain = self.words(), np.zeros(128, f"{self.order}i{self.width}")
         for name, value in words.items():
             plain[_PLACES[name]] = value
@@ -163,7 +166,7 @@ class D3plotWriter:
         return bytes(data) + self._titles()
 
     def _numbers(self, words: dict[str, int]) -> Any:
-        """Ids of nodes, elements and parts."""
+        """Return the section of node, element and part ids."""
         counts = [
             words["numnp"],
             abs(words["nel8"]),
@@ -172,9 +175,17 @@ class D3plotWriter:
             words["nelt"],
         ]
         head = [-1, 1, 1, 1, 1, *counts, 0, 0, 0, len(self.ids), 0, len(self.ids)]
-        each = [number for count in counts for number in range(1, count + 1)]
+        numbers_in_order = [
+            number for count in counts for number in range(1, count + 1)
+        ]
         return np.array(
-            [*head, *each, *self.ids, *self.ids, *range(1, len(self.ids) + 1)]
+            [
+                *head,
+                *numbers_in_order,
+                *self.ids,
+                *self.ids,
+                *range(1, len(self.ids) + 1),
+            ]
         )
 
     def _titles(self) -> bytes:
@@ -187,7 +198,7 @@ class D3plotWriter:
         return end + parts + self.whole([90000]) + self.title.encode().ljust(72) + end
 
     def state(self, state: State) -> bytes:
-        """Write one state: its values, then nodes and elements, none of them 0."""
+        """Return one state: its values, then nodes and elements, none of which is 0."""
         words = self.words()
         elements = (
             abs(words["nel8"]) * words["nv3d"]
@@ -203,33 +214,33 @@ class D3plotWriter:
             if words["maxint"] < 0
             else 0
         )
-        rest = 9 * words["numnp"] + elements + deleted + self.more_of_state
-        return self.real([*state.values(), *[0.125] * rest])
+        remaining_words = 9 * words["numnp"] + elements + deleted + self.more_of_state
+        return self.real([*state.values(), *[0.125] * remaining_words])
 
     def file(self, states: Sequence[State], *, ended: bool = True) -> bytes:
-        """Write a file of states alone, filled up behind the mark of its end."""
+        """Return a file of states only, filled up after the end mark."""
         return self.filled(
             b"".join(map(self.state, states)) + (self.real([END]) if ended else b"")
         )
 
     def filled(self, data: bytes) -> bytes:
-        """Fill a file up to whole blocks."""
+        """Fill up to complete blocks."""
         return data + bytes(-len(data) % (BLOCK * self.width))
 
     def together(self, states: Sequence[State]) -> bytes:
-        """Write one file of all."""
+        """Return one file with everything."""
         return self.head() + self.file(states)
 
     def written(
         self, states: Sequence[State], per_file: int = 1, name: str = "d3plot"
     ) -> dict[str, bytes]:
-        """Write a family of so many states a file, by the names of its files."""
+        """Return a family with ``per_file`` states in each file, by file name."""
         groups = [
             states[begin : begin + per_file]
             for begin in range(0, len(states), per_file)
         ]
-        behind = {
+        files = {
             f"{name}{number:02d}": self.file(group)
             for number, group in enumerate(groups, start=1)
         }
-        return {name: self.filled(self.head()), **behind}
+        return {name: self.filled(self.head()), **files}

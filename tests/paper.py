@@ -1,6 +1,6 @@
-"""The oscillator of the published example and numbers of it, computed independently of the closed forms.
+"""The oscillator of the published example, with reference numbers computed independently of the closed forms.
 
-All digits come from the matrix exponential of the first-order system with 40 digits.
+All digits come from the matrix exponential of the first-order system, computed with 40 digits.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ ENERGY_TD = 0.606348787620396
 KINETIC_TD = 6.67273843468
 KINETIC_SHARE = 0.916699887073
 
-# times with E(t) = E(64 ms) [ms], and whether the deformation has the sign that it has at 64 ms
+# Times with E(t) = E(64 ms) [ms], and True if the deformation has the same sign as at 64 ms.
 CROSSINGS = (
     (0.227328972837089, False),
     (12.2658849405802, False),
@@ -202,14 +202,18 @@ REFERENCE = (
 )
 
 
-def energy(time: Samples) -> Samples:
-    """Internal energy of the paper's oscillator without switching."""
+def compute_energy(time: Samples) -> Samples:
+    """Return the internal energy of the paper's oscillator in the reference run."""
     return OSCILLATOR.internal_energy(OSCILLATOR.free(START, time))
 
 
-def history(step: float = 1e-4, end: float = 0.15) -> History:
-    """The record that the paper's example starts from."""
+def make_history(step: float = 1e-4, end: float = 0.15) -> History:
+    """Return the energy history of the paper's example."""
     time = step * np.arange(round(end / step) + 1, dtype=np.float64)
     return History(
-        time, energy(time), source=("paper",), format="csv", channel="internal_energy"
+        time,
+        compute_energy(time),
+        source=("paper",),
+        format="csv",
+        channel="internal_energy",
     )

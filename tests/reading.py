@@ -1,4 +1,4 @@
-"""Contents of files as a run, past the names and folders that a user would give."""
+"""Open file contents as a run, without the names and folders that a user would give."""
 
 import os
 from collections.abc import Sequence
@@ -14,22 +14,22 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
 from tests.command import ROOT
-from tests.computed import stored
+from tests.computed import locate_stored
 
 
 class InPieces(OnDisk):
-    """Read in pieces that are small even beside the files of tests."""
+    """File on disk that is read in pieces, which are small even compared with the test files."""
 
     block, gap, window = 256, 32, 64
 
 
-def run_of(
+def open_contents(
     reader: Reader,
     *contents: bytes | str,
     selection: Selection | None = None,
     name: str = "run",
 ) -> Run:
-    """Open contents as the legs of one run in one format; texts are latin-1."""
+    """Open contents as the restart segments of one run in one format; texts are latin-1."""
     data = [
         content.encode("latin-1") if isinstance(content, str) else content
         for content in contents
@@ -46,64 +46,66 @@ def run_of(
     return Run(tuple(names), (Legs(legs),))
 
 
-def history_of(
+def read_contents(
     reader: Reader,
     *contents: bytes | str,
     selection: Selection | None = None,
     name: str = "run",
 ) -> History:
-    """Read the history that is selected, by default the internal energy."""
+    """Read the selected history, by default the internal energy."""
     selection = selection or Selection()
-    return run_of(reader, *contents, selection=selection, name=name).history(selection)
+    return open_contents(reader, *contents, selection=selection, name=name).history(
+        selection
+    )
 
 
 def read(
     names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
 ) -> Reference:
-    """Read as `d2rpick.choice.question.read` does; what is found in files of the clone, which stay, is found once."""
+    """Read as `d2rpick.choice.question.read` does; results for files of the repository are cached."""
     selection = selection or Selection()
-    asked = (
+    key = (
         tuple(names),
         selection._replace(parts=(), flying=(), springs=None),
         input_format,
     )
     of_clone = all(Path(name).absolute().is_relative_to(ROOT) for name in names)
-    return Reference.of((_opened if of_clone else open_run)(*asked), selection)
+    return Reference.of((_opened if of_clone else open_run)(*key), selection)
 
 
 _opened = cache(open_run)
 
 
-def solved(name: str, *parts: str) -> Reference:
-    """Read a run of a solver in tests/data, and of its energy that of these parts."""
-    return read([stored(name)], Selection(parts=parts))
+def read_solved(name: str, *parts: str) -> Reference:
+    """Read a run computed by a solver from tests/data, and the energy of these parts."""
+    return read([locate_stored(name)], Selection(parts=parts))
 
 
 def read_history(
     names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
 ) -> History:
-    """Read the history that is selected of a run, by default the internal energy."""
+    """Read the selected history of a run, by default the internal energy."""
     return read(names, selection, input_format).history
 
 
-def on_disk(file: Path, of: type[OnDisk] = InPieces) -> OnDisk:
-    """Content of a file that stays on its disk, however small it is itself."""
+def open_on_disk(file: Path, disk_type: type[OnDisk] = InPieces) -> OnDisk:
+    """Open a file so that it stays on disk, however small it is."""
     with file.open("rb", buffering=0) as opened:
         state = read_at_rest(str(file), opened, FormatError, may_grow=True)
         assert not isinstance(state, bytes)
-        return of(str(file), os.dup(opened.fileno()), state)
+        return disk_type(str(file), os.dup(opened.fileno()), state)
 
 
-def run_of_file(file: Path) -> Run:
-    """Open a file, which is held in memory where it is small."""
+def open_file(file: Path) -> Run:
+    """Open a file; a small file is held in memory."""
     return open_run([str(file)])
 
 
-def run_on_disk(file: Path) -> Run:
-    """Open a file and leave it on its disk."""
-    return open_sources([Source(str(file), on_disk(file))])
+def open_run_on_disk(file: Path) -> Run:
+    """Open a file and leave it on disk."""
+    return open_sources([Source(str(file), open_on_disk(file))])
 
 
-def states_of(history: History) -> list[tuple[float, float]]:
-    """Time and energy of each state."""
+def list_states(history: History) -> list[tuple[float, float]]:
+    """Return time and energy of each state."""
     return list(zip(history.time.tolist(), history.energy.tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Twenty-one rollovers, fixed in advance, and what the tool says of each against what happens at every tr."""
+"""Twenty-one rollovers, fixed in advance: the recommendations compared with switched runs at every tr."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,19 +16,19 @@ from d2rpick.models.box_run import (
     simulate,
 )
 from d2rpick.report import history_files
-from tests.command import answer, put
-from tests.energies import sure
+from tests.command import put, run_json
+from tests.energies import require
 
 T_END = 0.55
-# td is this long before the ground comes [s], to the millisecond; as in the published study.
+# td is this much before the landing [s], rounded to 1 ms; as in the published study.
 BEFORE_LANDING = 0.010
-# The mean energy is taken over this time after td [s], with the ground taken away: two periods of the lowest mode.
+# Time after td over which the mean energy is taken, without the ground [s]: two periods of the lowest mode.
 MEAN_OVER = 0.1
 NO_GROUND = 50.0
 
 
 def _halton(index: int, base: int) -> float:
-    """Give the ``index``-th number of a sequence that fills [0, 1) evenly."""
+    """Return number ``index`` of the Halton sequence, which fills [0, 1) evenly."""
     value, share = 0.0, 1.0
     while index:
         share /= base
@@ -55,10 +55,10 @@ SETS = (Parameters(), *(_set(index) for index in range(1, 21)))
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """One set: the reference run, what the tool recommends, how the switched runs compare.
+    """One set of parameters: the reference run, the recommendation, and the switched runs compared with the reference.
 
-    ``announced``: mean energy after td over that of the reference, as the tool expects it.  ``mean_ratio``: what it is
-    over two periods after td, ``mean_to_landing``: in the few milliseconds that are left.
+    ``announced`` is the predicted mean energy after td over that of the reference.  ``mean_ratio`` is the computed
+    value over two periods after td, ``mean_to_landing`` the value over the few milliseconds until the landing.
     """
 
     parameters: Parameters
@@ -75,43 +75,45 @@ class Rehearsal:
 
     @property
     def roll_share(self) -> float:
-        """Roll error of the recommended tr over the largest of the scan."""
+        """Roll error of the recommended tr divided by the largest of the scan [-]."""
         return self.error / self.worst
 
     @property
     def energy_off(self) -> float:
-        """How far the mean energy after td is from what was announced."""
+        """Difference of the mean energy after td from the announced value [-]."""
         return self.mean_ratio / self.announced - 1
 
 
 def rehearse(
-    parameters: Parameters, folder: Path, *, every: int = 1, interval: float = 1e-4
+    parameters: Parameters, folder: Path, *, stride: int = 1, interval: float = 1e-4
 ) -> Rehearsal:
-    """Run one set; of the times of a scan take one in ``every``."""
+    """Compute one set of parameters; the scan uses every ``stride``-th tr."""
     reference = simulate(parameters, T_END, interval=interval)
-    shown = reference.time <= sure(reference.landed) + 0.04
-    td = round(sure(reference.landed) - BEFORE_LANDING, 3)
+    until_landing = reference.time <= require(reference.landed) + 0.04
+    td = round(require(reference.landed) - BEFORE_LANDING, 3)
     file = put(
         folder / "reference.matsum",
-        history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))),
+        history_files.BOX_WRITERS["matsum"](
+            _until(reference, int(until_landing.sum()))
+        ),
     )
-    found = answer("suggest", "--td", str(td), "--part", "box", str(file))
-    tr = found["recommended"]["tr"] if found["recommended"] else None
-    flight = found["flight"]
+    suggestion = run_json("suggest", "--td", str(td), "--part", "box", str(file))
+    tr = suggestion["recommended"]["tr"] if suggestion["recommended"] else None
+    flight = suggestion["flight"]
     times = sorted(
-        {*scan_times(sure(reference.released), td)[::every], *([tr] if tr else [])}
+        {*scan_times(require(reference.released), td)[::stride], *([tr] if tr else [])}
     )
     outcomes = tuple(scan(parameters, reference, times, td, jobs=1))
-    chosen = next((one for one in outcomes if one.tr == tr), None)
+    chosen = next((outcome for outcome in outcomes if outcome.tr == tr), None)
     return Rehearsal(
         parameters=parameters,
         reference=reference,
         td=td,
         flight=(flight["start"], flight["end"], flight["source"]),
         tr=tr,
-        worst=max(abs(one.roll_error) for one in outcomes),
+        worst=max(abs(outcome.roll_error) for outcome in outcomes),
         error=abs(chosen.roll_error) if chosen else np.nan,
-        announced=found["expected"]["ratio"] if chosen else np.nan,
+        announced=suggestion["expected"]["ratio"] if chosen else np.nan,
         mean_ratio=_mean_ratio(parameters, tr, td, interval) if tr else np.nan,
         mean_to_landing=chosen.mean_ratio if chosen else np.nan,
         outcomes=outcomes,
@@ -119,7 +121,7 @@ def rehearse(
 
 
 def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -> float:
-    """Mean energy of the box after td, switched over not switched, if no ground came."""
+    """Return the mean energy of the box after td, switched over reference, without contact with the ground."""
     flying = replace(parameters, ground=NO_GROUND)
     runs = (
         simulate(flying, td + MEAN_OVER, *windows, interval=interval)
@@ -130,7 +132,7 @@ def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -
 
 
 def _until(record: Record, states: int) -> Record:
-    """Give the first states of a record."""
+    """Return the first states of a record."""
     return Record._make(
         value[:states] if isinstance(value, np.ndarray) else value for value in record
     )

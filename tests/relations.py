@@ -1,9 +1,9 @@
-"""Relations between answers: how a choice follows when its history is changed in a known way.
+"""Relations between answers: how a choice must follow a known change of its history.
 
-A history is made from a seed and a number: a load, then a flight in which one or two modes vibrate, then a landing.  A
-`Relation` writes it twice, as it is and changed.  Both are read and asked for the same choice.  The second answer must
-be the first one, moved and scaled as the change says: exactly if the reader gets the same numbers, else within the
-stated ``+-`` of both.
+A seed and a number define a history: a load, then a flight in which one or two modes vibrate, then a landing.  A
+`Relation` writes it twice, unchanged and changed.  Both are read and asked for the same choice.  The second answer must
+be the first one, moved and scaled as the change requires: exactly if the reader gets the same numbers, otherwise within
+the stated ``+-`` of both.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from d2rpick.choice.question import Settings, read
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
 from tests.made_binout import LsdaWriter
-from tests.made_t01 import MadePart, headed
-from tests.text_files import glstat_text, matsum_text
+from tests.made_t01 import MadePart, write_head
+from tests.text_files import make_glstat_text, make_matsum_text
 
-_IDS: Final = (7, 3)  # of the parts: the first vibrates, the second is elsewhere
+_IDS: Final = (7, 3)  # part ids: the first part vibrates, the second is elsewhere
 _ROUNDED: Final = (
-    1e-9  # of the time or the residual: what another scale changes by rounding
+    1e-9  # relative change of a time or residual that rounding causes in other units
 )
 _TEXTS: Final = {
     ",": ".",
@@ -39,7 +39,7 @@ _TEXTS: Final = {
 
 
 class MadeRun(NamedTuple):
-    """A run: times (n,), internal and kinetic energy of the part that vibrates, the energy of another part, td."""
+    """Run: times (n,), internal and kinetic energy of the part that vibrates, energy of another part, and td."""
 
     time: Samples
     internal: Samples
@@ -51,7 +51,7 @@ class MadeRun(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Files of a run, and the choice that is asked of them."""
+    """Files of a run, and the choice asked of them."""
 
     names: list[str]
     td: float
@@ -61,12 +61,12 @@ class Asked(NamedTuple):
 
 
 class Relation(NamedTuple):
-    """``change`` writes a run twice into a folder.
+    """Relation whose ``change`` writes a run twice into a folder.
 
-    Times of the second answer are ``scale`` times those of the first, later by ``shift`` spans of the record.  If it is
-    ``exact``, everything must be the same to rounding.  If it ``may_lose`` what the first history shows, the second one
-    may be too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` things than
-    the first one, less or more, pairs that are alike may change places: another tr may be chosen, of the same residual.
+    Times of the second answer are ``scale`` times those of the first, and later by ``shift`` record lengths.  If it is
+    ``exact``, everything must be equal except for rounding.  If it ``may_lose`` information, the second history may be
+    too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` evidence than the
+    first, equally good pairs may change places: another tr of the same residual may be chosen.
     """
 
     change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
@@ -78,7 +78,7 @@ class Relation(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """What is compared of an answer; None for what nothing can be said of."""
+    """Values of an answer that are compared; None if unknown."""
 
     tr: float | None
     half_width: float
@@ -89,7 +89,7 @@ class Chosen(NamedTuple):
 
 
 def make_run(random: Random) -> MadeRun:
-    """Make a run whose vibration, load and sampling are random; the energy has two periods in one of the vibration."""
+    """Draw a run with random vibration, load and sampling; the energy has two periods per vibration period."""
     mode_count = random.choice((1, 1, 2))
     period = 10 ** random.uniform(-3, 0)
     flight = random.uniform(3, 8) * period
@@ -118,28 +118,28 @@ def make_run(random: Random) -> MadeRun:
     landing = load + flight
     pushed = energy * 3 * np.maximum(time - landing, 0.0) / flight
     internal = internal * np.sin(math.pi / 2 * loaded) ** 2 + pushed
-    other = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
+    second_energy = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
     return MadeRun(
         time,
         internal,
         kinetic,
-        other,
+        second_energy,
         load,
         landing,
         load + random.uniform(0.5, 0.95) * flight,
     )
 
 
-# How a run is written.
+# Writers of a run.
 
 
-def csv(
+def write_csv(
     folder: Path,
     columns: Mapping[str, Samples],
     name: str = "run.csv",
     separator: str = ",",
 ) -> list[str]:
-    """Write columns with all digits; the names of the files."""
+    """Write columns with all digits; return the file names."""
     rows = (
         separator.join(map(repr, row))
         for row in zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -153,11 +153,11 @@ def csv(
     return [str(file)]
 
 
-def columns_of(run: MadeRun) -> dict[str, Samples]:
+def list_columns(run: MadeRun) -> dict[str, Samples]:
     return {"time": run.time, "internal_energy": run.internal}
 
 
-def hdf5(folder: Path, columns: Mapping[str, Samples]) -> list[str]:
+def write_hdf5(folder: Path, columns: Mapping[str, Samples]) -> list[str]:
     with h5py.File(folder / "run.h5", "w") as file:
         for name, column in columns.items():
             file[name] = column
@@ -169,12 +169,12 @@ def put(folder: Path, name: str, content: bytes) -> list[str]:
     return [str(folder / name)]
 
 
-def asked(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
+def make_question(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
     return Asked(names, run.td, run.load_end, run.landing, parts)
 
 
-def rounded(run: MadeRun, digits: int) -> MadeRun:
-    """Give a run as a text with so many digits holds it."""
+def round_run(run: MadeRun, digits: int) -> MadeRun:
+    """Return a run as a text with this number of digits stores it."""
 
     def printed(column: Samples) -> Samples:
         return np.array([float(f"{value:.{digits - 1}E}") for value in column])
@@ -184,8 +184,8 @@ def rounded(run: MadeRun, digits: int) -> MadeRun:
     )
 
 
-def single(run: MadeRun) -> MadeRun:
-    """Give a run as a file in single precision holds it."""
+def store_in_single_precision(run: MadeRun) -> MadeRun:
+    """Return a run as a file in single precision stores it."""
 
     def stored(column: Samples) -> Samples:
         return column.astype(np.float32).astype(float)
@@ -195,40 +195,44 @@ def single(run: MadeRun) -> MadeRun:
     )
 
 
-def binout(folder: Path, run: MadeRun) -> list[str]:
-    """Write the energies of two parts as LS-DYNA does in a binout in single precision."""
-    made = LsdaWriter()
-    made.cd("/matsum/metadata")
-    made.put("ids", _IDS, "i4")
+def write_binout(folder: Path, run: MadeRun) -> list[str]:
+    """Write the energies of two parts as LS-DYNA does in a binout in single precision; return the file names."""
+    writer = LsdaWriter()
+    writer.cd("/matsum/metadata")
+    writer.put("ids", _IDS, "i4")
     for state, time in enumerate(run.time):
-        made.cd(f"/matsum/d{state + 1:06d}")
-        made.put("time", [time], "f4")
-        made.put("internal_energy", [run.internal[state], run.other[state]], "f4")
-    made.table()
-    return put(folder, "binout", bytes(made.data))
+        writer.cd(f"/matsum/d{state + 1:06d}")
+        writer.put("time", [time], "f4")
+        writer.put("internal_energy", [run.internal[state], run.other[state]], "f4")
+    writer.table()
+    return put(folder, "binout", bytes(writer.data))
 
 
-def time_history(folder: Path, run: MadeRun) -> list[str]:
-    """Write the energies of two parts as Radioss does."""
+def write_time_history(folder: Path, run: MadeRun) -> list[str]:
+    """Write the energies of two parts as Radioss does; return the file names."""
     parts = [MadePart(id_, f"part {id_}", (1,)) for id_ in _IDS]
-    made = headed(parts, globals_=2)
-    for time, internal, other in zip(run.time, run.internal, run.other, strict=True):
-        made.state(time, [internal + other, 0.0], [internal, other])
-    return put(folder, "runT01", bytes(made.data))
+    writer = write_head(parts, globals_=2)
+    for time, internal, second_energy in zip(
+        run.time, run.internal, run.other, strict=True
+    ):
+        writer.state(time, [internal + second_energy, 0.0], [internal, second_energy])
+    return put(folder, "runT01", bytes(writer.data))
 
 
-def matsum(
+def write_matsum(
     folder: Path, run: MadeRun, ids: Sequence[int] = _IDS, name: str = "matsum"
 ) -> list[str]:
     energies = dict(zip(_IDS, (run.internal, run.other), strict=True))
     return put(
         folder,
         name,
-        matsum_text(run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)),
+        make_matsum_text(
+            run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)
+        ),
     )
 
 
-# Changes that must not matter, or matter in a known way.
+# Changes that must not change the answer, or must change it in a known way.
 
 
 def same_numbers(
@@ -236,51 +240,54 @@ def same_numbers(
     as_stored: Callable[[MadeRun], MadeRun],
     parts: int | None = None,
 ) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
-    """Write a table of the numbers that another format stores, and that format."""
+    """Return a change that writes a table and another format with the same numbers."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-        table = csv(folder, columns_of(as_stored(run)))
-        return asked(run, table), asked(run, write(folder, run), parts=parts)
+        table = write_csv(folder, list_columns(as_stored(run)))
+        return make_question(run, table), make_question(
+            run, write(folder, run), parts=parts
+        )
 
     return change
 
 
 def in_single_precision(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, columns_of(single(run)), "single.csv")
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run,
+        write_csv(folder, list_columns(store_in_single_precision(run)), "single.csv"),
     )
 
 
 def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    turned = matsum(folder, run, _IDS[::-1], "matsum_turned")
-    return asked(run, matsum(folder, run), parts=_IDS[0]), asked(
+    turned = write_matsum(folder, run, _IDS[::-1], "matsum_turned")
+    return make_question(run, write_matsum(folder, run), parts=_IDS[0]), make_question(
         run, turned, parts=_IDS[0]
     )
 
 
 def further_columns(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    more = {
+    extra_columns = {
         "pressure": np.array([random.gauss(0, 1) for _ in run.time]),
-        **columns_of(run),
+        **list_columns(run),
         "status": run.other,
     }
-    in_front = {"time": run.time, **more}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, in_front, "more.csv")
+    in_front = {"time": run.time, **extra_columns}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, in_front, "more.csv")
     )
 
 
 def kinetic_energy_too(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    more = {**columns_of(run), "kinetic_energy": run.kinetic}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, more, "more.csv")
+    extra_columns = {**list_columns(run), "kinetic_energy": run.kinetic}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, extra_columns, "more.csv")
     )
 
 
 def scaled(
     time: float, energy: float, shift: float = 0.0
 ) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
-    """Write times and energies in other units, and times from another origin, so many spans of the record later."""
+    """Return a change of the units of time and energy, and of the time origin by ``shift`` record lengths."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
         later = shift * float(run.time[-1])
@@ -289,20 +296,21 @@ def scaled(
             "internal_energy": energy * run.internal,
         }
         again = Asked(
-            csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
+            write_csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
             time * run.landing + later,
         )  # fmt: skip
-        return asked(run, csv(folder, columns_of(run))), again
+        return make_question(run, write_csv(folder, list_columns(run))), again
 
     return change
 
 
 def doubled_last_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     doubled = {
-        name: np.append(column, column[-1]) for name, column in columns_of(run).items()
+        name: np.append(column, column[-1])
+        for name, column in list_columns(run).items()
     }
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, doubled, "doubled.csv")
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, doubled, "doubled.csv")
     )
 
 
@@ -310,9 +318,9 @@ def cut_after_the_landing(
     run: MadeRun, folder: Path, random: Random
 ) -> tuple[Asked, Asked]:
     end = np.searchsorted(run.time, run.landing) + random.randrange(1, 6)
-    cut = {name: column[:end] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, cut, "cut.csv")
+    cut = {name: column[:end] for name, column in list_columns(run).items()}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, cut, "cut.csv")
     )
 
 
@@ -326,17 +334,17 @@ def legs_in_another_order(
     ):
         leg = {
             name: column[max(begin - 2, 0) : end]
-            for name, column in columns_of(run).items()
+            for name, column in list_columns(run).items()
         }
-        names += csv(folder, leg, f"leg{number}.csv")
+        names += write_csv(folder, leg, f"leg{number}.csv")
     turned = random.sample(names, len(names))
-    return asked(run, names), asked(run, turned)
+    return make_question(run, names), make_question(run, turned)
 
 
 def every_second_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    thinned = {name: column[::2] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, thinned, "thinned.csv")
+    thinned = {name: column[::2] for name, column in list_columns(run).items()}
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, thinned, "thinned.csv")
     )
 
 
@@ -351,41 +359,54 @@ def other_names(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Aske
             ".hidden",
         )
     )
-    return asked(run, csv(folder, columns_of(run))), asked(
-        run, csv(folder, columns_of(run), name)
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, write_csv(folder, list_columns(run), name)
     )
 
 
 def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    other = csv(folder, columns_of(run), "other.txt", random.choice((";", "\t")))
-    return asked(run, csv(folder, columns_of(run))), asked(run, other)
+    other_file = write_csv(
+        folder, list_columns(run), "other.txt", random.choice((";", "\t"))
+    )
+    return make_question(run, write_csv(folder, list_columns(run))), make_question(
+        run, other_file
+    )
 
 
 def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    names = matsum(folder, run)
+    names = write_matsum(folder, run)
     table, _notes = extracted(open_files(names).files, Selection(parts=(str(_IDS[0]),)))
     columns = {name: table[name] for name in ("time", "internal_energy")}
-    return asked(run, names, parts=_IDS[0]), asked(run, csv(folder, columns))
+    return make_question(run, names, parts=_IDS[0]), make_question(
+        run, write_csv(folder, columns)
+    )
 
 
 RELATIONS: Final[Mapping[str, Relation]] = {
     "hdf5": Relation(
-        same_numbers(lambda folder, run: hdf5(folder, columns_of(run)), lambda run: run)
+        same_numbers(
+            lambda folder, run: write_hdf5(folder, list_columns(run)), lambda run: run
+        )
     ),
     "glstat": Relation(
         same_numbers(
             lambda folder, run: put(
-                folder, "glstat", glstat_text(run.time, run.internal)
+                folder, "glstat", make_glstat_text(run.time, run.internal)
             ),
-            lambda run: rounded(run, 6),
+            lambda run: round_run(run, 6),
         ),
         exact=False,
     ),
     "matsum": Relation(
-        same_numbers(matsum, lambda run: rounded(run, 5), _IDS[0]), exact=False
+        same_numbers(write_matsum, lambda run: round_run(run, 5), _IDS[0]), exact=False
     ),
-    "binout": Relation(same_numbers(binout, single, _IDS[0]), exact=False),
-    "radioss-th": Relation(same_numbers(time_history, single, _IDS[0]), exact=False),
+    "binout": Relation(
+        same_numbers(write_binout, store_in_single_precision, _IDS[0]), exact=False
+    ),
+    "radioss-th": Relation(
+        same_numbers(write_time_history, store_in_single_precision, _IDS[0]),
+        exact=False,
+    ),
     "single precision": Relation(in_single_precision, exact=False),
     "order of parts": Relation(other_order_of_parts),
     "further columns": Relation(further_columns),
@@ -432,8 +453,10 @@ def choose(question: Asked) -> Chosen:
     )
 
 
-def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
-    """Say how the second answer is not the first one as the relation moves it; nothing if it is."""
+def find_difference(
+    relation: Relation, run: MadeRun, first: Chosen, second: Chosen
+) -> str:
+    """Describe how the second answer breaks the relation; empty if it does not."""
     if relation.may_lose and (second.tr is None or second.basis != first.basis):
         return ""
     if (first.tr is None) != (second.tr is None):
@@ -459,12 +482,15 @@ def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) 
 
 
 def check_relation(name: str, random: Random) -> bool:
-    """Compare the two answers of one history; whether a tr was chosen. AssertionError if they do not follow."""
+    """Check a relation for one history; return True if a tr was chosen.
+
+    Raises AssertionError if the second answer does not follow.
+    """
     relation, run = RELATIONS[name], make_run(random)
     with TemporaryDirectory() as folder:
         first, second = (
             choose(question) for question in relation.change(run, Path(folder), random)
         )
-    wrong = difference(relation, run, first, second)
-    assert not wrong, wrong
+    fault = find_difference(relation, run, first, second)
+    assert not fault, fault
     return first.tr is not None and second.tr is not None

@@ -1,8 +1,8 @@
-"""Writes the run of the rollover box in every format that is read: ``python -m tests.sample_box`` from the root.
+"""Write the run of the rollover box in every format that is read: ``python -m tests.sample_box`` from the root.
 
-One run, a state each millisecond, so that all files hold the same numbers to the digits of their format.  csv, hdf5,
-glstat and matsum are what ``d2rpick rollover --dt 1e-3 -o FILE`` writes; a binout, a d3plot and a Radioss time history
-are not written by the program, and the writers of the tests make them.
+All files hold the same run, one state each millisecond, to the digits of their format.  ``d2rpick rollover --dt 1e-3 -o
+FILE`` writes the csv, hdf5, glstat and matsum.  The program does not write binout, d3plot and Radioss time histories;
+the writers of the tests do.
 """
 
 import struct
@@ -26,39 +26,39 @@ _T01_PART: Final = (1, 2, 3, 4, 5, 6)  # internal and kinetic energy, momentum, 
 _TITLE: Final = "rollover box"
 
 
-def files(record: Record) -> Mapping[str, bytes]:
-    """Content by the name of the file."""
+def make_files(record: Record) -> Mapping[str, bytes]:
+    """Return the contents of all files by file name."""
     suffixes = {"csv": "csv", "hdf5": "h5", "glstat": "glstat", "matsum": "matsum"}
     return {
         **{
             f"rollover_box.{suffixes[form]}": write(record)
             for form, write in BOX_WRITERS.items()
         },
-        "rollover_box.binout": binout(record),
-        "rollover_boxT01": t01(record),
-        "rollover_box.d3plot": d3plot(record, family=1),
-        "rollover_box.d3thdt": d3plot(record, family=3),
+        "rollover_box.binout": make_binout(record),
+        "rollover_boxT01": make_t01(record),
+        "rollover_box.d3plot": make_d3plot(record, family=1),
+        "rollover_box.d3thdt": make_d3plot(record, family=3),
     }
 
 
-def binout(record: Record) -> bytes:
-    """Branches glstat and matsum in single precision, without symbol tables, as a run leaves them that was killed."""
-    made = LsdaWriter()
+def make_binout(record: Record) -> bytes:
+    """Return the branches glstat and matsum in single precision, without symbol tables, as a killed run leaves them."""
+    writer = LsdaWriter()
     for branch in ("glstat", "matsum"):
-        made.cd(f"/{branch}/metadata")
-        made.put("title", _TITLE.encode().ljust(80), "i1")
-        made.put("version", b"d2rpick     ", "i1")
-    made.put("ids", range(1, len(PARTS) + 1), "i4")
-    made.put("legend", b"".join(title.encode().ljust(70) for title in PARTS), "i1")
-    made.put("legend_ids", range(1, len(PARTS) + 1), "i4")
+        writer.cd(f"/{branch}/metadata")
+        writer.put("title", _TITLE.encode().ljust(80), "i1")
+        writer.put("version", b"d2rpick     ", "i1")
+    writer.put("ids", range(1, len(PARTS) + 1), "i4")
+    writer.put("legend", b"".join(title.encode().ljust(70) for title in PARTS), "i1")
+    writer.put("legend_ids", range(1, len(PARTS) + 1), "i4")
     whole, of_parts = _whole(record), _of_parts(record)
     for number, time in enumerate(record.time, start=1):
         for branch, columns in (("glstat", whole), ("matsum", of_parts)):
-            made.cd(f"/{branch}/d{number:06d}")
-            made.put("time", [time], "f4")
+            writer.cd(f"/{branch}/d{number:06d}")
+            writer.put("time", [time], "f4")
             for name, values in columns.items():
-                made.put(name, np.atleast_1d(values[number - 1]), "f4")
-    return bytes(made.data)
+                writer.put(name, np.atleast_1d(values[number - 1]), "f4")
+    return bytes(writer.data)
 
 
 def _whole(record: Record) -> dict[str, Samples]:
@@ -81,43 +81,43 @@ def _of_parts(record: Record) -> dict[str, Samples]:
     }  # fmt: skip
 
 
-def t01(record: Record) -> bytes:
-    """Time history of the whole and of both parts.
+def make_t01(record: Record) -> bytes:
+    """Return the time history of the model and of both parts.
 
-    Radioss has no terms for rigid walls and for damping: what they take is work of external forces.
+    Radioss has no terms for rigid walls and for damping: their energy counts as work of external forces.
     """
-    made, count = T01Writer(), len(PARTS)
-    made.record(struct.pack(">i", 3050) + _TITLE.encode().ljust(80))
-    made.record(b"d2rpick, layout of RADIOSS".ljust(80))
-    made.integers(2)
-    made.integers(40)
-    made.record(np.array([1, 1, 1], ">f4").tobytes())
-    made.integers(count, 0, 0, 1, 0, _GLOBALS)
-    made.integers(*range(1, _GLOBALS + 1))
+    writer, count = T01Writer(), len(PARTS)
+    writer.record(struct.pack(">i", 3050) + _TITLE.encode().ljust(80))
+    writer.record(b"d2rpick, layout of RADIOSS".ljust(80))
+    writer.integers(2)
+    writer.integers(40)
+    writer.record(np.array([1, 1, 1], ">f4").tobytes())
+    writer.integers(count, 0, 0, 1, 0, _GLOBALS)
+    writer.integers(*range(1, _GLOBALS + 1))
     for number, title in enumerate(PARTS, start=1):
-        made.record(
+        writer.record(
             struct.pack(">i", number)
             + title.encode().ljust(40)
             + struct.pack(">4i", 0, 1, 2, len(_T01_PART))
         )
-        made.integers(*_T01_PART)
-    made.record(struct.pack(">5i", 0, 0, 0, count, 0) + b"GLOBAL MODEL".ljust(40))
-    made.integers(*range(1, count + 1))
+        writer.integers(*_T01_PART)
+    writer.record(struct.pack(">5i", 0, 0, 0, count, 0) + b"GLOBAL MODEL".ljust(40))
+    writer.integers(*range(1, count + 1))
     whole, parts = _t01_globals(record), _of_parts(record)
     mass = np.broadcast_to(_masses(), record.internal_energy.shape)
     of_parts = np.stack([*parts.values(), mass], axis=2)
     for time, values, numbers in zip(record.time, whole, of_parts, strict=True):
-        made.reals([time])
-        made.reals(values.tolist())
-        made.reals(numbers.ravel().tolist())
-    return bytes(made.data)
+        writer.reals([time])
+        writer.reals(values.tolist())
+        writer.reals(numbers.ravel().tolist())
+    return bytes(writer.data)
 
 
-def d3plot(record: Record, family: int) -> bytes:
-    """A family of one file in double precision, without nodes and elements."""
+def make_d3plot(record: Record, family: int) -> bytes:
+    """Return a family of one file in double precision, without nodes and elements."""
     nothing = dict.fromkeys(("numnp", "nel8", "nel4", "nel2", "nelt"), 0)
     ids = tuple(range(1, len(PARTS) + 1))
-    made = D3plotWriter(
+    writer = D3plotWriter(
         8, ids=ids, titles=PARTS, title=_TITLE, control=nothing, family=family
     )
     masses, speed = _masses(), record.momentum.sum(axis=1) / record.mass
@@ -136,13 +136,13 @@ def d3plot(record: Record, family: int) -> bytes:
         )
         for i in range(record.time.size)
     ]
-    return made.together(states)
+    return writer.together(states)
 
 
 def _t01_globals(record: Record) -> Samples:
-    """Globals of all states, those that do not apply 0; shape (n, globals)."""
+    """Return the globals of all states, 0 if they do not apply; shape (n, globals)."""
     whole, momentum = _whole(record), record.momentum.sum(axis=1)
-    known = {
+    globals_by_code = {
         1: whole["internal_energy"], 2: whole["kinetic_energy"], 3: momentum.real, 5: momentum.imag,
         6: record.mass + 0 * record.time, 7: record.dt + 0 * record.time,
         9: record.external_work - record.wall_energy - record.damping_energy,
@@ -150,7 +150,7 @@ def _t01_globals(record: Record) -> Samples:
     }  # fmt: skip
     nothing = 0 * record.time
     return np.stack(
-        [known.get(code, nothing) for code in range(1, _GLOBALS + 1)], axis=1
+        [globals_by_code.get(code, nothing) for code in range(1, _GLOBALS + 1)], axis=1
     )
 
 
@@ -162,7 +162,7 @@ def _masses() -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    for name, content in files(
+    for name, content in make_files(
         simulate(Parameters(), T_END, interval=INTERVAL)
     ).items():
         (ROOT / "sample_data" / name).write_bytes(content)

@@ -1,8 +1,8 @@
-"""The coarse decks in ``sample_data``: the rollover box with its step and the sled, as shells.
+"""Write the coarse decks in ``sample_data``: the rollover box with its step and the sled, as shells.
 
-Run as ``python -m tests.sample_deck``.  The LS-DYNA deck has the parts of the sample histories of the box, for
-``d2rpick parts``.  The Radioss decks let box and step fly, free for 20 ms and rigid for 20 ms, for
-``d2rpick calibrate``; their listings are what the solver printed, cut to the summary.
+Run ``python -m tests.sample_deck``.  The LS-DYNA deck has the parts of the sample histories of the box, for ``d2rpick
+parts``.  In the Radioss decks, box and step fly, deformable for 20 ms and rigid for 20 ms, for ``d2rpick calibrate``;
+their listings are those of the solver, reduced to the summary.
 """
 
 import itertools
@@ -20,7 +20,7 @@ _X, _Y, _Z = (
     np.linspace(0.0, 1.5, 6),
     np.linspace(0.2, 1.4, 5),
 )
-_SLED, _MAIN = 3, 9999  # a part, and the main node of the rigid body
+_SLED, _MAIN = 3, 9999  # part id of the sled, and main node of the rigid body
 _CARDS = """*SECTION_SHELL
 $#   secid    elform      shrf       nip
          1         2       1.0         3
@@ -36,45 +36,50 @@ $#     mid        ro         e        pr      sigy
 
 
 class _Mesh:
-    """Nodes by place, and shells by part."""
+    """Nodes by position, and shells by part."""
 
     def __init__(self) -> None:
         self.nodes: dict[tuple[float, ...], int] = {}
         self.shells: list[tuple[int, list[int]]] = []
 
     def grid(
-        self, part: int, fixed: int, at: float, one: Samples, other: Samples
+        self,
+        part: int,
+        fixed: int,
+        level: float,
+        first_span: Samples,
+        second_span: Samples,
     ) -> None:
-        """Fill a rectangle, at a constant coordinate ``fixed``, with shells."""
-        for a, b in itertools.pairwise(one):
-            for c, d in itertools.pairwise(other):
+        """Fill a rectangle in the plane in which coordinate ``fixed`` is ``level`` with shells."""
+        for a, b in itertools.pairwise(first_span):
+            for c, d in itertools.pairwise(second_span):
                 corners = [(a, c), (b, c), (b, d), (a, d)]
                 self.shells.append(
                     (
                         part,
                         [
-                            self._node(*np.insert(corner, fixed, at))
+                            self._node(*np.insert(corner, fixed, level))
                             for corner in corners
                         ],
                     )
                 )
 
-    def _node(self, *place: float) -> int:
-        key = tuple(round(float(value), 6) for value in place)
+    def _node(self, *position: float) -> int:
+        key = tuple(round(float(value), 6) for value in position)
         return self.nodes.setdefault(key, len(self.nodes) + 1)
 
 
-def deck() -> str:
-    """Text of the LS-DYNA deck."""
+def make_deck() -> str:
+    """Return the text of the LS-DYNA deck."""
     return "\n".join(_lines(_mesh())) + "\n"
 
 
-def radioss() -> dict[str, str]:
-    """Texts of the starter and of two legs by the names of their files."""
+def make_radioss_files() -> dict[str, str]:
+    """Return the texts of the starter and of two engine files by file name."""
     step = "/VERS/2022\n/DT\n0.9 0.0\n/DTIX\n5e-05 5e-05\n"
-    rest = "/TFILE/4\n0.001\n/PRINT/-2000\n/MON/ON\n"
+    run_time_cards = "/TFILE/4\n0.001\n/PRINT/-2000\n/MON/ON\n"
     legs = {
-        f"BOX_000{leg}.rad": f"/RUN/BOX/{leg}\n{stop}\n{step}/RBODY/{word}\n9999\n{rest}"
+        f"BOX_000{leg}.rad": f"/RUN/BOX/{leg}\n{stop}\n{step}/RBODY/{word}\n9999\n{run_time_cards}"
         for leg, stop, word in ((1, 0.02, "OFF"), (2, 0.04, "ON"))
     }
     return {"BOX_0000.rad": "\n".join(_starter(_mesh())) + "\n", **legs}
@@ -115,7 +120,7 @@ def _lines(mesh: _Mesh) -> Iterator[str]:
 def _starter(mesh: _Mesh) -> Iterator[str]:
     shells = [(part, nodes) for part, nodes in mesh.shells if part != _SLED]
     used = sorted({node for _, nodes in shells for node in nodes})
-    places = {number: place for place, number in mesh.nodes.items()}
+    node_positions = {number: position for position, number in mesh.nodes.items()}
     yield "#RADIOSS STARTER\n/BEGIN\nBOX\n      2022         0"
     yield (
         f"{'kg':>20}{'m':>20}{'s':>20}\n" * 2
@@ -131,7 +136,9 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
         yield f"{3:10d}{0:10d}{thickness:20g}{0:20d}{'':10}{1:10d}{1:10d}"
     yield "/NODE"
     for node in used:
-        yield f"{node:10d}" + "".join(f"{value:20.6f}" for value in places[node])
+        yield f"{node:10d}" + "".join(
+            f"{value:20.6f}" for value in node_positions[node]
+        )
     yield f"{_MAIN:10d}{-0.45:20.6f}{0.75:20.6f}{0.8:20.6f}"
     for number, title in ((1, "box"), (2, "step")):
         yield f"/PART/{number}\n{title}\n{number:10d}{1:10d}\n/SHELL/{number}"
@@ -141,8 +148,8 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
     for group, members in ((1, used), (2, [*used, _MAIN])):
         yield f"/GRNOD/NODE/{group}\nnodes"
         yield from (
-            "".join(f"{node:10d}" for node in members[at : at + 10])
-            for at in range(0, len(members), 10)
+            "".join(f"{node:10d}" for node in members[first_member : first_member + 10])
+            for first_member in range(0, len(members), 10)
         )
     yield f"/RBODY/1\nbody\n{_MAIN:10d}{0:10d}{0:10d}{0:10d}{0:20d}{1:10d}{0:10d}{0:10d}{0:10d}"
     yield f"{0:20d}{0:20d}{0:20d}\n" * 2 + f"{0:10d}{0:10d}{0:10d}"
@@ -150,7 +157,7 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    DECK.write_text(deck(), "utf-8")
+    DECK.write_text(make_deck(), "utf-8")
     FLYING.mkdir(exist_ok=True)
-    for name, text in radioss().items():
+    for name, text in make_radioss_files().items():
         (FLYING / name).write_text(text, "utf-8")

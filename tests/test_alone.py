@@ -1,4 +1,4 @@
-"""The suite stands alone: what its modules may name, what they may open, and where its data come from."""
+"""The tests need only the repository: what modules may name, what tests may open, and where the data come from."""
 
 import os
 import re
@@ -21,9 +21,10 @@ HOME, TEMPORARY = Path("/home/one"), Path(tempfile.gettempdir())
 def test_no_test_names_what_lies_beside_the_clone() -> None:
     modules = [path.relative_to(ROOT) for path in (ROOT / "tests").rglob("*.py")]
     judged = [
-        one
-        for one in modules
-        if one.parts[1] != "real" and one.stem not in ("alone", "test_alone")
+        module_name
+        for module_name in modules
+        if module_name.parts[1] != "real"
+        and module_name.stem not in ("alone", "test_alone")
     ]
     assert len(judged) > 100
     for module in judged:
@@ -36,7 +37,7 @@ def test_no_test_names_what_lies_beside_the_clone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "root", "beside"),
+    ("name", "root", "outside_path"),
     [
         (FOREIGN, ROOT, True),
         (str(REAL), HOME / "d2rpick", True),
@@ -53,32 +54,34 @@ def test_no_test_names_what_lies_beside_the_clone() -> None:
         ("/etc/fonts", Path("/d2rpick"), False),
     ],
 )
-def test_what_lies_beside_the_clone(name: str | Path, root: Path, beside: bool) -> None:
-    assert is_beside(str(name), root) is beside
+def test_what_lies_beside_the_clone(
+    name: str | Path, root: Path, outside_path: bool
+) -> None:
+    assert is_beside(str(name), root) is outside_path
 
 
 def test_what_lies_beside_the_clone_cannot_be_opened() -> None:
     ways: list[Callable[[Path], object]] = [
         Path.read_bytes, os.listdir, os.scandir, lambda path: subprocess.run(["cat", path], check=False),
     ]  # fmt: skip
-    for way in ways:
+    for open_path in ways:
         with pytest.raises(AssertionError, match="lies beside the clone"):
-            way(Path(FOREIGN))
+            open_path(Path(FOREIGN))
     assert WATCH.opened == [FOREIGN] * len(ways)
     WATCH.opened.clear()
 
 
 def test_each_file_of_the_data_has_a_line_that_says_what_wrote_it() -> None:
-    """And all of them are small."""
+    """All files must be small too."""
     files = {
         str(path.relative_to(DATA)): path.stat().st_size
         for path in DATA.rglob("*")
         if path.is_file()
     }
-    told = re.findall(
+    files_in_table = re.findall(
         r"^\| `(.+?)` \| .+ \| .+ \|$",
         (DATA / "README.md").read_text("utf-8"),
         re.MULTILINE,
     )
-    assert sorted(told) == sorted(files.keys() - {"README.md"})
+    assert sorted(files_in_table) == sorted(files.keys() - {"README.md"})
     assert sum(files.values()) < 2_000_000

@@ -1,4 +1,4 @@
-"""A real Dask scheduler and workers, each a process of its own, do the work; one of them is killed on the way."""
+"""Studies on a real Dask scheduler and workers, each a process of its own; one worker is killed during a study."""
 
 import json
 import os
@@ -17,20 +17,20 @@ import pytest
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import Cluster
 from tests import variants
-from tests.command import ROOT, refused, run
+from tests.command import ROOT, read_refusal, run
 
 pytestmark = pytest.mark.skipif(
     not find_spec("distributed"), reason="needs the extra 'dask'"
 )
-PATIENCE = 30.0  # [s]
+PATIENCE = 30.0  # longest wait for a cluster [s]
 
 
 def until(true: Callable[[], Any]) -> Any:
-    """Wait for something to be true."""
+    """Wait until ``true`` returns a true value, and return it."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
-        if found := true():
-            return found
+        if value := true():
+            return value
         time.sleep(0.02)
     raise AssertionError("waited in vain")
 
@@ -52,7 +52,7 @@ def process(*args: str, **options: Any) -> Iterator[subprocess.Popen[str]]:
 def cluster(
     folder: Path, names: tuple[str, ...]
 ) -> Iterator[tuple[str, dict[str, subprocess.Popen[str]]]]:
-    """Start a scheduler and workers of these names, each of one thread; the address, and the processes by name."""
+    """Start a scheduler and one-thread workers with these names; yield the address, and the processes by name."""
     listed = folder / "scheduler.json"
     common = ("--no-dashboard", "--scheduler-file", str(listed), "--host", "127.0.0.1")
     with ExitStack() as stack:
@@ -85,7 +85,7 @@ def cluster(
 def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> None:
     from distributed import Client  # slow
 
-    sources = variants.variants(tmp_path)
+    sources = variants.write_variants(tmp_path)
     expected = json.loads(
         run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout
     )
@@ -130,36 +130,36 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
             slow.unlink()
             slow.write_bytes(Path(sources[0]).read_bytes())
             workers[victim].kill()
-            text, said = study.communicate(timeout=PATIENCE)
-    assert study.returncode == 0, said
-    found = json.loads(text)
-    assert [row["source"] for row in found["runs"]] == names
-    for row in (*found["runs"], *expected["runs"]):
+            text, error_output = study.communicate(timeout=PATIENCE)
+    assert study.returncode == 0, error_output
+    document = json.loads(text)
+    assert [row["source"] for row in document["runs"]] == names
+    for row in (*document["runs"], *expected["runs"]):
         del row["source"]
     same = ("runs", "tr", "agree", "common_tr", "common_window")
-    assert {key: found[key] for key in same} == {key: expected[key] for key in same}
+    assert {key: document[key] for key in same} == {key: expected[key] for key in same}
 
 
 @pytest.mark.slow
 def test_what_a_worker_found_before_it_died_is_not_lost(tmp_path: Path) -> None:
     from distributed import Client  # slow
 
-    found = []
+    results = []
     with (
         cluster(tmp_path, ("one", "two")) as (address, workers),
         Cluster(address) as farm,
         Client(address, set_as_default=False) as client,
     ):
         for answer in farm.answers(abs, range(500)):
-            found.append(answer)
-            if len(found) == 100:
+            results.append(answer)
+            if len(results) == 100:
                 until(
                     lambda: not any(client.processing().values())
-                )  # so all that was begun is found
-            if len(found) == 101:
+                )  # so that everything that was begun is finished
+            if len(results) == 101:
                 workers["one"].kill()
                 until(lambda: len(client.scheduler_info(n_workers=-1)["workers"]) == 1)
-    assert sorted(found) == [(number, number, None) for number in range(500)]
+    assert sorted(results) == [(number, number, None) for number in range(500)]
 
 
 @pytest.mark.slow
@@ -180,10 +180,10 @@ def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(
 
 
 def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
-    told = "no answer from a Dask scheduler ("
-    with pytest.raises(D2RPickError, match=f"^tcp://127.0.0.1:9: {re.escape(told)}"):
+    message = "no answer from a Dask scheduler ("
+    with pytest.raises(D2RPickError, match=f"^tcp://127.0.0.1:9: {re.escape(message)}"):
         Cluster("tcp://127.0.0.1:9", patience=0.3)
-    asked = (
+    arguments = (
         "study",
         "--td",
         str(variants.TD),
@@ -191,14 +191,14 @@ def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
         "--scheduler",
         "nonsense://x",
     )
-    assert refused(*asked).startswith(f"nonsense://x: {told}")
+    assert read_refusal(*arguments).startswith(f"nonsense://x: {message}")
 
 
 def test_without_the_package_its_name_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert "pip install distributed" in refused(
+    assert "pip install distributed" in read_refusal(
         "study",
         "--td",
         "0.064",

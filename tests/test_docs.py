@@ -1,4 +1,4 @@
-"""The documentation shows what the program does: its examples are run, its commands and links exist."""
+"""The documentation is true: its examples run, its commands and links exist."""
 
 import doctest
 import re
@@ -20,97 +20,100 @@ from d2rpick.rules import RULES, read_configuration
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, run
 from tests.examples import (
     PAGES,
-    blocks,
-    folder_of_a_reader,
-    languages,
-    printed,
-    prose,
-    rounded,
-    sessions,
-    text_of,
+    enter_reader_folder,
+    find_blocks,
+    find_languages,
+    find_sessions,
+    read_page,
+    round_numbers,
+    run_shown_command,
+    strip_blocks,
 )
 
-README = text_of("README.md")
-ALL = "\n".join(text_of(page) for page in PAGES)
+README = read_page("README.md")
+ALL = "\n".join(read_page(page) for page in PAGES)
 MAP = "docs/README.md"
-LONGEST_README = 700  # [words] of prose
-# Each has a test below, or shows nothing to be run.
+LONGEST_README = 700  # words of prose that can be read in five minutes
+# Each language has a test below, or shows nothing that can be run.
 KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
 
 
-def slug(heading: str) -> str:
-    """Anchor that GitHub gives a heading."""
+def make_anchor(heading: str) -> str:
+    """Return the anchor that GitHub gives a heading."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
-def anchors(page: Path) -> set[str]:
-    """Anchors of a page."""
+def list_anchors(page: Path) -> set[str]:
+    """Return the anchors of a page."""
     return {
-        slug(heading)
+        make_anchor(heading)
         for heading in re.findall(
-            r"^#+ (.*)$", prose(page.read_text("utf-8")), flags=re.MULTILINE
+            r"^#+ (.*)$", strip_blocks(page.read_text("utf-8")), flags=re.MULTILINE
         )
     }
 
 
-def links(page: str) -> Iterator[tuple[Path, str]]:
-    """Files and anchors in the repository that a page points to."""
-    for target in re.findall(r"\]\(([^)]+)\)", prose(text_of(page))):
+def list_links(page: str) -> Iterator[tuple[Path, str]]:
+    """Yield the files and anchors in the repository that a page links to."""
+    for target in re.findall(r"\]\(([^)]+)\)", strip_blocks(read_page(page))):
         if "://" not in target:
             name, _, anchor = target.partition("#")
             yield (PAGES[page].parent / name if name else PAGES[page]), anchor
 
 
-def one_is_quick(pages: Iterable[str]) -> list[Any]:
-    """Pages of which the README alone is tried each time."""
+def mark_slow_pages(pages: Iterable[str]) -> list[Any]:
+    """Return the pages as parameters; only the README runs each time, the others are marked slow."""
     return [
         page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow)
         for page in pages
     ]
 
 
-@pytest.mark.parametrize("page", one_is_quick(PAGES))
+@pytest.mark.parametrize("page", mark_slow_pages(PAGES))
 def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
-    with folder_of_a_reader():
-        for command, shown in sessions(
-            text_of(page)
+    with enter_reader_folder():
+        for command, shown_output in find_sessions(
+            read_page(page)
         ):  # in order and in one folder, as a reader would type them
             assert (
-                f"{command}\n{rounded(printed(command))}"
-                == f"{command}\n{rounded(shown)}"
+                f"{command}\n{round_numbers(run_shown_command(command))}"
+                == f"{command}\n{round_numbers(shown_output)}"
             )
 
 
 def test_the_sessions_show_the_commands_that_matter_most() -> None:
-    shown = {shlex.split(command)[1] for command, _ in sessions(ALL)}
-    assert {*COMMANDS} - {"rule"} <= shown
+    shown_commands = {shlex.split(command)[1] for command, _ in find_sessions(ALL)}
+    assert {*COMMANDS} - {"rule"} <= shown_commands
 
 
 @pytest.mark.parametrize(
-    "page", one_is_quick(page for page in PAGES if "pycon" in languages(text_of(page)))
+    "page",
+    mark_slow_pages(
+        page for page in PAGES if "pycon" in find_languages(read_page(page))
+    ),
 )
 def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
-    source = "".join(blocks(text_of(page), "pycon"))
+    source = "".join(find_blocks(read_page(page), "pycon"))
     test = doctest.DocTestParser().get_doctest(source, {}, page, page, 0)
     report: list[str] = []
-    with folder_of_a_reader():
+    with enter_reader_folder():
         doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test, out=report.append)
     assert not report, "".join(report)
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_no_example_escapes_the_tests(page: str) -> None:
-    text = text_of(page)
+    text = read_page(page)
     assert text.count("\n```") == 2 * len(
         re.findall(r"^```\w+$", text, flags=re.MULTILINE)
     )
-    assert languages(text) <= KINDS
-    assert not [block for block in blocks(text, "text") if "d2rpick " in block]
+    assert find_languages(text) <= KINDS
+    assert not [block for block in find_blocks(text, "text") if "d2rpick " in block]
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page != "README.md"])
 def test_a_page_begins_with_what_the_reader_gets(page: str) -> None:
-    title, first, *_ = text_of(page).split("\n\n")
+    title, first, *_ = read_page(page).split("\n\n")
     assert re.fullmatch(r"# .+", title)
     assert re.match(r"[A-Z`]", first)
 
@@ -120,8 +123,10 @@ def test_no_page_repeats_another() -> None:
         paragraph
         for page in PAGES
         for paragraph in {
-            " ".join(found.split())
-            for found in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))
+            " ".join(text_block.split())
+            for text_block in re.split(
+                r"\n\n|\n(?=[|*])", strip_blocks(read_page(page))
+            )
         }
         if len(paragraph) > 80
     ]
@@ -131,29 +136,31 @@ def test_no_page_repeats_another() -> None:
 
 
 def test_the_readme_is_read_in_three_minutes() -> None:
-    assert len(prose(README).split()) <= LONGEST_README
+    assert len(strip_blocks(README).split()) <= LONGEST_README
 
 
 def test_the_map_leads_to_every_page_and_the_readme_to_the_map() -> None:
-    linked = {path.resolve() for path, _ in links(MAP)}
+    linked = {path.resolve() for path, _ in list_links(MAP)}
     assert {*PAGES.values()} - {ROOT / "README.md", PAGES[MAP]} <= linked
-    assert PAGES[MAP] in {path.resolve() for path, _ in links("README.md")}
+    assert PAGES[MAP] in {path.resolve() for path, _ in list_links("README.md")}
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_of_a_page_lead_somewhere(page: str) -> None:
-    for path, anchor in links(page):
+    for path, anchor in list_links(page):
         assert path.exists()
-        assert not anchor or anchor in anchors(path)
+        assert not anchor or anchor in list_anchors(path)
 
 
 def test_the_files_that_the_recipes_name_exist() -> None:
-    named = re.findall(
-        r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing/README.md")
+    named_files = re.findall(
+        r"`((?:d2rpick|tests)/[\w/.-]+)`", read_page("docs/developing/README.md")
     )
-    assert len(named) > 20
+    assert len(named_files) > 20
     assert not {
-        name for name in named if "NAME" not in name and not (ROOT / name).exists()
+        name
+        for name in named_files
+        if "NAME" not in name and not (ROOT / name).exists()
     }
 
 
@@ -161,13 +168,13 @@ def test_the_files_that_the_recipes_name_exist() -> None:
 def test_every_command_has_help_and_is_documented_with_its_options(
     command: str,
 ) -> None:
-    assert f"\n## {command}\n" in text_of("docs/reference/commands.md")
-    shown = run(command, "--help").stdout
-    assert re.search(r"Examples:\n +d2rpick", shown)
+    assert f"\n## {command}\n" in read_page("docs/reference/commands.md")
+    result = run(command, "--help").stdout
+    assert re.search(r"Examples:\n +d2rpick", result)
     options = set(
         re.findall(
             r"(?<![\w-])--[a-z][a-z0-9-]+",
-            re.split(r"\n[A-Z][a-z ]+:\n", shown, maxsplit=1)[1].split("Examples:")[0],
+            re.split(r"\n[A-Z][a-z ]+:\n", result, maxsplit=1)[1].split("Examples:")[0],
         )
     )
     common = {
@@ -175,40 +182,40 @@ def test_every_command_has_help_and_is_documented_with_its_options(
         "--input-format",
         "--output-format",
         "--output-file",
-    }  # by their short names
+    }  # options by their short names
     assert not {option for option in options - common if option not in ALL}
 
 
 @pytest.mark.parametrize("name", READERS)
 def test_every_format_is_documented(name: str) -> None:
-    assert f"| `{name}` |" in text_of("docs/reference/histories.md")
+    assert f"| `{name}` |" in read_page("docs/reference/histories.md")
 
 
 def test_the_exit_codes_are_listed() -> None:
-    page = text_of("docs/reference/scripts.md")
+    page = read_page("docs/reference/scripts.md")
     assert re.findall(r"^\| (\d) \|", page, flags=re.MULTILINE) == ["0", "1", "2"]
 
 
 def test_the_two_commands_of_the_readme_are_one_line_each() -> None:
-    first, second = blocks(README, "sh")
+    first, second = find_blocks(README, "sh")
     assert [block.count("\n") for block in (first, second)] == [1, 1]
     (command,) = re.findall(r"\.venv/bin/(d2rpick .*)", first)
     assert command in {
-        re.sub(r" --limit \d+", "", command) for command, _ in sessions(README)
+        re.sub(r" --limit \d+", "", command) for command, _ in find_sessions(README)
     }
     assert "pytest" in second
 
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:
-    _, second = blocks(README, "sh")
+    _, second = find_blocks(README, "sh")
     assert second in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
 @pytest.mark.usefixtures("here")
 def test_the_jobs_in_the_documentation_run() -> None:
     shutil.copy(DECK, "main.k")
-    Path("d2rpick").symlink_to(ROOT)  # where the clone lies
-    jobs = "".join(blocks(ALL, "yaml"))
+    Path("d2rpick").symlink_to(ROOT)  # the folder of the clone
+    jobs = "".join(find_blocks(ALL, "yaml"))
     assert [
         Path(name, "pyproject.toml").exists()
         for name in re.findall(r"pip install (.*)", jobs)
@@ -226,7 +233,7 @@ def test_the_jobs_in_the_documentation_run() -> None:
 
 
 def test_the_configuration_in_the_documentation_is_one() -> None:
-    (rules,) = blocks(text_of("docs/how-to/check-decks.md"), "toml")
+    (rules,) = find_blocks(read_page("docs/how-to/check-decks.md"), "toml")
     read_configuration(tomllib.loads(rules)).verify(RULES)
 
 
@@ -234,23 +241,23 @@ def test_the_configuration_in_the_documentation_is_one() -> None:
     "page", ["docs/how-to/recipes.md", "docs/reference/scripts.md"]
 )
 def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> None:
-    (settings,) = blocks(text_of(page), "toml")
+    (settings,) = find_blocks(read_page(page), "toml")
     (here / "d2rpick.toml").write_text(settings)
-    shown = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
+    result = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
     table = tomllib.loads(settings)
     taken = {*table, *table.pop("suggest")} - {
         "suggest",
         "fail-on",
-    }  # which check alone takes
-    assert shown.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
+    }  # options that only check has
+    assert result.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
 
 
 @pytest.mark.usefixtures("here")
 def test_the_parquet_of_the_recipes_is_read() -> None:
-    """Where pandas can: pyarrow is no dependency."""
+    """Only if pandas can read parquet: pyarrow is not a dependency."""
     pytest.importorskip("pyarrow")
     (line,) = re.findall(
-        r"`(pd\.read_parquet\(.*?\))`", text_of("docs/how-to/recipes.md")
+        r"`(pd\.read_parquet\(.*?\))`", read_page("docs/how-to/recipes.md")
     )
     pd.read_csv(ENERGY, index_col="time").to_parquet("energies.parquet")
     assert d2rpick.from_frame(eval(line)).parts == ()
@@ -286,7 +293,7 @@ def test_every_sample_has_a_line_on_what_wrote_it() -> None:
 
 @pytest.mark.slow
 def test_the_python_of_the_readme_passes_a_type_checker(tmp_path: Path) -> None:
-    source = "".join(blocks(README, "pycon"))
+    source = "".join(find_blocks(README, "pycon"))
     examples = doctest.DocTestParser().get_examples(source)
     script = tmp_path / "example.py"
     script.write_text("".join(example.source for example in examples), "utf-8")

@@ -1,8 +1,8 @@
-"""Plans of the falling box held against the runs that are switched so: ``python -m tests.test_drops``.
+"""Plans of the falling box compared with the runs switched accordingly: ``python -m tests.test_drops``.
 
-Twenty sets of parameters, fixed before any of them was run: height of the fall and tilt on a grid, the speed across,
-the stiffness of the ground and of the bars in turn.  Each supported window has to end before the landing of the
-switched run.
+Twenty sets of parameters were fixed before any of them was run: drop height and tilt on a grid, and in turn the
+horizontal speed, the stiffness of the ground and the stiffness of the bars.  Each supported window must end before the
+landing of the switched run.
 """
 
 import tempfile
@@ -17,7 +17,7 @@ from d2rpick.choice.question import Settings, read
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate
-from tests.drops import written
+from tests.drops import write_run_files
 
 SETS = tuple(
     Parameters(
@@ -31,45 +31,52 @@ BOX = Selection(parts=("box",))
 
 
 class Outcome(NamedTuple):
-    """Supported windows, and the contact of the switched run after each, None where none comes [s]."""
+    """Supported windows, and the next contact of the switched run after each [s]; None if there is none."""
 
     windows: tuple[tuple[float, float], ...]
     landings: tuple[float | None, ...]
 
     @property
     def kept(self) -> bool:
-        """Whether each window ends before the landing."""
+        """True if each window ends before the landing."""
         return all(
             landing is None or td < landing
             for (_, td), landing in zip(self.windows, self.landings, strict=True)
         )
 
 
-def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
-    """Plan the run of some parameters, and compute it switched in the supported windows."""
+def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
+    """Plan a run with these parameters, and compute it switched in the supported windows."""
     with tempfile.TemporaryDirectory() as folder:
-        files = written(simulate(parameters, T_END, interval=interval), Path(folder))
+        files = write_run_files(
+            simulate(parameters, T_END, interval=interval), Path(folder)
+        )
         windows = plan_of(read(files, BOX), Settings()).windows
     switched = simulate(
-        parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval
+        parameters,
+        T_END,
+        *(RigidWindow(*window) for window in windows),
+        interval=interval,
     )
     contacts = switched.landings
-    after = tuple(
+    next_contacts = tuple(
         next((start for start, _ in contacts if start > tr), None) for tr, _ in windows
     )
-    return Outcome(windows, after)
+    return Outcome(windows, next_contacts)
 
 
 @pytest.mark.slow
 def test_supported_windows_end_before_the_landing_of_the_switched_run() -> None:
-    found = outcome(SETS[12], interval=3e-4)  # at most two steps of the model a state
-    assert found.windows
-    assert found.kept, found
+    drop_outcome = compute_outcome(
+        SETS[12], interval=3e-4
+    )  # at most two time steps of the model per state
+    assert drop_outcome.windows
+    assert drop_outcome.kept, drop_outcome
 
 
 if __name__ == "__main__":
     for number, parameters in enumerate(SETS, start=1):
-        found = outcome(parameters)
+        found = compute_outcome(parameters)
         pairs = zip(found.windows, found.landings, strict=True)
         told = "; ".join(
             f"{tr:.4f} to {td:.4f}, contact {at if at is None else round(at, 4)}"

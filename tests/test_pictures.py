@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from tests.examples import PAGES, text_of
+from tests.examples import PAGES, read_page
 from tests.pictures import screenshots
 from tests.pictures.__main__ import PICTURES
 from tests.pictures.drawing import PLACE, POINTS, draw_curve, drawn, make_figure
 
-ALL = "\n".join(text_of(page) for page in PAGES)
+ALL = "\n".join(read_page(page) for page in PAGES)
 LARGEST = 60_000  # [bytes] of a drawing
 LARGEST_SCREENSHOT = 250_000  # [bytes]
 

@@ -8,9 +8,9 @@ import pytest
 
 from d2rpick.rules import RULES
 from tests.command import ROOT
-from tests.examples import text_of
+from tests.examples import read_page
 from tests.reference import PAGES, PLACE
-from tests.test_docs import anchors
+from tests.test_docs import list_anchors
 
 SOURCES = [*(ROOT / "d2rpick").rglob("*.py")]
 WARNINGS = ROOT / "docs" / "reference" / "warnings.md"
@@ -23,7 +23,7 @@ def test_a_page_of_the_reference_is_current(name: str) -> None:
 
 
 def test_every_rule_has_an_anchor() -> None:
-    assert {rule.lower() for rule in RULES} <= anchors(PLACE / "rules.md")
+    assert {rule.lower() for rule in RULES} <= list_anchors(PLACE / "rules.md")
 
 
 def codes(tree: ast.Module) -> Iterator[str]:
@@ -64,7 +64,7 @@ def test_pages_that_the_code_names_exist() -> None:
 
 def test_the_glossary_has_each_term_once() -> None:
     terms = re.findall(
-        r"^\| ([^|]+) \| ", text_of("docs/reference/glossary.md"), re.MULTILINE
+        r"^\| ([^|]+) \| ", read_page("docs/reference/glossary.md"), re.MULTILINE
     )
     names = [term for term in terms if term not in ("term", "---")]
     assert len(names) == len({*names}) > 50

@@ -1,4 +1,4 @@
-"""The samples of the rollover box are one run in every format, and its energies balance in each."""
+"""The samples of the rollover box are the same run in every format, and the energies of each balance."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,29 +12,29 @@ from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from tests import sample_box
-from tests.command import ROOT, answer, put
-from tests.energies import sure
+from tests.command import ROOT, put, run_json
+from tests.energies import require
 
 KEPT = ROOT / "sample_data"
 NAMES = (*(f"rollover_box.{suffix}" for suffix in ("csv", "h5", "glstat", "matsum", "binout")), "rollover_boxT01",
          *(f"rollover_box.{suffix}" for suffix in ("d3plot", "d3thdt")))  # fmt: skip
-LARGEST = 320_000  # bytes of one sample
+LARGEST = 320_000  # largest sample [bytes]
 
 
 @pytest.fixture(scope="module")
 def computed() -> Record:
-    """A run that is computed now."""
+    """Compute the run now."""
     return simulate(Parameters(), sample_box.T_END, interval=sample_box.INTERVAL)
 
 
 @pytest.fixture(scope="module")
 def fresh(computed: Record) -> Mapping[str, bytes]:
-    """Its files."""
-    return sample_box.files(computed)
+    """Make the files of the run that is computed now."""
+    return sample_box.make_files(computed)
 
 
-def history(path: Path) -> History:
-    """Energy of the box, or of box and step where a file does not tell them apart."""
+def read_box_history(path: Path) -> History:
+    """Read the energy of the box, or of box and step if the file does not distinguish them."""
     run = open_run([str(path)])
     return run.history(Selection(parts=("box",) if run.parts else ()))
 
@@ -42,35 +42,40 @@ def history(path: Path) -> History:
 def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_study(
     computed: Record,
 ) -> None:
-    assert 0.070 <= sure(computed.released) <= 0.090
-    assert sure(computed.landed) == pytest.approx(0.380, abs=0.005)
+    assert 0.070 <= require(computed.released) <= 0.090
+    assert require(computed.landed) == pytest.approx(0.380, abs=0.005)
     assert np.abs(computed.imbalance).max() < 0.01
 
 
 @pytest.mark.slow
 def test_every_format_has_its_sample(fresh: Mapping[str, bytes]) -> None:
     assert {*fresh} == {*NAMES}
-    assert {answer("info", str(KEPT / name))["format"] for name in NAMES} == {*READERS}
+    assert {run_json("info", str(KEPT / name))["format"] for name in NAMES} == {
+        *READERS
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_sample_is_what_the_model_gives(
     name: str, fresh: Mapping[str, bytes], tmp_path: Path
 ) -> None:
-    kept, now = history(KEPT / name), history(put(tmp_path / name, fresh[name]))
-    np.testing.assert_allclose(kept.time, now.time, rtol=1e-6)
+    stored_history, fresh_history = (
+        read_box_history(KEPT / name),
+        read_box_history(put(tmp_path / name, fresh[name])),
+    )
+    np.testing.assert_allclose(stored_history.time, fresh_history.time, rtol=1e-6)
     np.testing.assert_allclose(
-        kept.energy, now.energy, rtol=1e-3, atol=1e-2
-    )  # rounding grows with every contact
+        stored_history.energy, fresh_history.energy, rtol=1e-3, atol=1e-2
+    )  # rounding errors grow with every contact
     assert (KEPT / name).stat().st_size < LARGEST
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> None:
-    health = answer("info", str(KEPT / name))["health"]
+    health = run_json("info", str(KEPT / name))["health"]
     if not name.endswith(
         ("matsum", "d3plot", "d3thdt")
-    ):  # have no energies of the whole model, or no external work
+    ):  # these have no energies of the model, or no external work
         assert health["energy_ratio_min"] > 0.999
         assert health["energy_ratio_max"] < 1.001
         assert health["sliding_share"] < 1e-6
@@ -82,8 +87,12 @@ def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> 
     [name for name in NAMES if name.endswith(("matsum", "binout", "d3plot", "d3thdt"))],
 )
 def test_one_run_has_one_answer_in_every_file_of_its_parts(name: str) -> None:
-    found = answer("suggest", "--td", "0.37", "--part", "box", str(KEPT / name))
-    assert found["recommended"]["tr"] == pytest.approx(0.09703, abs=sample_box.INTERVAL)
-    assert found["flight"]["source"] == "momentum"
-    assert found["flight"]["start"] == pytest.approx(0.0865, abs=sample_box.INTERVAL)
-    assert found["flight"]["end"] == pytest.approx(0.379, abs=sample_box.INTERVAL)
+    suggestion = run_json("suggest", "--td", "0.37", "--part", "box", str(KEPT / name))
+    assert suggestion["recommended"]["tr"] == pytest.approx(
+        0.09703, abs=sample_box.INTERVAL
+    )
+    assert suggestion["flight"]["source"] == "momentum"
+    assert suggestion["flight"]["start"] == pytest.approx(
+        0.0865, abs=sample_box.INTERVAL
+    )
+    assert suggestion["flight"]["end"] == pytest.approx(0.379, abs=sample_box.INTERVAL)

@@ -1,4 +1,4 @@
-"""What must hold of the package as a whole: the direction of its imports, and what a command loads."""
+"""Structure of the package: the direction of its imports, and the modules that a command loads."""
 
 import ast
 import re
@@ -18,7 +18,7 @@ from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 PACKAGE = ROOT / "d2rpick"
 
-# Each folder imports only from itself and from those on the lines above its own.
+# Each folder imports only from itself and from the lines above its own.
 LAYERS = (
     ("base",),
     ("histories", "deck"),
@@ -33,42 +33,44 @@ LAYERS = (
     ("cli",),
     ("__main__",),
 )
-# The only modules that may import these.
+# The only folders that may import these libraries.
 RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for types
 
 
-def name_of(path: Path) -> str:
-    """Name of a module within the package."""
+def name_module(path: Path) -> str:
+    """Return the name of a module within the package."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(part for part in parts if part != "__init__") or "d2rpick"
 
 
-MODULES = {name_of(path): path for path in PACKAGE.rglob("*.py")}
+MODULES = {name_module(path): path for path in PACKAGE.rglob("*.py")}
 
 
-def parsed(module: str) -> ast.Module:
-    """The source of a module."""
+def parse_module(module: str) -> ast.Module:
+    """Return the syntax tree of a module."""
     return ast.parse(MODULES[module].read_text("utf-8"))
 
 
-def statements(module: str) -> Iterator[ast.AST]:
-    """All statements in the source of a module, however deep, without their expressions."""
-    rest: list[ast.AST] = [parsed(module)]
-    while rest:
-        yield (node := rest.pop())
-        rest += [
-            one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr)
+def list_statements(module: str) -> Iterator[ast.AST]:
+    """Yield all statements of a module, nested ones included, without their expressions."""
+    nodes_to_visit: list[ast.AST] = [parse_module(module)]
+    while nodes_to_visit:
+        yield (node := nodes_to_visit.pop())
+        nodes_to_visit += [
+            child
+            for child in ast.iter_child_nodes(node)
+            if not isinstance(child, ast.expr)
         ]
 
 
 @cache
-def imports(module: str) -> frozenset[str]:
-    """Names of all modules that a module imports, also for type checking, those of the package without its name."""
+def list_imports(module: str) -> frozenset[str]:
+    """Return the names of all modules that a module imports, also for type checking; without the package's name."""
     return frozenset(_imports(module))
 
 
 def _imports(module: str) -> Iterator[str]:
-    for node in statements(module):
+    for node in list_statements(module):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -84,45 +86,45 @@ def _imports(module: str) -> Iterator[str]:
 LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
 INNER = sorted(
     name for name in MODULES if name != "d2rpick"
-)  # the public face stands above all
+)  # the public names are above all layers
 
 
-def folder(module: str) -> str:
-    """Folder of a module at the root of the package."""
+def name_folder(module: str) -> str:
+    """Return the top folder of a module in the package."""
     return module.partition(".")[0]
 
 
 def test_every_folder_has_its_layer() -> None:
-    assert {folder(module) for module in INNER} == {*LAYER}
+    assert {name_folder(module) for module in INNER} == {*LAYER}
 
 
 def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
     inner = {*INNER}
-    found = {
+    wrong_imports = {
         (module, name)
         for module in INNER
-        for name in imports(module) & inner
-        if folder(name) != folder(module)
-        and LAYER[folder(name)] >= LAYER[folder(module)]
+        for name in list_imports(module) & inner
+        if name_folder(name) != name_folder(module)
+        and LAYER[name_folder(name)] >= LAYER[name_folder(module)]
     }
-    assert not found
+    assert not wrong_imports
     assert not [
-        module for module in INNER if "d2rpick" in imports(module)
-    ]  # the public face stands above all
+        module for module in INNER if "d2rpick" in list_imports(module)
+    ]  # the public names are above all layers
 
 
 def test_the_command_line_knows_the_library_results_and_base_alone() -> None:
-    known = {
-        folder(name)
+    known_folders = {
+        name_folder(name)
         for module in INNER
-        if folder(module) == "cli"
-        for name in imports(module) & {*INNER}
+        if name_folder(module) == "cli"
+        for name in list_imports(module) & {*INNER}
     }
-    assert known == {"cli", "api", "report", "base"}
+    assert known_folders == {"cli", "api", "report", "base"}
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph = {module: (imports(module) & {*INNER}) - {module} for module in INNER}
+    graph = {module: (list_imports(module) & {*INNER}) - {module} for module in INNER}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
 
 
@@ -131,22 +133,22 @@ def test_a_library_stays_behind_its_module(library: str) -> None:
     importing = {
         module
         for module in MODULES
-        if library in {folder(name) for name in imports(module)}
+        if library in {name_folder(name) for name in list_imports(module)}
     }
     assert importing
-    assert {folder(module) for module in importing} <= {*RESERVED[library]}
+    assert {name_folder(module) for module in importing} <= {*RESERVED[library]}
 
 
 def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
     importing = {
         module
         for module in MODULES
-        if "validation" in {folder(name) for name in imports(module)}
+        if "validation" in {name_folder(name) for name in list_imports(module)}
     }
     assert importing == {"cli.models"}
     top = [
         ast.unparse(node)
-        for node in parsed("cli.models").body
+        for node in parse_module("cli.models").body
         if not isinstance(node, ast.FunctionDef)
     ]
     assert not [text for text in top if "import" in text and "validation" in text]
@@ -159,8 +161,8 @@ def test_only_the_command_line_prints_and_exits() -> None:
     called = {
         (module, ast.unparse(node.func))
         for module, path in MODULES.items()
-        if folder(module) != "cli" and PRINTS.search(path.read_text("utf-8"))
-        for node in ast.walk(parsed(module))
+        if name_folder(module) != "cli" and PRINTS.search(path.read_text("utf-8"))
+        for node in ast.walk(parse_module(module))
         if isinstance(node, ast.Call)
     }
     assert not {
@@ -173,37 +175,37 @@ def test_only_the_command_line_prints_and_exits() -> None:
 SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
 
 
-def swapped(tree: ast.Module) -> Iterator[str]:
-    """What a test module sets attributes or entries of: the name that it begins with."""
+def list_swapped(tree: ast.Module) -> Iterator[str]:
+    """Yield the first name of each expression whose attributes or entries a test module replaces by monkeypatch."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and SWAP.search(ast.unparse(node.func)):
             yield re.findall(r"\w+", ast.unparse(node.args[0]))[0]
 
 
 def test_tests_swap_names_of_the_standard_library_alone() -> None:
-    """Where a module of ours moves, a test that swaps a name in it would have to be written anew."""
+    """A test that replaces a name of our modules must be rewritten if the module moves."""
     sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("*.py")}
     for path, tree in (
         (path, ast.parse(text)) for path, text in sources.items() if SWAP.search(text)
     ):
         froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         theirs = {
-            one.name
+            name.name
             for node in froms
             if node.module in sys.stdlib_module_names
-            for one in node.names
+            for name in node.names
         }
-        assert {*swapped(tree)} <= theirs | sys.stdlib_module_names, path
+        assert {*list_swapped(tree)} <= theirs | sys.stdlib_module_names, path
 
 
 def test_no_file_is_mapped_into_memory() -> None:
-    """Where a mapped file is cut by another program, the system ends the process."""
-    assert not [module for module in MODULES if "mmap" in imports(module)]
+    """If another program cuts a mapped file, the system kills the process."""
+    assert not [module for module in MODULES if "mmap" in list_imports(module)]
 
 
 @cache
-def loaded(*args: str) -> frozenset[str]:
-    """Modules that a call of the program has loaded by its end."""
+def list_loaded(*args: str) -> frozenset[str]:
+    """Return the modules that a call of the program has loaded when it ends."""
     code = (
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
         "from d2rpick.__main__ import main; main()"
@@ -221,21 +223,20 @@ def loaded(*args: str) -> frozenset[str]:
 
 
 @cache
-def beside(libraries: str) -> frozenset[str]:
-    """Modules of a process that imports nothing but some libraries."""
-    return frozenset(
-        printed_by(f"import sys, {libraries}; print(*sys.modules)").split()
-    )
+def list_loaded_beside(libraries: str) -> frozenset[str]:
+    """Return the modules of a process that imports only these libraries."""
+    return frozenset(run_code(f"import sys, {libraries}; print(*sys.modules)").split())
 
 
-def share(modules: frozenset[str]) -> float:
-    """How much of the package these of its modules are, by the bytes of their sources."""
+def compute_share(modules: frozenset[str]) -> float:
+    """Return the share of the package that these modules are, by source size [bytes]."""
     size = {name: path.stat().st_size for name, path in MODULES.items()}
     loaded = {name.removeprefix("d2rpick.") for name in modules}
     return sum(size[name] for name in loaded) / sum(size.values())
 
 
-# What else of the standard library and of numpy costs start-up, and an answer to a plain table does without.
+# Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
+# need.
 UNNEEDED = {
     *(
         "pathlib",
@@ -275,7 +276,7 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
 
 @pytest.mark.parametrize(
-    ("args", "libraries", "most"),
+    ("args", "libraries", "module_limit"),
     [
         (("--help",), "click", 0.02),
         (("--version",), "click", 0.02),
@@ -294,18 +295,18 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
     ],
 )
 def test_a_command_loads_only_what_its_answer_needs(
-    args: tuple[str, ...], libraries: str, most: float
+    args: tuple[str, ...], libraries: str, module_limit: float
 ) -> None:
-    """No library but these, and so much of the package at most: a file more is worth a thought."""
-    there = beside(libraries)
-    assert "d2rpick" not in there
-    mine = loaded(*args) - there
-    own = frozenset(name for name in mine if folder(name) == "d2rpick")
-    assert {folder(name) for name in mine - own} <= {
+    """No other library, and at most this share of the package: a further module must be justified."""
+    libraries_beside = list_loaded_beside(libraries)
+    assert "d2rpick" not in libraries_beside
+    mine = list_loaded(*args) - libraries_beside
+    own_modules = frozenset(name for name in mine if name_folder(name) == "d2rpick")
+    assert {name_folder(name) for name in mine - own_modules} <= {
         *sys.stdlib_module_names,
         *re.findall(r"\w+", libraries),
     }
-    assert share(own) <= most
+    assert compute_share(own_modules) <= module_limit
 
 
 @pytest.mark.parametrize(
@@ -322,16 +323,16 @@ def test_a_command_loads_only_what_its_answer_needs(
     ],
 )
 def test_an_answer_needs_little_of_what_python_has(args: tuple[str, ...]) -> None:
-    mine = loaded(*args) - beside("click, numpy")
+    mine = list_loaded(*args) - list_loaded_beside("click, numpy")
     assert not mine & (UNNEEDED if args[-1] == ENERGY else UNNEEDED - {"array"})
 
 
 def test_a_small_deck_needs_little_of_what_python_has() -> None:
-    assert not (loaded("check", DECK) - beside("click")) & UNNEEDED
+    assert not (list_loaded("check", DECK) - list_loaded_beside("click")) & UNNEEDED
 
 
-def printed_by(code: str) -> str:
-    """What a fresh interpreter prints."""
+def run_code(code: str) -> str:
+    """Return the output of a fresh interpreter."""
     result = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
@@ -344,9 +345,9 @@ def printed_by(code: str) -> str:
 
 
 def test_the_package_alone_imports_nothing() -> None:
-    """What typing and its like make is looked through for garbage, unless the command line comes first."""
+    """Otherwise garbage collection scans the objects of typing and the like, unless the command line comes first."""
     code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
-    assert {*printed_by(code).split()} <= {
+    assert {*run_code(code).split()} <= {
         "d2rpick",
         "d2rpick.api",
         "d2rpick.base",
@@ -359,14 +360,14 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
         "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()) < gc.get_freeze_count()));"
         "sys.argv = ['d2rpick', '--help']; from d2rpick.__main__ import main; main()"
     )
-    assert printed_by(code).splitlines()[-1] == "True"
+    assert run_code(code).splitlines()[-1] == "True"
 
 
 def test_the_command_line_offers_the_formats_of_models_there_are() -> None:
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
 
-# The result of each command that knows JSON, and the number of its schema.
+# The result of each command with JSON output, and the version of its schema.
 SCHEMAS = [
     f"schemas/{name}.json"
     for name in (

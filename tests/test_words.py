@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.examples import PAGES, prose, text_of
+from tests.examples import PAGES, read_page, strip_blocks
 from tests.reference import PAGES as GENERATED
 
 # Pages that follow from the code, quote what is to be avoided, or are for developers.
@@ -43,7 +43,10 @@ OPENINGS = ("Of ", "Where ", "Refused ", "Left ", "Beyond that ")
 def paragraphs(page: str) -> Iterator[str]:
     """Paragraphs and items of lists, without headings, tables, pictures, code and targets of links."""
     text = re.sub(
-        r"^(?:    .*|#.*|\|.*|!\[.*)$", "", prose(text_of(page)), flags=re.MULTILINE
+        r"^(?:    .*|#.*|\|.*|!\[.*)$",
+        "",
+        strip_blocks(read_page(page)),
+        flags=re.MULTILINE,
     )
     text = re.sub(r"\]\([^)]*\)", "]", text)
     text = re.sub(r"`[^`]*`", "code", text)
@@ -84,13 +87,16 @@ def test_sentences_begin_plainly(page: str) -> None:
 
 @pytest.mark.parametrize("page", READ)
 def test_no_page_has_a_word_of_the_list(page: str) -> None:
-    assert not BANNED.findall(prose(text_of(page)))
+    assert not BANNED.findall(strip_blocks(read_page(page)))
 
 
 @pytest.mark.parametrize("page", READ)
 def test_one_thing_has_one_name(page: str) -> None:
     text = re.sub(
-        r"`[^`]*`|^#.*$|\]\([^)]*\)", "", prose(text_of(page)), flags=re.MULTILINE
+        r"`[^`]*`|^#.*$|\]\([^)]*\)",
+        "",
+        strip_blocks(read_page(page)),
+        flags=re.MULTILINE,
     )
     assert not {
         name: found
@@ -103,7 +109,7 @@ def test_one_thing_has_one_name(page: str) -> None:
     "page", [page for page in READ if not page.startswith(REFERENCE)]
 )
 def test_a_page_is_read_in_ten_minutes(page: str) -> None:
-    assert len(prose(text_of(page)).split()) <= LONGEST_PAGE
+    assert len(strip_blocks(read_page(page)).split()) <= LONGEST_PAGE
 
 
 def test_the_measures_of_words_find_what_they_are_for() -> None:

@@ -1,4 +1,4 @@
-"""glstat and matsum as LS-DYNA writes them, from numbers."""
+"""glstat and matsum texts as LS-DYNA writes them, from numbers."""
 
 from collections.abc import Sequence
 
@@ -18,29 +18,37 @@ LABELS = (
 LAST = b" time per zone cycle.(nanosec)..             0\n"
 
 
-def glstat_line(label: str, value: float) -> bytes:
+def format_glstat_line(label: str, value: float) -> bytes:
     return f" {label:.<31s}{value:14.5E}\n".encode()
 
 
-def glstat_blocks(times: ArrayLike, energies: ArrayLike) -> list[bytes]:
-    """One block per state: controller line, values (other than the energies: their rank), two blank lines."""
-    rest = {label: glstat_line(label, rank) for rank, label in enumerate(LABELS)}
-    rest["spring and damper energy"] = glstat_line("spring and damper energy", 1e-20)
-    fixed = [rest[label] for label in LABELS]
-    place = LABELS.index("internal energy")
-    before, behind = b"".join(fixed[:place]), b"".join(fixed[place + 1 :]) + LAST
+def make_glstat_blocks(times: ArrayLike, energies: ArrayLike) -> list[bytes]:
+    """Return a block per state: controller line, values, two blank lines; values other than energies are their rank."""
+    other_labels = {
+        label: format_glstat_line(label, rank) for rank, label in enumerate(LABELS)
+    }
+    other_labels["spring and damper energy"] = format_glstat_line(
+        "spring and damper energy", 1e-20
+    )
+    fixed = [other_labels[label] for label in LABELS]
+    energy_rank = LABELS.index("internal energy")
+    before_energy, after_energy = (
+        b"".join(fixed[:energy_rank]),
+        b"".join(fixed[energy_rank + 1 :]) + LAST,
+    )
     return [
         b" dt of cycle%8d is controlled by solid         100449 of part        10\n\n" % (24 * state + 1)
-        + glstat_line("time", time) + before + glstat_line("internal energy", energy) + behind + b"\n\n"
+        + format_glstat_line("time", time) + before_energy
+        + format_glstat_line("internal energy", energy) + after_energy + b"\n\n"
         for state, (time, energy) in enumerate(zip(np.asarray(times), np.asarray(energies), strict=True))
     ]  # fmt: skip
 
 
-def glstat_text(times: ArrayLike, energies: ArrayLike) -> bytes:
-    return HEAD + b"\n\n" + b"".join(glstat_blocks(times, energies))
+def make_glstat_text(times: ArrayLike, energies: ArrayLike) -> bytes:
+    return HEAD + b"\n\n" + b"".join(make_glstat_blocks(times, energies))
 
 
-def matsum_head(ids: Sequence[int]) -> bytes:
+def make_matsum_head(ids: Sequence[int]) -> bytes:
     titles = b"".join(b"%9d     %-72s\n" % (id_, b"Part %d" % id_) for id_ in ids)
     return (
         HEAD
@@ -50,8 +58,8 @@ def matsum_head(ids: Sequence[int]) -> bytes:
     )
 
 
-def matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
-    """Lines of one part; numbers other than its internal energy are 0."""
+def make_matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
+    """Return the lines of one part; numbers other than its internal energy are 0."""
     zero = b"   0.0000E+00"
     number = b"%5d             " % id_ if id_ < 100_000 else b"%8d          " % id_
     text = (
@@ -67,19 +75,19 @@ def matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
     )
 
 
-def matsum_state(
+def make_matsum_state(
     time: float, ids: Sequence[int], energies: ArrayLike, lines: int = 4
 ) -> bytes:
     parts = zip(ids, np.asarray(energies).tolist(), strict=True)
     return f" time ={time:13.4E}\n".encode() + b"".join(
-        matsum_part(id_, energy, lines) for id_, energy in parts
+        make_matsum_part(id_, energy, lines) for id_, energy in parts
     )
 
 
-def matsum_text(
+def make_matsum_text(
     times: ArrayLike, ids: Sequence[int], energies: ArrayLike, lines: int = 4
 ) -> bytes:
     states = zip(np.asarray(times).tolist(), np.asarray(energies), strict=True)
-    return matsum_head(ids) + b"".join(
-        matsum_state(time, ids, row, lines) for time, row in states
+    return make_matsum_head(ids) + b"".join(
+        make_matsum_state(time, ids, row, lines) for time, row in states
     )

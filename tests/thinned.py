@@ -1,8 +1,8 @@
-"""Small copies of computed runs, for the tests: ``python -m tests.thinned FOLDER`` writes those of tests/data anew.
+"""Reduce computed runs to the small copies in tests/data: ``python -m tests.thinned FOLDER`` writes them again.
 
-FOLDER holds the runs as OpenRadioss wrote them, and the tables made of them.  A time history keeps its head, every
-n-th state and the last one up to a time, and of its parts the variables that are read; what it says of nodes,
-interfaces and subsets goes.  A table keeps the columns that are named.
+FOLDER holds the runs as OpenRadioss wrote them, and the tables made of them.  A reduced time history keeps its head,
+every n-th state and the last one up to a time, and the variables of parts that d2rpick reads; nodes, interfaces and
+subsets are dropped.  A reduced table keeps the named columns.
 """
 
 import csv
@@ -26,7 +26,7 @@ SILENT = (1, 3, 4, 5, 6)  # without the kinetic energy
 
 
 class Thinned(NamedTuple):
-    """What stays of a time history."""
+    """Selection of the states and variables of a time history that are kept."""
 
     every: int
     end: float = np.inf
@@ -64,101 +64,108 @@ TABLES = {
 }
 
 
-def thin(data: bytes, kept: Thinned) -> bytes:
-    """Time history without the states, variables of parts and groups that are not kept."""
-    records, made = bodies(data), T01Writer()
+def thin(data: bytes, selection: Thinned) -> bytes:
+    """Return a time history with only the selected states and part variables, and without groups."""
+    records, writer = split_records(data), T01Writer()
     for _ in range(2):
-        made.record(next(records))
+        writer.record(next(records))
     counts = next(records)
-    if len(counts) == 4:  # of newer codes
-        for record in (counts, *islice(records, *integers(counts))):
-            made.record(record)
+    if len(counts) == 4:  # written by newer codes
+        for record in (counts, *islice(records, *read_integers(counts))):
+            writer.record(record)
         counts = next(records)
-    parts, materials, properties, subsets, groups, variables = integers(counts)
-    made.integers(parts, materials, properties, subsets, 0, variables)
+    parts, materials, properties, subsets, groups, variables = read_integers(counts)
+    writer.integers(parts, materials, properties, subsets, 0, variables)
     if variables:
-        made.record(next(records))
-    before, places = 0, list[int]()
+        writer.record(next(records))
+    first_position, positions = 0, list[int]()
     for _ in range(parts):
         head = next(records)
-        codes = integers(next(records)) if integers(head)[-1] else ()
-        own = [place for place, code in enumerate(codes) if code in kept.codes]
-        made.record(head[:-4] + len(own).to_bytes(4))
-        made.integers(*(codes[place] for place in own))
-        places += [before + place for place in own]
-        before += len(codes)
+        codes = read_integers(next(records)) if read_integers(head)[-1] else ()
+        own_positions = [
+            position for position, code in enumerate(codes) if code in selection.codes
+        ]
+        writer.record(head[:-4] + len(own_positions).to_bytes(4))
+        writer.integers(*(codes[position] for position in own_positions))
+        positions += [first_position + position for position in own_positions]
+        first_position += len(codes)
     for record in islice(records, materials + properties):
-        made.record(record)
-    of_subsets = sum(copy_subset(records, made) for _ in range(subsets))
+        writer.record(record)
+    of_subsets = sum(copy_subset(records, writer) for _ in range(subsets))
     of_groups = [skip_group(records) for _ in range(groups)]
     states = zip(
-        *[records] * sum(map(bool, (True, variables, before, of_subsets, *of_groups))),
+        *[records]
+        * sum(map(bool, (True, variables, first_position, of_subsets, *of_groups))),
         strict=True,
     )
     inside = [
-        state for state in states if np.frombuffer(state[0], ">f4")[0] <= kept.end
+        state for state in states if np.frombuffer(state[0], ">f4")[0] <= selection.end
     ]
     of_parts = 1 + bool(variables)
-    for state in [*inside[: -1 : kept.every], inside[-1]]:
+    for state in [*inside[: -1 : selection.every], inside[-1]]:
         for record in state[:of_parts]:
-            made.record(record)
-        made.record(np.frombuffer(state[of_parts], ">f4")[places].tobytes())
-    return bytes(made.data)
+            writer.record(record)
+        writer.record(np.frombuffer(state[of_parts], ">f4")[positions].tobytes())
+    return bytes(writer.data)
 
 
-def copy_subset(records: Iterator[bytes], made: T01Writer) -> int:
-    """Copy a subset without its variables; how many they are."""
+def copy_subset(records: Iterator[bytes], writer: T01Writer) -> int:
+    """Copy a subset without its variables; return their number."""
     head = next(records)
-    children, parts, variables = integers(head[8:20])
-    made.record(head[:16] + bytes(4) + head[20:])
+    children, parts, variables = read_integers(head[8:20])
+    writer.record(head[:16] + bytes(4) + head[20:])
     for record in islice(records, bool(children) + bool(parts)):
-        made.record(record)
+        writer.record(record)
     if variables:
         next(records)
     return variables
 
 
 def skip_group(records: Iterator[bytes]) -> int:
-    """Pass over a group; how many numbers a state has of it."""
-    elements, variables = integers(next(records)[12:20])
+    """Skip a group; return how many numbers of it a state has."""
+    elements, variables = read_integers(next(records)[12:20])
     for _ in range(elements + bool(variables)):
         next(records)
     return elements * variables
 
 
-def bodies(data: bytes) -> Iterator[bytes]:
-    """Contents of the Fortran records."""
-    at = 0
-    while at < len(data):
-        (length,) = struct.unpack_from(">i", data, at)
-        yield data[at + 4 : at + 4 + length]
-        at += 8 + length
+def split_records(data: bytes) -> Iterator[bytes]:
+    """Yield the contents of the Fortran records."""
+    offset = 0
+    while offset < len(data):
+        (length,) = struct.unpack_from(">i", data, offset)
+        yield data[offset + 4 : offset + 4 + length]
+        offset += 8 + length
 
 
-def integers(record: bytes) -> tuple[int, ...]:
+def read_integers(record: bytes) -> tuple[int, ...]:
     return tuple(np.frombuffer(record, ">i4").tolist())
 
 
-def columns_of(text: str, names: tuple[str, ...]) -> str:
-    """Table of some columns, each cell as it was written."""
-    kept = io.StringIO()
-    writer = csv.DictWriter(kept, names, extrasaction="ignore", lineterminator="\n")
+def choose_columns(text: str, names: tuple[str, ...]) -> str:
+    """Return a table of the named columns, each cell as it was written."""
+    table_text = io.StringIO()
+    writer = csv.DictWriter(
+        table_text, names, extrasaction="ignore", lineterminator="\n"
+    )
     writer.writeheader()
     writer.writerows(csv.DictReader(text.splitlines()))
-    return kept.getvalue()
+    return table_text.getvalue()
 
 
 def main(folder: Path) -> None:
-    """Write all of them, and print their sizes."""
-    for name, kept in RUNS.items():
+    """Write all copies and print their sizes."""
+    for name, selection in RUNS.items():
         write(
             f"{name}.gz",
-            thin(gzip.decompress((folder / f"{name}.gz").read_bytes()), kept),
+            thin(gzip.decompress((folder / f"{name}.gz").read_bytes()), selection),
         )
     for name, columns in TABLES.items():
         write(
             f"{name}.csv.gz",
-            columns_of((folder / f"{name}.csv").read_text("ascii"), columns).encode(),
+            choose_columns(
+                (folder / f"{name}.csv").read_text("ascii"), columns
+            ).encode(),
         )
 
 

@@ -1,4 +1,4 @@
-"""Runs of a few masses as solvers and tables write them."""
+"""Write runs of a few masses in the formats of solvers and as tables."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from tests.made_binout import LsdaWriter
-from tests.made_t01 import MadePart, headed
-from tests.text_files import HEAD, glstat_line, matsum_head
+from tests.made_t01 import MadePart, write_head
+from tests.text_files import HEAD, format_glstat_line, make_matsum_head
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 class Written(NamedTuple):
-    """A run of k masses: ``time`` (n,), ``momentum`` (n, k, 2), energies of each (n, k) and the external ``work`` (n,).
+    """Run of k masses: ``time`` (n,), ``momentum`` (n, k, 2), energies of each (n, k) and the external ``work`` (n,).
 
-    ``damped`` (n,) is what damping has taken.
+    ``damped`` (n,) is the energy that damping has dissipated.
     """
 
     time: Samples
@@ -77,10 +77,10 @@ def as_glstat(run: Written, folder: Path, *, kinetic: bool = True) -> str:
             % (24 * state + 1)
         )
         lines = [
-            glstat_line(name.replace("_", " "), float(values[state]))
+            format_glstat_line(name.replace("_", " "), float(values[state]))
             for name, values in columns.items()
         ]
-        blocks += [head, glstat_line("time", time), *lines, b"\n\n"]
+        blocks += [head, format_glstat_line("time", time), *lines, b"\n\n"]
     path = folder / "glstat"
     path.write_bytes(b"".join(blocks))
     return str(path)
@@ -88,18 +88,18 @@ def as_glstat(run: Written, folder: Path, *, kinetic: bool = True) -> str:
 
 def as_binout(run: Written, folder: Path, *, kinetic: bool = True) -> str:
     """Write a binout with the branch glstat."""
-    made = LsdaWriter()
-    made.cd("/glstat/metadata")
-    made.put("title", b"made for tests".ljust(80), "i1")
+    writer = LsdaWriter()
+    writer.cd("/glstat/metadata")
+    writer.put("title", b"made for tests".ljust(80), "i1")
     columns = {"time": run.time} | _of_glstat(run, kinetic=kinetic)
     for state in range(run.time.size):
-        made.cd(f"/glstat/d{state + 1:06d}")
-        made.put("cycle", [state], "i4")
+        writer.cd(f"/glstat/d{state + 1:06d}")
+        writer.put("cycle", [state], "i4")
         for name, values in columns.items():
-            made.put(name, [values[state]], "f4")
-    made.table()
+            writer.put(name, [values[state]], "f4")
+    writer.table()
     path = folder / "binout"
-    path.write_bytes(bytes(made.data))
+    path.write_bytes(bytes(writer.data))
     return str(path)
 
 
@@ -122,10 +122,10 @@ def as_t01(run: Written, folder: Path, *, kinetic: bool = True) -> str:
     """Write a T01 with one part for each mass."""
     names = (1, 2, 3, 4, 5, 6) if kinetic else (1, 3, 4, 5, 6)
     parts = [
-        MadePart(place + 1, f"mass {place + 1}", names)
-        for place in range(run.masses.size)
+        MadePart(part_index + 1, f"mass {part_index + 1}", names)
+        for part_index in range(run.masses.size)
     ]
-    made = headed(parts, globals_=12)
+    writer = write_head(parts, globals_=12)
     momentum, still = run.momentum.sum(axis=1), [0.0] * 5
     for state, time in enumerate(run.time.tolist()):
         energies = [float(run.internal[state].sum()), float(run.kinetic[state].sum())]
@@ -146,16 +146,16 @@ def as_t01(run: Written, folder: Path, *, kinetic: bool = True) -> str:
             )
             of_parts += [inner, moving] if kinetic else [inner]
             of_parts += [*run.momentum[state, part].tolist(), 0.0, mass]
-        made.state(time, whole + still[:3], of_parts)
+        writer.state(time, whole + still[:3], of_parts)
     path = folder / "runT01"
-    path.write_bytes(bytes(made.data))
+    path.write_bytes(bytes(writer.data))
     return str(path)
 
 
 def as_matsum(run: Written, folder: Path) -> str:
     """Write a matsum with one part for each mass."""
     count = run.masses.size
-    text = [matsum_head(range(1, count + 1))]
+    text = [make_matsum_head(range(1, count + 1))]
     still = f"{0.0:13.4E}"
     for state, time in enumerate(run.time.tolist()):
         text.append(f" time ={time:13.4E}\n".encode())

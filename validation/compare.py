@@ -77,12 +77,17 @@ def compare(reference: Run, switched: Run, td: float) -> Comparison:
     )
     time = reference.time[(reference.time > td) & (reference.time < landing)]
     wanted = np.interp(time, reference.time, reference.internal)
-    found = np.interp(time, switched.time, switched.internal)
-    shifts = tuple(one - other for one, other in zip(ours, theirs, strict=False))
+    switched_energy = np.interp(time, switched.time, switched.internal)
+    shifts = tuple(
+        our_time - their_time
+        for our_time, their_time in zip(ours, theirs, strict=False)
+    )
     if wanted.max() <= _ROUNDING * reference.internal.max():
         return Comparison(None, None, landing, shifts)
-    deviation = float(np.abs(found - wanted).max() / wanted.max())
-    return Comparison(deviation, float(found.mean() / wanted.mean()), landing, shifts)
+    deviation = float(np.abs(switched_energy - wanted).max() / wanted.max())
+    return Comparison(
+        deviation, float(switched_energy.mean() / wanted.mean()), landing, shifts
+    )
 
 
 def main() -> None:
@@ -93,15 +98,15 @@ def main() -> None:
     parser.add_argument("--td", type=float, required=True)
     parser.add_argument("--reference", nargs="+", required=True)
     parser.add_argument("--switched", nargs="+", required=True)
-    given = parser.parse_args()
-    found = compare(read(given.reference), read(given.switched), given.td)
-    known = "round-off until the next contact"
-    if found.deviation is not None:
-        known = f"off by {found.deviation:.3g} of its peak, mean ratio {found.mean_ratio:.3f}"
-    print(f"internal energy after td  {known}")
-    print(f"compared up to            {found.landing:.6g}")
+    options = parser.parse_args()
+    comparison = compare(read(options.reference), read(options.switched), options.td)
+    finding = "round-off until the next contact"
+    if comparison.deviation is not None:
+        finding = f"off by {comparison.deviation:.3g} of its peak, mean ratio {comparison.mean_ratio:.3f}"
+    print(f"internal energy after td  {finding}")
+    print(f"compared up to            {comparison.landing:.6g}")
     print(
-        f"contacts shifted by       {', '.join(f'{1e3 * shift:+.2f}' for shift in found.shifts[:4]) or '-'} ms"
+        f"contacts shifted by       {', '.join(f'{1e3 * shift:+.2f}' for shift in comparison.shifts[:4]) or '-'} ms"
     )
 
 

@@ -63,7 +63,7 @@ TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells th
 _AFTER: Final = 2e-4  # behind td the body is looked at [s]
 
 
-def driven(name: str, folder: Path) -> Drive:
+def drive_model(name: str, folder: Path) -> Drive:
     """Drive a model to its end, or give what an earlier call has."""
     model, deck = MODELS[name], folder / "deck"
     deck.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def driven(name: str, folder: Path) -> Drive:
         return driving.answer(driver, ())
 
 
-def reference(name: str, folder: Path, solver: Path) -> list[str]:
+def compute_reference(name: str, folder: Path, solver: Path) -> list[str]:
     """Compute a model without switching, unless that is done."""
     done = folder / "reference" / f"{name}T01"
     return (
@@ -86,7 +86,7 @@ def reference(name: str, folder: Path, solver: Path) -> list[str]:
     )
 
 
-def places(
+def locate_nodes(
     names: Sequence[str], deck: Path, count: int, time: float
 ) -> NDArray[np.float64]:
     """Where the first nodes that are watched are at a time, shape (count, 3) [m]."""
@@ -95,52 +95,66 @@ def places(
     wanted = [int(line[:10]) for line in lines]
     nodes = text.partition("\n/NODE\n")[2].partition("\n/")[0].splitlines()
     where = {
-        int(line[:10]): [float(line[at : at + 20]) for at in (10, 30, 50)]
+        int(line[:10]): [
+            float(line[node_number : node_number + 20]) for node_number in (10, 30, 50)
+        ]
         for line in nodes
         if line[:1] != "#"
     }
-    leg = next(one for one in map(_history, reversed(names)) if one.time[0] <= time)
+    leg = next(
+        run_names
+        for run_names in map(_read_history, reversed(names))
+        if run_names.time[0] <= time
+    )
     record = leg._head.counts.index(6 * len(wanted))
     columns = [6 * node + axis for node in range(count) for axis in range(3)]
     moved = leg._columns(record, columns)
-    there = np.array([np.interp(time, leg.time, column) for column in moved.T]).reshape(
-        count, 3
-    )
-    return np.asarray(there + [where[node] for node in wanted[:count]])
+    reference_positions = np.array(
+        [np.interp(time, leg.time, column) for column in moved.T]
+    ).reshape(count, 3)
+    return np.asarray(reference_positions + [where[node] for node in wanted[:count]])
 
 
-def _history(name: str) -> TimeHistory:
+def _read_history(name: str) -> TimeHistory:
     return TimeHistory(Path(name).read_bytes(), name)
 
 
-def angle(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def compute_angle(
+    first_positions: NDArray[np.float64], second_positions: NDArray[np.float64]
+) -> float:
     """Angle between two places (n, 3) of a body [degrees]."""
-    left, _, right = np.linalg.svd(
-        (one - one.mean(axis=0)).T @ (other - other.mean(axis=0))
+    left_vectors, _, right_vectors = np.linalg.svd(
+        (first_positions - first_positions.mean(axis=0)).T
+        @ (second_positions - second_positions.mean(axis=0))
     )
     cosine = (
-        np.trace(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right) - 1
+        np.trace(
+            left_vectors
+            @ np.diag([1.0, 1.0, np.linalg.det(left_vectors @ right_vectors)])
+            @ right_vectors
+        )
+        - 1
     ) / 2
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def held(
+def measure_model(
     name: str, folder: Path, solver: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
     """Give what is measured, its value, its limit, and whether it is within that."""
-    goal, found, names = (
+    goal, run_driven, names = (
         GOALS[name],
-        driven(name, folder),
-        reference(name, folder, solver),
+        drive_model(name, folder),
+        compute_reference(name, folder, solver),
     )
     ours = [
         str(path) for path in sorted((folder / "driven").glob(f"{name}T[0-9][0-9]"))
     ]
-    switched = [one for one in found.windows if not one.reason]
+    switched = [item for item in run_driven.windows if not item.reason]
     yield "windows", len(switched), np.inf, bool(switched)
     history = open_run(names).history(Selection())
     for start, end in [
-        one.within(history.time) for one in flights_of(history, Settings())
+        item.within(history.time) for item in flights_of(history, Settings())
     ][: goal.flights]:
         lands = min(read(names).contacts(), key=lambda time: abs(time - end))
         shift = min(
@@ -152,15 +166,15 @@ def held(
             1e3 * goal.landing,
             shift <= goal.landing,
         )
-        for window in (one for one in switched if start < one.td < end):
-            yield from _window(
+        for window in (item for item in switched if start < item.td < end):
+            yield from _measure_window(
                 window, goal, (names, ours), folder / "deck" / f"{name}_0000.rad"
             )
     took = read_timing(str(folder / "reference" / f"{name}_0001.out")).total
     # a reference takes the same for each second; two runs differ by 15 % on a machine that others use
     for until, limit in ((lands, goal.cost), (history.time[-1], _MOST)):
         cost = (
-            sum(_cost(one, until) for one in found.legs)
+            sum(_measure_cost(item, until) for item in run_driven.legs)
             / took
             * history.time[-1]
             / until
@@ -173,43 +187,51 @@ def held(
         )
 
 
-def _cost(leg: Leg, until: float) -> float:
+def _measure_cost(leg: Leg, until: float) -> float:
     """Processor time of a leg, up to a time if it is deformable [s]."""
-    before = until - leg.order.start
+    cost_before = until - leg.order.start
     return (
         0.0
-        if before <= 0
+        if cost_before <= 0
         else (leg.cpu or np.nan)
-        * (1.0 if leg.order.rigid else min(1.0, before / leg.length))
+        * (1.0 if leg.order.rigid else min(1.0, cost_before / leg.length))
     )
 
 
-def _window(
+def _measure_window(
     window: Window, goal: Goal, runs: tuple[Sequence[str], Sequence[str]], deck: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
-    at, (theirs, ours) = (
+    prefix, (theirs, ours) = (
         f"td = {1e3 * window.td:.1f} ms: ",
         (read(names) for names in runs),
     )
-    found = compare(theirs, ours, window.td)
-    early = found.landing - window.td
-    yield f"{at}before the landing [ms]", 1e3 * early, 0.0, early > 0
-    if found.mean_ratio is not None:
+    comparison = compare(theirs, ours, window.td)
+    early = comparison.landing - window.td
+    yield f"{prefix}before the landing [ms]", 1e3 * early, 0.0, early > 0
+    if comparison.mean_ratio is not None:
         yield (
-            f"{at}mean energy to the landing",
-            found.mean_ratio,
+            f"{prefix}mean energy to the landing",
+            comparison.mean_ratio,
             goal.energy,
-            found.mean_ratio >= goal.energy,
+            comparison.mean_ratio >= goal.energy,
         )
-    there, here = (
-        places(names, deck, goal.nodes, window.td + _AFTER) for names in runs
+    reference_positions, driven_positions = (
+        locate_nodes(names, deck, goal.nodes, window.td + _AFTER) for names in runs
     )
-    off, turned = float(np.linalg.norm((here - there).mean(axis=0))), angle(there, here)
-    yield f"{at}out of place [mm]", 1e3 * off, 1e3 * goal.place, off <= goal.place
-    yield f"{at}turned [degrees]", turned, goal.angle, turned <= goal.angle
+    position_error, turned = (
+        float(np.linalg.norm((driven_positions - reference_positions).mean(axis=0))),
+        compute_angle(reference_positions, driven_positions),
+    )
+    yield (
+        f"{prefix}out of place [mm]",
+        1e3 * position_error,
+        1e3 * goal.place,
+        position_error <= goal.place,
+    )
+    yield f"{prefix}turned [degrees]", turned, goal.angle, turned <= goal.angle
 
 
-def refused(name: str, folder: Path) -> bool:
+def is_refused(name: str, folder: Path) -> bool:
     """Whether a wait below half of a period that the deck tells is refused."""
     try:
         Driving(
@@ -232,21 +254,21 @@ def main() -> int:
         metavar="NAME",
         help=f"of {', '.join(GOALS)}; by default all",
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         print("skipped: OPENRADIOSS_PATH is not set")
         return 0
     missed = False
-    for name in given.names or GOALS:
-        folder = given.folder / name
-        for what, value, limit, good in held(name, folder, Path(solver)):
+    for name in options.names or GOALS:
+        folder = options.folder / name
+        for quantity, value, limit, good in measure_model(name, folder, Path(solver)):
             print(
-                f"{name:6} {what:45} {value:8.3g}   goal {limit:<6.3g} {'' if good else 'MISSED'}"
+                f"{name:6} {quantity:45} {value:8.3g}   goal {limit:<6.3g} {'' if good else 'MISSED'}"
             )
             missed |= not good
         if name == "CAR":
-            good = refused(name, folder)
+            good = is_refused(name, folder)
             print(
                 f"{name:6} {'--wait 0.002':45} {'refused' if good else 'taken: MISSED'}"
             )

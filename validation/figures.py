@@ -38,127 +38,133 @@ _VIBRATING: Final = {
 _ABSORBS: Final = 0.05  # least share of the rise of the total energy in a part whose energy is compared
 
 
-def table(name: str) -> NDArray[Any]:
+def read_results(name: str) -> NDArray[Any]:
     """Read a table of results; empty cells are nan."""
     return np.genfromtxt(
         RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
     )
 
 
-def oscillators() -> Figure:
+def draw_oscillators() -> Figure:
     """Residuals that were predicted beside those of the solver, for one and for two modes."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.bar(
+    left_axes, right_axes = figure.subplots(1, 2)
+    left_axes.bar(
         [name for name, _ in _PAIRS],
         [error for _, error in _PAIRS],
         color=REFERENCE,
         width=0.5,
     )
-    left.set(
+    left_axes.set(
         yscale="log",
         ylim=(1e-3, 10),
         ylabel="largest deviation after td [-]",
         xlabel="tr, td [ms]",
     )
-    left.set_title("oscillator: vibration after td, OpenRadioss", fontsize="small")
-    rows = table("chain_scan")
-    right.plot([0, 2.2], [0, 2.2], color=FLIGHT, linewidth=1)
-    single = table("oscillators_scan")
-    right.plot(
+    left_axes.set_title("oscillator: vibration after td, OpenRadioss", fontsize="small")
+    rows = read_results("chain_scan")
+    right_axes.plot([0, 2.2], [0, 2.2], color=FLIGHT, linewidth=1)
+    single = read_results("oscillators_scan")
+    right_axes.plot(
         rows["R_theory"],
         rows["R_sim"],
         ".",
         color=REFERENCE,
         label=f"two modes, {rows.size} switched runs",
     )
-    right.plot(
+    right_axes.plot(
         single["R_theory"],
         single["R_sim"],
         "o",
         color=SWITCHED,
         label=f"one mode, {single.size} switched runs",
     )
-    right.legend(fontsize="x-small")
-    right.set(xlabel="residual predicted [-]", ylabel="residual computed [-]")
-    right.set_title("chain of two springs, and three oscillators", fontsize="small")
-    return _done(figure)
+    right_axes.legend(fontsize="x-small")
+    right_axes.set(xlabel="residual predicted [-]", ylabel="residual computed [-]")
+    right_axes.set_title(
+        "chain of two springs, and three oscillators", fontsize="small"
+    )
+    return _finish_figure(figure)
 
 
-def rollover() -> Figure:
+def draw_rollover() -> Figure:
     """Roll at td and mean energy after td of the shell box, against tr."""
-    rows = np.sort(table("rollover_scan"), order="tr_s")
+    rows = np.sort(read_results("rollover_scan"), order="tr_s")
     tr = 1e3 * rows["tr_s"]
     figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.plot(tr, np.abs(rows["droll_td_deg"]), ".-", color=REFERENCE, linewidth=0.8)
-    left.set(yscale="log", ylabel="|roll error| at td [degrees]")
-    right.plot(
+    left_axes, right_axes = figure.subplots(1, 2)
+    left_axes.plot(
+        tr, np.abs(rows["droll_td_deg"]), ".-", color=REFERENCE, linewidth=0.8
+    )
+    left_axes.set(yscale="log", ylabel="|roll error| at td [degrees]")
+    right_axes.plot(
         tr,
         rows["IEmean_td_to_380ms_J"] / rows["IEmean_ref_J"],
         ".-",
         color=REFERENCE,
         linewidth=0.8,
     )
-    right.axhline(1.0, color=SWITCHED, linewidth=0.8)
-    right.set(ylabel="mean energy after td, over the reference")
-    for axes in (left, right):
+    right_axes.axhline(1.0, color=SWITCHED, linewidth=0.8)
+    right_axes.set(ylabel="mean energy after td, over the reference")
+    for axes in (left_axes, right_axes):
         axes.axvspan(0, 88.5, color=SWITCHED, alpha=0.1, linewidth=0, label="trip")
         axes.axvline(
             88.58, color=GOOD, linestyle="--", linewidth=1, label="recommended tr"
         )
         axes.set_xlabel("tr [ms]")
         axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
-def car() -> Figure:
+def draw_car() -> Figure:
     """Angle at td and mean energy of the car, against tr and against the level."""
-    rows = table("car_runs")
+    rows = read_results("car_runs")
     rows = np.sort(rows[np.char.startswith(rows["run"], "car_a")], order="tr_s")
     tr = 1e3 * rows["tr_s"]
     flying = tr > 38.5
     figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.plot(tr, rows["dangle_td_deg"], ".-", color=REFERENCE, linewidth=0.8)
-    for place, (start, end) in enumerate(((2.3, 11.8), (28.1, 38.5))):
-        left.axvspan(
+    left_axes, right_axes = figure.subplots(1, 2)
+    left_axes.plot(tr, rows["dangle_td_deg"], ".-", color=REFERENCE, linewidth=0.8)
+    for span_index, (start, end) in enumerate(((2.3, 11.8), (28.1, 38.5))):
+        left_axes.axvspan(
             start,
             end,
             color=SWITCHED,
             alpha=0.1,
             linewidth=0,
-            label="_" if place else "contact",
+            label="_" if span_index else "contact",
         )
-    left.axvline(38.05, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
-    left.set(
+    left_axes.axvline(
+        38.05, color=GOOD, linestyle="--", linewidth=1, label="recommended tr"
+    )
+    left_axes.set(
         yscale="log",
         xlabel="tr [ms]",
         ylabel="angle between the two bodies at td [degrees]",
     )
-    left.legend(fontsize="x-small")
+    left_axes.legend(fontsize="x-small")
     level = rows["E_tr_J"] / rows["E_td_ref_J"]
-    for some, colour, name in (
+    for chosen_rows, colour, name in (
         (flying, REFERENCE, "in flight"),
         (~flying, SWITCHED, "during the load"),
     ):
-        right.plot(
-            level[some],
-            rows["meanIE_td_landing_ratio"][some],
+        right_axes.plot(
+            level[chosen_rows],
+            rows["meanIE_td_landing_ratio"][chosen_rows],
             ".",
             color=colour,
             label=name,
         )
-    right.set(
+    right_axes.set(
         xlabel="E(tr)/E(td)", ylabel="mean energy until the landing, over the reference"
     )
-    right.legend(fontsize="x-small")
-    return _done(figure)
+    right_axes.legend(fontsize="x-small")
+    return _finish_figure(figure)
 
 
 def drop() -> Figure:
     """How far the contacts of the falling box move, run by run."""
-    rows = table("drop2_runs")
+    rows = read_results("drop2_runs")
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     axes = figure.subplots()
     numbers = np.arange(1, 8)
@@ -175,33 +181,35 @@ def drop() -> Figure:
         )
     axes.set(xlabel="contact", ylabel="contact comes later by [ms]")
     axes.legend(fontsize="x-small")
-    return _done(figure)
+    return _finish_figure(figure)
 
 
-def absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
+def find_absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
     """Tell which rows of the vibration table are parts that take a fair share of the energy of the landing."""
     total = {row["case"]: row["rise_J"] for row in rows if row["energy"] == "total"}
     shares = rows["rise_J"] / [total[case] for case in rows["case"]]
     return np.asarray((rows["energy"] != "total") & (shares >= _ABSORBS))
 
 
-def vibration() -> Figure:
+def draw_vibration() -> Figure:
     """Residuals by all nodes against the predicted ones, and what differs after the landing against the worth."""
-    rows = table("vibration")
+    rows = read_results("vibration")
     switched = rows[~np.isnan(rows["tr_s"])]
-    absorbing = absorbing_parts(switched)
+    absorbing = find_absorbing_parts(switched)
     figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.plot([0, 2], [0, 2], color=FLIGHT, linewidth=1)
-    right.axvline(0.01, color="grey", linestyle="--", linewidth=1, label="1 % and 5 %")
-    right.axvline(0.05, color="grey", linestyle="--", linewidth=1)
+    left_axes, right_axes = figure.subplots(1, 2)
+    left_axes.plot([0, 2], [0, 2], color=FLIGHT, linewidth=1)
+    right_axes.axvline(
+        0.01, color="grey", linestyle="--", linewidth=1, label="1 % and 5 %"
+    )
+    right_axes.axvline(0.05, color="grey", linestyle="--", linewidth=1)
     for (case, name), colour in zip(
         _VIBRATING.items(), (REFERENCE, FLIGHT, SWITCHED, "#cc79a7", GOOD), strict=True
     ):
-        own = switched[switched["case"] == case]
-        whole = own[own["energy"] == "total"]
+        own_rows = switched[switched["case"] == case]
+        whole = own_rows[own_rows["energy"] == "total"]
         if not np.isnan(whole["R_predicted"]).all():
-            left.plot(
+            left_axes.plot(
                 whole["R_predicted"],
                 whole["R_nodes"],
                 "o",
@@ -209,38 +217,40 @@ def vibration() -> Figure:
                 markersize=4,
                 label=name,
             )
-        right.plot(
+        right_axes.plot(
             whole["worth"], whole["rms"], "o", color=colour, markersize=4, label=name
         )
         parts = switched[absorbing & (switched["case"] == case)]
-        right.plot(
+        right_axes.plot(
             parts["worth"], parts["rms"], "x", color=colour, markersize=4, label="_"
         )
-    left.set(
+    left_axes.set(
         xlabel="residual predicted by the reference [-]",
         ylabel="residual of all nodes [-]",
     )
-    right.set(xscale="log", yscale="log", xlabel="worth of the vibration error [-]")
-    right.set_ylabel("energy after the landing off by, of its rise [-]")
-    right.set_title("dots: all parts, crosses: single parts", fontsize="small")
-    left.legend(fontsize="x-small")
-    right.legend(fontsize="x-small")
-    return _done(figure)
+    right_axes.set(
+        xscale="log", yscale="log", xlabel="worth of the vibration error [-]"
+    )
+    right_axes.set_ylabel("energy after the landing off by, of its rise [-]")
+    right_axes.set_title("dots: all parts, crosses: single parts", fontsize="small")
+    left_axes.legend(fontsize="x-small")
+    right_axes.legend(fontsize="x-small")
+    return _finish_figure(figure)
 
 
 FIGURES: Final[Mapping[str, Callable[[], Figure]]] = {
-    "oscillators": oscillators, "rollover": rollover, "car": car, "drop": drop,
-    "vibration": vibration,
+    "oscillators": draw_oscillators, "rollover": draw_rollover, "car": draw_car, "drop": drop,
+    "vibration": draw_vibration,
 }  # fmt: skip
 
 
-def _done(figure: Figure) -> Figure:
+def _finish_figure(figure: Figure) -> Figure:
     for axes in figure.axes:
-        _grid(axes)
+        _show_grid(axes)
     return figure
 
 
-def _grid(axes: Axes) -> None:
+def _show_grid(axes: Axes) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.set_axisbelow(True)
 

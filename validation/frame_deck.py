@@ -167,22 +167,22 @@ class Mesh:
     )
     _numbers: dict[Place, int] = field(default_factory=dict)
 
-    def node(self, place: Iterable[float]) -> int:
+    def node(self, position: Iterable[float]) -> int:
         """Give the number of the node at a place, a new one if there is none."""
-        x, y, z = (round(float(value), 7) + 0.0 for value in place)
+        x, y, z = (round(float(value), 7) + 0.0 for value in position)
         if (x, y, z) not in self._numbers:
             self.places.append((x, y, z))
             self._numbers[x, y, z] = len(self.places)
         return self._numbers[x, y, z]
 
-    def add_beam(self, start: Reals, end: Reals, beside: Reals) -> None:
+    def add_beam(self, start: Reals, end: Reals, side_vector: Reals) -> None:
         """Add the elements of a beam; the node ``beside`` it orients its section."""
         stations = (
             start + share * (end - start)
             for share in np.linspace(0, 1, _BEAM_PIECES + 1)
         )
         numbers = [self.node(station) for station in stations]
-        orients = self.node(beside)
+        orients = self.node(side_vector)
         self.elements[_BEAMS] += [
             [first, second, orients] for first, second in pairwise(numbers)
         ]
@@ -216,17 +216,19 @@ def mesh_frame() -> Mesh:
 
 
 def _add_plate(mesh: Mesh, part: int, centre: Reals) -> None:
-    mesh.add_grid(part, centre, _line(0, _HALF_SIDES), _line(1, _HALF_SIDES))
+    mesh.add_grid(
+        part, centre, _list_points(0, _HALF_SIDES), _list_points(1, _HALF_SIDES)
+    )
 
 
 def _add_foot(mesh: Mesh, top: Reals) -> None:
-    upwards = _line(2, np.linspace(-_FOOT_HEIGHT, 0, _RINGS + 1))
+    upwards = _list_points(2, np.linspace(-_FOOT_HEIGHT, 0, _RINGS + 1))
     for across, along in ((0, 1), (1, 0)):
-        for side in _line(across, _HALF_SIDES[[0, -1]]):
-            mesh.add_grid(_FEET, top + side, _line(along, _HALF_SIDES), upwards)
+        for side in _list_points(across, _HALF_SIDES[[0, -1]]):
+            mesh.add_grid(_FEET, top + side, _list_points(along, _HALF_SIDES), upwards)
 
 
-def _line(axis: int, values: Reals) -> Line:
+def _list_points(axis: int, values: Reals) -> Line:
     """Give points along an axis."""
     return [value * np.eye(3)[axis] for value in values]
 
@@ -238,28 +240,32 @@ def write_deck(landing: Landing) -> str:
     sides = np.linspace(-_GROUND_SIDE / 2, _GROUND_SIDE / 2, 9)
     depth = _FOOT_HEIGHT + _GAP + landing.speed * landing.time
     under = np.array([*_LENGTHS[:2] / 2, -depth])
-    mesh.add_grid(_GROUND, under, _line(0, sides), _line(1, sides))
+    mesh.add_grid(_GROUND, under, _list_points(0, sides), _list_points(1, sides))
     ground = range(frame.stop, len(mesh.places) + 1)
     pushed = mesh.node(_LENGTHS * _PUSHED_CORNER)
     cards = (
-        _HEAD, _MATERIALS, _PROPERTIES, _node_cards(mesh), _part_cards(mesh),
+        _HEAD, _MATERIALS, _PROPERTIES, _write_node_cards(mesh), _write_part_cards(mesh),
         _group(1, "frame", frame), _group(2, "ground", ground), _group(3, "pushed corner", [pushed]),
         _group(4, "frame and main node", [*frame, MAIN_NODE]),
-        _push_cards(), _START.format(speed=-landing.speed, main=MAIN_NODE), _CONTACT, _history_cards(frame), "/END",
+        _push_cards(), _START.format(speed=-landing.speed, main=MAIN_NODE), _CONTACT, _write_history_cards(frame),
+        "/END",
     )  # fmt: skip
     return "\n".join(cards) + "\n"
 
 
-def _node_cards(mesh: Mesh) -> str:
-    places = {**dict(enumerate(mesh.places, start=1)), MAIN_NODE: tuple(_LENGTHS / 2)}
+def _write_node_cards(mesh: Mesh) -> str:
+    positions = {
+        **dict(enumerate(mesh.places, start=1)),
+        MAIN_NODE: tuple(_LENGTHS / 2),
+    }
     lines = (
         f"{number:10d}{x:20.9g}{y:20.9g}{z:20.9g}"
-        for number, (x, y, z) in places.items()
+        for number, (x, y, z) in positions.items()
     )
     return "\n".join(("/NODE", *lines))
 
 
-def _part_cards(mesh: Mesh) -> str:
+def _write_part_cards(mesh: Mesh) -> str:
     lines, numbers = [], count(1)
     for part, (card, elements) in enumerate(
         zip(_PARTS, mesh.elements, strict=True), start=1
@@ -270,19 +276,20 @@ def _part_cards(mesh: Mesh) -> str:
             f"{card.property:10d}{card.material:10d}",
             f"/{card.kind}/{part}",
         ]
-        lines += [_integers([next(numbers), *nodes]) for nodes in elements]
+        lines += [_format_integers([next(numbers), *nodes]) for nodes in elements]
     return "\n".join(lines)
 
 
 def _group(number: int, title: str, nodes: Iterable[int]) -> str:
     listed = list(nodes)
     lines = (
-        _integers(listed[first : first + 10]) for first in range(0, len(listed), 10)
+        _format_integers(listed[first : first + 10])
+        for first in range(0, len(listed), 10)
     )
     return "\n".join((f"/GRNOD/NODE/{number}", title, *lines))
 
 
-def _integers(numbers: Iterable[int]) -> str:
+def _format_integers(numbers: Iterable[int]) -> str:
     return "".join(f"{number:10d}" for number in numbers)
 
 
@@ -303,10 +310,10 @@ def _push_cards() -> str:
     return "\n".join(lines)
 
 
-def _history_cards(nodes: Iterable[int]) -> str:
+def _write_history_cards(nodes: Iterable[int]) -> str:
     return "\n".join((
         "/TH/NODE/1", "frame", "DX        DY        DZ        VX        VY        VZ",
         *(f"{node:10d}{0:10d}node {node}" for node in nodes),
-        "/TH/PART/2", "parts", "DEF       MASS", _integers(range(1, len(_PARTS) + 1)),
-        "/TH/INTER/3", "contact", "DEF", _integers([1]),
+        "/TH/PART/2", "parts", "DEF       MASS", _format_integers(range(1, len(_PARTS) + 1)),
+        "/TH/INTER/3", "contact", "DEF", _format_integers([1]),
     ))  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.histories.opening import Selection, open_run
 from validation.compare import read
-from validation.driven import angle
+from validation.driven import compute_angle
 from validation.nodes import interpolate, read_motion
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Record:
 
     def align(self, reference: Course, since: Reals) -> None:
         """Move the start of the landing to where the total energy differs least from that of a reference."""
-        off = [
+        misfits = [
             np.mean(
                 (self.energies(self.landing + shift + since) - reference.energies)[
                     :, -1
@@ -104,7 +104,7 @@ class Record:
             )
             for shift in _ALIGNED
         ]
-        self.landing += float(_ALIGNED[np.argmin(off)])
+        self.landing += float(_ALIGNED[np.argmin(misfits)])
 
     def course(self, nodes: Nodes, since: Reals) -> Course:
         """Give the run at some times since its landing."""
@@ -137,17 +137,20 @@ def compare_landings(
     """Compare a switched run with its reference after the landing."""
     last = slice(-round(_END * len(reference.energies)), None)
     rises = reference.energies.max(axis=0) - reference.before
-    off = switched.energies - reference.energies
+    energy_differences = switched.energies - reference.energies
     measures = (
-        np.sqrt((off**2).mean(axis=0)),
+        np.sqrt((energy_differences**2).mean(axis=0)),
         switched.energies.max(axis=0) - reference.energies.max(axis=0),
-        off[last].mean(axis=0),
+        energy_differences[last].mean(axis=0),
     )
     shares = np.stack([measure / rises for measure in measures] + [rises], axis=1)
     moved = nodes.centre(switched.places) - nodes.centre(reference.places)
     impulses = [
-        float(np.linalg.norm(one))
-        for one in (switched.impulse - reference.impulse, reference.impulse)
+        float(np.linalg.norm(impulse_difference))
+        for impulse_difference in (
+            switched.impulse - reference.impulse,
+            reference.impulse,
+        )
     ]
     return LandingDifference(
         energies={
@@ -157,5 +160,5 @@ def compare_landings(
         shift=switched.landing - reference.landing,
         impulse=impulses[0] / impulses[1],
         place=float(np.linalg.norm(moved)),
-        turned=angle(reference.places, switched.places),
+        turned=compute_angle(reference.places, switched.places),
     )

@@ -36,10 +36,10 @@ class Nodes:
     places: Reals
     masses: Reals
 
-    def centre(self, places: Reals) -> Reals:
+    def centre(self, positions: Reals) -> Reals:
         """Centre of mass of the nodes at some places (..., nodes, 3)."""
         return np.asarray(
-            np.einsum("n,...nx->...x", self.masses, places) / self.masses.sum()
+            np.einsum("n,...nx->...x", self.masses, positions) / self.masses.sum()
         )
 
 
@@ -77,29 +77,33 @@ def read_nodes(deck: Path) -> Nodes:
             elements.kind, elements.nodes, inventory.coordinates
         )
         for part in np.unique(elements.part).tolist():
-            own = elements.part == part
-            shares = np.ones(own.sum()) if elements.kind == SPRING else sizes[own]
+            own_elements = elements.part == part
+            shares = (
+                np.ones(own_elements.sum())
+                if elements.kind == SPRING
+                else sizes[own_elements]
+            )
             mass = of_parts[part][0]
             if mass is None:
                 raise ValueError(
                     f"{deck}: the mass of part {part} is unknown; give its density and size"
                 )
-            given = ends[own] != NO_NODE  # a triangle has no fourth node
+            is_given = ends[own_elements] != NO_NODE  # a triangle has no fourth node
             of_nodes = (
-                given
-                * (mass * shares / shares.sum() / given.sum(axis=1))[:, np.newaxis]
+                is_given
+                * (mass * shares / shares.sum() / is_given.sum(axis=1))[:, np.newaxis]
             )
-            np.add.at(masses, ends[own][given], of_nodes[given])
+            np.add.at(masses, ends[own_elements][is_given], of_nodes[is_given])
     return Nodes(inventory.coordinates[inventory.watched], masses[inventory.watched])
 
 
 def read_motion(legs: Sequence[Path], nodes: Nodes, start: float, end: float) -> Motion:
     """Read the motion between two times [time] from the time histories of a run."""
-    found = [_motion_of_leg(leg, nodes, start, end) for leg in sorted(legs)]
-    return Motion(*(np.concatenate(pieces) for pieces in zip(*found, strict=True)))
+    motions = [_read_motion_of_leg(leg, nodes, start, end) for leg in sorted(legs)]
+    return Motion(*(np.concatenate(pieces) for pieces in zip(*motions, strict=True)))
 
 
-def _motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
+def _read_motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
     count = len(nodes.places)
     history = TimeHistory(leg.read_bytes(), str(leg))
     inside = (history.time >= start) & (history.time <= end)
@@ -125,30 +129,35 @@ def compare_vibration(
     )
     reference = Motion(*(values[inside] for values in reference))
     wanted = remove_rigid_motion(reference, nodes)
-    found = remove_rigid_motion(interpolate(switched, reference.time), nodes)
+    switched_velocities = remove_rigid_motion(
+        interpolate(switched, reference.time), nodes
+    )
 
     def energy(first: Reals, second: Reals) -> float:
         return float(np.einsum("n,tnx,tnx->", nodes.masses, first, second))
 
-    residual = np.sqrt(energy(found - wanted, found - wanted) / energy(wanted, wanted))
-    correlation = energy(found, wanted) / np.sqrt(
-        energy(found, found) * energy(wanted, wanted)
+    residual = np.sqrt(
+        energy(switched_velocities - wanted, switched_velocities - wanted)
+        / energy(wanted, wanted)
+    )
+    correlation = energy(switched_velocities, wanted) / np.sqrt(
+        energy(switched_velocities, switched_velocities) * energy(wanted, wanted)
     )
     return VibrationError(float(residual), float(correlation))
 
 
 def interpolate(motion: Motion, times: Reals) -> Motion:
     """Give a motion at other times, which lie between its own."""
-    after = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
-    share = (times - motion.time[after - 1]) / (
-        motion.time[after] - motion.time[after - 1]
+    next_state = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
+    share = (times - motion.time[next_state - 1]) / (
+        motion.time[next_state] - motion.time[next_state - 1]
     )
     share = share[:, np.newaxis, np.newaxis]
-    places, velocities = (
-        values[after - 1] + share * (values[after] - values[after - 1])
+    positions, velocities = (
+        values[next_state - 1] + share * (values[next_state] - values[next_state - 1])
         for values in (motion.places, motion.velocities)
     )
-    return Motion(times, places, velocities)
+    return Motion(times, positions, velocities)
 
 
 def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
@@ -165,7 +174,7 @@ def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
     return np.asarray(moving - np.cross(spin[:, np.newaxis], arms))
 
 
-def vibration_energy(motion: Motion, nodes: Nodes) -> float:
+def compute_vibration_energy(motion: Motion, nodes: Nodes) -> float:
     """Mean energy of the vibration [energy]: twice its kinetic energy, as far as the times cover whole periods."""
     moving = remove_rigid_motion(motion, nodes)
     return float(np.einsum("n,tnx,tnx->", nodes.masses, moving, moving) / len(moving))

@@ -30,14 +30,14 @@ def main() -> None:
         "--window", nargs=2, type=float, action="append", default=[], metavar=("TR", "TD"),
         help="rigid from TR to TD [s]; repeatable, in order",
     )  # fmt: skip
-    given = parser.parse_args()
+    options = parser.parse_args()
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         sys.exit("OPENRADIOSS_PATH is not set; it names the folder of OpenRadioss")
     for name in run(
-        MODELS[given.model],
-        given.folder,
-        [tuple(window) for window in given.window],
+        MODELS[options.model],
+        options.folder,
+        [tuple(window) for window in options.window],
         Path(solver),
     ):
         print(name)
@@ -74,12 +74,14 @@ def run(
     return sorted(folder.glob(f"{model.name}T[0-9][0-9]"))
 
 
-def _call(solver: Path, what: str, folder: Path, *options: str) -> None:
+def _call(solver: Path, program_kind: str, folder: Path, *options: str) -> None:
     """Call starter or engine in ``folder``, its words in a log there."""
-    found = [solver / name for name in _PROGRAMS[what] if (solver / name).exists()]
-    if not found:
+    programs = [
+        solver / name for name in _PROGRAMS[program_kind] if (solver / name).exists()
+    ]
+    if not programs:
         sys.exit(
-            f"{solver}: no {' or '.join(_PROGRAMS[what])}; OPENRADIOSS_PATH names the folder of OpenRadioss"
+            f"{solver}: no {' or '.join(_PROGRAMS[program_kind])}; OPENRADIOSS_PATH names the folder of OpenRadioss"
         )
     configuration = os.environ.get("RAD_CFG_PATH", str(solver / "hm_cfg_files"))
     libraries = os.pathsep.join(
@@ -96,12 +98,12 @@ def _call(solver: Path, what: str, folder: Path, *options: str) -> None:
         **os.environ, "RAD_CFG_PATH": configuration, "LD_LIBRARY_PATH": libraries, "OMP_STACKSIZE": "400m",
         "OMP_NUM_THREADS": "1",
     }  # fmt: skip
-    log = folder / f"{what}_{Path(options[1]).stem}.log"
+    log = folder / f"{program_kind}_{Path(options[1]).stem}.log"
     command = [
         "bash",
         "-c",
         'ulimit -s unlimited; exec "$0" "$@"',
-        str(found[0].resolve()),
+        str(programs[0].resolve()),
         *options,
     ]
     with log.open("w") as words:
@@ -115,7 +117,7 @@ def _call(solver: Path, what: str, folder: Path, *options: str) -> None:
         )
     if done.returncode:
         sys.exit(
-            f"{log}: the {what} ended with {done.returncode}; its last words are there"
+            f"{log}: the {program_kind} ended with {done.returncode}; its last words are there"
         )
 
 

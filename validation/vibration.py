@@ -28,9 +28,9 @@ from validation.landing import TOTAL, Record, compare_landings
 from validation.models import MODELS, Model
 from validation.nodes import (
     compare_vibration,
+    compute_vibration_energy,
     read_motion,
     read_nodes,
-    vibration_energy,
 )
 from validation.run import run
 
@@ -78,8 +78,8 @@ class AllNodes(Model):
     def deck(self) -> bytes:
         """Give the starter deck."""
         text = super().deck().decode()
-        before, rest = text.split("/TH/NODE/1\n")
-        after = rest[rest.index("/TH/PART/") :]
+        text_before, text_after = text.split("/TH/NODE/1\n")
+        tail = text_after[text_after.index("/TH/PART/") :]
         nodes = (
             text.partition(f"/GRNOD/NODE/{self.group}\n")[2]
             .partition("\n/")[0]
@@ -92,7 +92,7 @@ class AllNodes(Model):
             if int(node) != self.main
         )
         variables = "DX        DY        DZ        VX        VY        VZ"
-        return f"{self._switch_group(before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
+        return f"{self._switch_group(text_before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{tail}".encode()
 
     def _switch_group(self, text: str) -> str:
         """Let the first rigid body hold the group."""
@@ -150,7 +150,7 @@ _FRAME_STARTS: Final = (
 _FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
 
 
-def _frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
+def _make_frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
     """Give the frame with a speed of landing [m/s]; the ground lies where the frame lands at the same time."""
     landing = Landing(speed, _LANDING + _REACH / speed)
     model = Frame(
@@ -173,11 +173,11 @@ CASES: Final = {
         flight_start=0.0885,
         after_landing=0.06,
     ),
-    "FRAME": _frame_case(
+    "FRAME": _make_frame_case(
         5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))
     ),  # the last one only stops the vibration
-    "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),
-    "FRAME-SLOW": _frame_case(2.5, _FRAME_PAIRS[::2]),
+    "FRAME-FAST": _make_frame_case(10.0, _FRAME_PAIRS[::2]),
+    "FRAME-SLOW": _make_frame_case(2.5, _FRAME_PAIRS[::2]),
     "CAR": Case(
         watch_all_nodes("CAR", group=4, interval=1e-4),
         _CAR_PARTS,
@@ -233,10 +233,10 @@ class Reference:
         """Compare a switched run."""
         landing = self._compare_landings(legs, pair[1])
         start, end = pair[1] + _CLEAR, self.record(pair[1]).landing - _CLEAR
-        wanted, found = (
+        wanted, reference_motion = (
             read_motion(names, self.nodes, start, end) for names in (self.legs, legs)
         )
-        vibration = compare_vibration(wanted, found, self.nodes)
+        vibration = compare_vibration(wanted, reference_motion, self.nodes)
         worth = (
             vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
         )
@@ -284,12 +284,12 @@ class Reference:
         """Mean energy of the vibration in the second half of the flight [J]."""
         landing = self.record(self.case.pairs[0][1]).landing
         start = (self.case.flight_start + landing) / 2
-        return vibration_energy(
+        return compute_vibration_energy(
             read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes
         )
 
 
-def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
+def compute_study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
     """Compute what is missing in a folder; give a row for the smaller step, then one for each pair.
 
     The energies and momenta of the reference are written to ``reference.csv`` in the folder.
@@ -333,7 +333,7 @@ _COLUMNS: Final = (
 )  # fmt: skip
 
 
-def cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
+def list_cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
     """Give the lines of a row in the table of results, one for each energy."""
     pair, vibration = row.pair or (None, None), row.vibration or (None, None)
     shared = (
@@ -368,16 +368,16 @@ def main() -> None:
         metavar="CASE",
         help=f"of {', '.join(CASES)}; by default all",
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         print("skipped: OPENRADIOSS_PATH is not set")
         return
     table = csv.writer(sys.stdout, lineterminator="\n")
     table.writerow(_COLUMNS)
-    for name in given.cases or CASES:
-        for row in study(CASES[name], given.folder / name, Path(solver)):
-            for line in cells(name, row):
+    for name in options.cases or CASES:
+        for row in compute_study(CASES[name], options.folder / name, Path(solver)):
+            for line in list_cells(name, row):
                 table.writerow(
                     [
                         f"{value:.6g}" if isinstance(value, float) else value

@@ -129,7 +129,12 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     deck_names = [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
     table = sets_of_parts.parts_of(
-        run.files, request.settings, model, given=ids, times=times, beside=deck_names
+        run.files,
+        request.settings,
+        model,
+        given_ids=ids,
+        times=times,
+        deck_files=deck_names,
     )
     window = [
         text

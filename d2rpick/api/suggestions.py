@@ -74,7 +74,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
             answers.verify_of,
             question.reference,
             settings=self.situation.settings,
-            known=self.situation,
+            earlier=self.situation,
         )
         return (
             card_judged(question, cards, [(pair.tr, pair.td)], judge) if pair else None

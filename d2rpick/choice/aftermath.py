@@ -1,11 +1,11 @@
-r"""What comes after td: the mean energy that a pair keeps, and what its error is worth in the next contact.
+r"""Predict the time after td: the mean energy that a pair keeps, and its error relative to the next contact.
 
-An elastic energy V that is released at rest is shared equally between internal and kinetic energy, so with a static
-energy S and the vibration energy U of the reference at td the means of the internal energy after td compare as
+An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the static
+energy S and the vibration energy U of the reference run at td, the ratio of the mean internal energies after td is
 
 .. math:: \frac{S + V(t_r)/2}{S + U(t_d)/2}
 
-What fluctuates in the flight bounds U, and with it what is static.
+The fluctuation of the energy in the flight bounds U, and with it S.
 """
 
 from __future__ import annotations
@@ -23,99 +23,95 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
-# Vibration energies are known within this share from lines, swings or signs of parts.
+# Relative accuracy of vibration energies from spectral lines, swings or signs of parts [-].
 _KNOWN_WITHIN: Final = 0.1
-# Of m alike modes that are out of step the energy has a standard deviation of 1/sqrt(8 m) of what they hold together:
-# so much more than it may be there. In a computed car 100 such modes hold what its nodes show.
+# Largest number of like modes out of step: with m of them the energy has a standard deviation of 1/sqrt(8 m) of their
+# energy. The nodes of a computed car show 100 such modes.
 _MODES_OUT_OF_STEP: Final = 110
-# Of e: about the largest double.
+# Largest exponent of e, near the largest double.
 _LARGEST_EXPONENT: Final = 700.0
-# By so much of it the means of computed runs lay beyond what follows from their lines.
+# Means of computed runs exceed the prediction from spectral lines by up to this share [-].
 _OF_SOLVER: Final = 0.005
-# Fewer states do not show what fluctuates.
+# Fewer states do not show the fluctuation.
 _FEWEST_STATES: Final = 8
 
 
 class Kept(NamedTuple):
-    """Lowest and highest mean internal energy after td, over that of the reference [-]."""
+    """Lowest and highest mean internal energy after td, over that of the reference run [-]."""
 
     low: float
     high: float
 
 
 def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
-    """Bound the mean energy after td for one tr; None if nothing tells it."""
+    """Return bounds of the mean energy after td for one tr; None if they are unknown."""
     if situation.at_rest:
         return Kept(1.0, 1.0)
     ratios = [
-        _ratio(candidate.energy, situation.energy_td, *one)
-        for one in _vibration_energies(situation)
+        _ratio(candidate.energy, situation.energy_td, *energies)
+        for energies in _vibration_energies(situation)
     ]
-    known = [ratio for ratio in ratios if np.isfinite(ratio)]
-    if not known:
+    finite = [ratio for ratio in ratios if np.isfinite(ratio)]
+    if not finite:
         return None
-    low, high = min(known), max(known)
+    low = min(finite)
+    high = max(finite)
     if situation.basis != "oscillator":
-        low, high = low - _OF_SOLVER, high + _OF_SOLVER
-    # parts that were not chosen may hand over what they hold
-    beside = situation.together.beside.energy
+        low = low - _OF_SOLVER
+        high = high + _OF_SOLVER
+    # parts that were not chosen may pass on their energy
+    other_energy = situation.together.beside.energy
     return Kept(
         max(low, 0.0),
-        high + (beside / situation.energy_td if situation.energy_td > 0 else 0.0),
+        high + (other_energy / situation.energy_td if situation.energy_td > 0 else 0.0),
     )
 
 
 def _ratio(
     energy_tr: float, energy_td: float, elastic_td: float, whole: float
 ) -> float:
-    """Mean energy after td over that of the reference, from the elastic and the whole vibration energy at td [-]."""
+    """Return the mean energy after td over that of the reference run [-].
+
+    ``elastic_td`` and ``whole`` are the elastic and the whole vibration energy at td [energy].
+    """
     static = max(energy_td - elastic_td, 0.0)
     reference = static + whole / 2
-    return (
-        (static + max(energy_tr - static, 0.0) / 2) / reference
-        if reference > 0
-        else np.nan
-    )
+    if reference > 0:
+        return (static + max(energy_tr - static, 0.0) / 2) / reference
+    return np.nan
 
 
 def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Bounds of the elastic and the whole vibration energy at td, in pairs that go together [energy]."""
+    """Return bounds of the elastic and the whole vibration energy at td, in matching pairs [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
         whole = float(compared.deformation.vibration_energy(situation.td))
-        scales = (
-            (1.0,)
-            if situation.basis == "oscillator"
-            else (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
-        )
+        if situation.basis == "oscillator":
+            scales: tuple[float, ...] = (1.0,)
+        else:
+            scales = (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
         return [(scale * elastic, scale * whole) for scale in scales]
     bounds = vibration_energy_bounds(situation)
     if bounds is None:
         return []
     time, energy = _energies_in_flight(situation)
     mean = float(np.mean(energy))
-    # what damping leaves at td of the mean over the flight
-    left = 1 / float(
-        np.mean(
-            np.exp(
-                np.minimum(
-                    -situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT
-                )
-            )
-        )
-    )
-    # half of the whole is the mean above what is static
+    # share of the mean vibration energy of the flight that damping leaves at td
+    exponents = -situation.flight.damping * (time - situation.td)
+    decay = np.exp(np.minimum(exponents, _LARGEST_EXPONENT))
+    damping_left = 1 / float(np.mean(decay))
+    # half of the vibration energy is the mean above the static energy
     return [
-        (max(situation.energy_td - (mean - whole / 2), 0.0), left * whole)
+        (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
     ]
 
 
 def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
-    """Least and largest vibration energy that an energy with these fluctuations has in the flight [energy].
+    """Return the smallest and largest vibration energy that can cause the fluctuations in the flight [energy].
 
-    No vibration swings by more than it holds; many modes out of step swing by much less.
+    No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
     """
     time, energy = _energies_in_flight(situation)
     if time.size < _FEWEST_STATES:
@@ -123,22 +119,23 @@ def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
     since = time - time[0]
     swing = energy - np.polyval(np.polyfit(since, energy, 2), since)
     largest = max(2 * float(energy.mean()), 0.0)
-    least = min(float(np.ptp(swing)), largest)
-    return least, max(
-        least, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
+    smallest = min(float(np.ptp(swing)), largest)
+    return smallest, max(
+        smallest, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
     )
 
 
 def _energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
-    """Times and energies of the flight, up to td if its end is not known [time], [energy]."""
-    start, end = situation.flight.start, situation.flight.end
+    """Return times and energies of the flight, up to td if its end is unknown [time], [energy]."""
+    start = situation.flight.start
+    end = situation.flight.end
     return situation.history.between(
         np.inf if start is None else start, situation.td if end is None else end
     )
 
 
 class Worth(NamedTuple):
-    """What an error of the vibration is worth: its energy over that of the next contact, at most [-].
+    """Energy of the vibration error over that of the next contact, at most [-].
 
     ``contact`` is the energy that the next contact puts into the parts [energy].
     """
@@ -148,9 +145,9 @@ class Worth(NamedTuple):
 
 
 def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
-    """Compare the error of the vibration of a pair with the next contact; None if that one is not known.
+    """Compare the vibration error of a pair with the next contact; None if that contact is unknown.
 
-    The energy of the error is R^2 U(td).  With an unknown residual the worst one counts, that of equal levels with
+    The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
     opposite signs.
     """
     known, flight = situation.history.known, situation.flight
@@ -175,14 +172,15 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
 
 
 def energy_of_next_contact(situation: Situation) -> float | None:
-    """Energy that the next contact puts into the parts [energy]; None if no contact is seen.
+    """Return the energy that the next contact puts into the parts [energy]; None if no contact is seen.
 
-    That is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy
-    of the fall at the end of the flight.
+    It is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy of
+    the approach at the end of the flight.
     """
-    history, end = situation.history, situation.flight.end
+    history = situation.history
+    end = situation.flight.end
     if end is None:
         return None
-    _, after = history.between(end, np.inf)
-    rise = float(after.max(initial=-np.inf)) - history.energy_at(end)
+    _, energies = history.between(end, np.inf)
+    rise = float(energies.max(initial=-np.inf)) - history.energy_at(end)
     return rise if rise > 0 else compute_energy_of_approach(history, situation.flight)

@@ -1,6 +1,7 @@
-"""From a run to an answer: the recommendation with its rivals and the better td, and the verdict on a pair.
+"""Answer ``suggest`` and ``verify``: recommend a pair, with its rivals and a better td, or judge a given pair.
 
-The command line, ``study``, ``check --history``, ``card`` and Python go this one way, and get the same numbers.
+The command line, ``study``, ``check --history``, ``card`` and Python all call these functions, so that they give the
+same numbers.
 """
 
 from __future__ import annotations
@@ -59,8 +60,8 @@ if TYPE_CHECKING:
 class Verdict(OfTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
-    ``tr_ok`` and ``td_ok`` are None where the record does not tell.  ``computed`` is the energy of the
-    finished switched run, if there is one.
+    ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``computed`` is the energy of the finished
+    switched run, if there is one.
     """
 
     situation: Situation
@@ -76,18 +77,19 @@ class Verdict(OfTd):
 
     @property
     def verified(self) -> bool:
-        """Whether the pair is admissible and not poor, and its vibration is not wrong by more than a half."""
+        """True if the pair is admissible and not poor, and its residual is at most 0.5."""
         residual = self.candidate.residual
-        kept = residual is None or residual <= POOR_RESIDUAL
-        return kept and self.decision.grade != POOR
+        is_kept = residual is None or residual <= POOR_RESIDUAL
+        return is_kept and self.decision.grade != POOR
 
     @cached_property
     def decision(self) -> Decision:
-        """Whether to use the pair, why, and what would be better."""
-        found = self._decide(None)
-        return self._decide(self.better) if found.grade == POOR else found
+        """Verdict on the pair, with reason and cure."""
+        decision = self._decide(None)
+        return self._decide(self.better) if decision.grade == POOR else decision
 
     def _decide(self, better: Pair | None) -> Decision:
+        """Decide on the pair; ``better`` is a better one, if known."""
         unknown = () if self.reasons else ("nothing shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         return decide(
@@ -96,17 +98,17 @@ class Verdict(OfTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A pair that is not poor: another tr for this td, or one at the nearest td that has one; None without."""
+        """A pair that is not poor: another tr for this td, or a pair at the nearest better td; None without one."""
         return way_out(self.situation)
 
     @property
     def quality(self) -> Quality | None:
-        """How good the pair is; None if it is not admissible."""
+        """Grade of the pair; None if it is not admissible."""
         return self.decision.quality if self.admissible else None
 
     @cached_property
     def kept(self) -> Kept | None:
-        """Bounds of the mean energy after td, over that of the reference; None if nothing tells it."""
+        """Bounds of the mean energy after td, over that of the reference run; None if they are unknown."""
         return kept_mean_energy(self.situation, self.candidate)
 
 
@@ -115,41 +117,52 @@ def verify(
     tr: float,
     td: float,
     settings: Settings,
-    known: Situation | None = None,
+    earlier: Situation | None = None,
 ) -> Verdict:
-    """Judge one pair, by what is ``known`` where its td is that one, or nearly so as it is printed.
+    """Judge one pair; the situation ``earlier`` is used if its td is ``td``, else its fits.
 
-    RangeError when a time lies outside the record or tr is not before td.
+    Raises
+    ------
+    RangeError
+        If a time lies outside the record, or tr is not before td.
     """
     _in_order(tr, td)
-    fits = known.fits if known else None
-    return verify_at(
-        known if known and td == known.td else examine(history, td, settings, fits), tr
-    )
+    if earlier and td == earlier.td:
+        return verify_at(earlier, tr)
+    fits = earlier.fits if earlier else None
+    return verify_at(examine(history, td, settings, fits), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> Verdict:
-    """Judge one pair in a situation that is known; RangeError when tr lies outside the record or is not before td."""
-    settings, td = situation.settings, situation.td
+    """Judge one pair in a known situation.
+
+    Raises
+    ------
+    RangeError
+        If tr lies outside the record or is not before td.
+    """
+    settings = situation.settings
+    td = situation.td
     _in_order(tr, td)
     situation.history.energy_at(tr, "tr")
     judged = judge(situation, [tr])
     candidate = judged[0]
-    known = situation.flight.start is not None
+    is_known = situation.flight.start is not None
     share = situation.kinetic_share
-    limit = (
-        POOR_KINETIC_SHARE
-        if settings.max_kinetic_share is None
-        else settings.max_kinetic_share
-    )
+    if settings.max_kinetic_share is None:
+        limit = POOR_KINETIC_SHARE
+    else:
+        limit = settings.max_kinetic_share
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    td_ok = False if outside else None if share is None else share <= limit
+    td_ok = None if share is None else share <= limit
+    if outside:
+        td_ok = False
     return Verdict(
         situation=situation,
         candidate=candidate,
-        tr_ok=candidate.admissible if known else None,
+        tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
         admissible=bool(judged.kept[0]),
         reasons=(*candidate.notes, *over_limits(situation, candidate)),
@@ -158,18 +171,19 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
 
 
 def _in_order(tr: float, td: float) -> None:
+    """Raise RangeError if tr is not before td."""
     if not tr < td:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td"
         )
 
 
-# Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
+# Number of pairs at other peaks that may fail the full examination before the search is given up.
 _MOST_REFUSED = 3
 
 
 class AcceptableWindow(NamedTuple):
-    """From ``start`` to ``end`` [time] every tr is acceptable; ``share`` is its share of the flight up to td [-]."""
+    """Window from ``start`` to ``end`` of acceptable tr [time]; ``share`` is its share of the flight up to td [-]."""
 
     start: float
     end: float
@@ -180,8 +194,8 @@ class AcceptableWindow(NamedTuple):
 class Suggestion(OfTd):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
-    ``td_window`` is where td was chosen, if it was; ``longer`` is the longest acceptable pair in it, where much saving
-    was given up for quality.
+    ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
+    in it, if much rigid time was given up for quality.
     """
 
     situation: Situation
@@ -194,45 +208,48 @@ class Suggestion(OfTd):
 
     @property
     def chosen(self) -> Candidate | None:
-        """The candidate that is recommended."""
+        """The recommended candidate; None without one."""
         return self.candidates.chosen
 
     @property
     def why_none(self) -> str:
-        """Why nothing is recommended; empty where a pair is."""
+        """Reason why nothing is recommended; empty if a pair is."""
         return "; ".join(
-            one.message for one in self.cautions if one.code == "no-candidate"
+            caution.message
+            for caution in self.cautions
+            if caution.code == "no-candidate"
         )
 
     @property
     def recommended(self) -> Pair | None:
-        """The recommended pair."""
+        """The recommended pair; None without one."""
         return self.candidates.pair
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """What the energy alone tells of the time after td, where it is all there is."""
+        """Estimate of the time after td on basis "energy"; None on other bases."""
         if self.situation.basis != "energy":
             return None
         return expectation(self.situation, self.chosen.energy if self.chosen else None)
 
     @cached_property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
-        """First and last acceptable tr of each window of them, on any basis [time]."""
+        """First and last acceptable tr of each window, on any basis [time]."""
         if not self.situation.in_flight:
             return ()
+        # imported here: an oscillator does not need it
         from d2rpick.choice.windows import (
             acceptable_windows,
-        )  # not above: an oscillator does without it
+        )
 
-        found = acceptable_windows(
+        windows = acceptable_windows(
             self.situation, self.candidates, self.chosen.tr if self.chosen else None
         )
-        return tuple((start, end) for start, end in found.tolist())
+        return tuple((start, end) for start, end in windows.tolist())
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """The same where the level alone decides, None on another basis: any tr in one is as good as a crossing."""
+        """Windows of acceptable tr on basis "energy", in which any tr is as good as a crossing; None on other bases."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -243,7 +260,7 @@ class Suggestion(OfTd):
 
     @cached_property
     def decision(self) -> Decision | None:
-        """Whether to use the recommended pair, why, and what would be better; None without a pair."""
+        """Verdict on the recommended pair, with reason and cure; None without a pair."""
         best = self.chosen
         if best is None:
             return None
@@ -251,21 +268,21 @@ class Suggestion(OfTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The better pair, if a residual shows that it is not poor."""
+        """The clearly better pair if its residual shows that it is not poor, else None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
         return better
 
     def decision_on(self, candidate: Candidate) -> Decision:
-        """Decide on one of the candidates, by the rules of `verify`."""
+        """Decide on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
         limits = over_limits(self.situation, candidate)
         return decide(self.situation, candidate, objections=(*objections, *limits))
 
     @property
     def quality(self) -> Quality | None:
-        """How good the recommended pair is; None without one."""
+        """Grade of the recommended pair; None without one."""
         return self.decision.quality if self.decision else None
 
     @cached_property
@@ -275,39 +292,38 @@ class Suggestion(OfTd):
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair where it is better than that recommended by more than what counts as equally good.
+        """The better pair if it is better than the recommended one by more than the limit of equal quality, else None.
 
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
-        better, own = self.better_pair, self.recommended
-        if better is None or own is None:
+        better = self.better_pair
+        recommended = self.recommended
+        if better is None or recommended is None:
             return better
-        if better.residual is not None and own.residual is not None:
+        if better.residual is not None and recommended.residual is not None:
             bound = self.chosen.residual_high if self.chosen else None
-            uncertain = 0.0 if bound is None else bound - own.residual
-            return (
-                better
-                if own.residual - better.residual > max(EQUALLY_GOOD, uncertain)
-                else None
-            )
+            uncertain = 0.0 if bound is None else bound - recommended.residual
+            if recommended.residual - better.residual > max(EQUALLY_GOOD, uncertain):
+                return better
+            return None
         levels = [
             max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5
-            for td in (better.td, own.td)
+            for td in (better.td, recommended.td)
         ]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
-    """Rank the candidates for tr at ``td`` and recommend one; RangeError when td lies outside the record."""
+    """Rank the candidates for tr at ``td`` and recommend one; RangeError if td lies outside the record."""
     return suggest_at(examine(history, td, settings))
 
 
 def suggest_at(
     situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
 ) -> Suggestion:
-    """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too.
+    """Rank the candidates for tr in a known situation, recommend one, and search for a better td.
 
-    ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
+    ``ranked`` are the ranked candidates if they are known, up to the recommended one at least.
     """
     candidates = next(candidates_at([situation])) if ranked is None else ranked
     best = candidates.chosen
@@ -328,32 +344,30 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there.
+    """Return the recommended pair at the nearest energy peak of the flight that has one; None without any.
 
-    The pair is the one that a user finds who asks for that td: the record is examined anew there.
+    The record is examined anew at that td, so that the pair is the answer to a question for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # where nothing tells the end of the flight, it is not sought beyond td
-    end = (
-        situation.td
-        if situation.flight.end is None and not situation.evidence.span
-        else situation.latest_td
-    )
+    # if nothing shows the end of the flight, do not search after td
+    if situation.flight.end is None and not situation.evidence.span:
+        end = situation.td
+    else:
+        end = situation.latest_td
     refused = 0
     for td in sorted(
         situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)
     ):
-        there = situation.at(td)
-        if (
-            there.vibration.doubts
-            or _level_refuses(there)
-            or not (best := _saving(there))
-        ):
+        peak_situation = situation.at(td)
+        if peak_situation.vibration.doubts or _level_refuses(peak_situation):
             continue
-        anew = _anew(situation, td)
-        best = best if anew.sees_as(there) else _saving(anew)
+        best = _saving(peak_situation)
+        if best is None:
+            continue
+        examined = _anew(situation, td)
+        best = best if examined.sees_as(peak_situation) else _saving(examined)
         if best and _holds_as_printed(situation, best.tr, td):
             return best
         refused += 1
@@ -363,7 +377,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def way_out(situation: Situation) -> Pair | None:
-    """Give a pair that is not poor: the recommended tr of this td, else the pair of the nearest better td."""
+    """Return a pair that is not poor: the recommended tr for this td, else the pair of the nearest better td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -374,44 +388,46 @@ def way_out(situation: Situation) -> Pair | None:
 
 
 def _level_refuses(situation: Situation) -> bool:
-    """Whether the level at td alone speaks against any tr: noise makes thousands of peaks below zero, or too high."""
+    """Return True if no tr can suit the level at td, which is negative or too high.
+
+    Noise makes thousands of such peaks, so that this test saves time.
+    """
     if situation.basis != "energy":
         return False
-    level, least = (
-        situation.energy_td,
-        max(0.0, 1 - situation.settings.tolerance - ROUNDING),
-    )
-    return level < -round_off(situation.history) or level * least**2 > most_energy(
-        situation
-    )
+    level = situation.energy_td
+    smallest_share = max(0.0, 1 - situation.settings.tolerance - ROUNDING)
+    return level < -round_off(
+        situation.history
+    ) or level * smallest_share**2 > most_energy(situation)
 
 
 def _saving(situation: Situation) -> Pair | None:
-    """Give what is recommended at a td, where that saves something."""
+    """Return the recommended pair at a td if it saves run time, else None."""
     return next(candidates_at([situation], in_flight=True)).saving
 
 
 def _anew(situation: Situation, td: float) -> Situation:
-    """Look at the same record for another td, as if that had been asked for."""
-    quick = (
-        situation.evidence.span is None
-    )  # an oscillator is sought again, why there is none is not
+    """Examine the same record at another td, as if that td had been given."""
+    # an oscillator is searched again, the reason why there is none is not
+    quick = situation.evidence.span is None
     return examine(
         situation.history, td, situation.settings, situation.fits, quick=quick
     )
 
 
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
-    """Whether ``verify`` would verify a pair in the six digits that people read."""
+    """Return True if ``verify`` admits a pair as rounded to the six printed digits."""
+    # rounding moved a time beyond the record, or both onto each other
     try:
         return verify_at(
             _anew(situation, round_as_read(td)), round_as_read(tr)
         ).admissible
-    except RangeError:  # rounded beyond an end of the record, or onto each other
+    except RangeError:
         return False
 
 
 def _why_none(situation: Situation, ranked: Candidates) -> str:
+    """Return the reason why no candidate is acceptable."""
     if not ranked:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
@@ -435,22 +451,23 @@ def suggest_of(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
+    """Choose tr for ``td``, or both times with td in a window (low, high), or for None in the longest flight [time].
 
-    ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
-    record with the same settings.  For a td in a window: no flight is taken to begin before ``since``, and ``times``
-    are td that are looked at beside the peaks of the energy, by default an even grid [time].
+    With ``with_better`` False no better td is searched for a given td.  ``fits`` are those of an earlier call for the
+    record with the same settings.  If td is chosen, no flight is assumed to begin before ``since``, and ``times`` are
+    tried besides the energy peaks, by default an even grid [time].
 
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
+        If td or the window lies outside the record, there is no flight, or the run cannot be judged.
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
+        # imported here: a given td needs no search
         from d2rpick.choice.suggest_td import (
             choose_td,
-        )  # not above: a td that is given needs no search
+        )
 
         chosen = choose_td(reference.history, td, settings, fits, since, times)
         answer = suggest_at(chosen.situation)
@@ -469,75 +486,77 @@ def verify_of(
     tr: float,
     td: float,
     settings: Settings,
-    known: Situation | None = None,
+    earlier: Situation | None = None,
 ) -> Verdict:
-    """Judge one pair of switch times; errors and ``known`` as for `verify`."""
+    """Judge one pair of a reference run; errors and ``earlier`` as for one pair of a history."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     return _with_health(
-        verify(reference.history, tr, td, settings, known), reference.run
+        verify(reference.history, tr, td, settings, earlier), reference.run
     )
 
 
 def compare_with(
     verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0
 ) -> Verdict:
-    """Hold a finished switched run, read in the same way, against the reference by which its times were judged.
+    """Add to a verdict the comparison of a finished switched run with the reference run that the verdict is based on.
 
-    ``min_mean`` is the least mean energy after td that is expected, as a share of the reference's [-].
+    Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
+    of the reference run [-].
 
     Raises
     ------
     RangeError
-        If one of the two runs does not go on after td.
+        If one of the two runs does not continue after td.
     """
     from d2rpick.choice.comparison import compare
 
-    found = compare(
+    comparison = compare(
         verdict.situation, verdict.candidate.tr, reference, switched, min_mean
     )
     return replace(
         verdict,
-        switched=found,
+        switched=comparison,
         computed=switched.history,
-        admissible=verdict.admissible
-        and not found.objections,  # a wrong motion overrules the verdict
-        reasons=verdict.reasons + found.objections,
+        # a wrong motion overrules the verdict
+        admissible=verdict.admissible and not comparison.objections,
+        reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
     )
 
 
 def _with_health(answer: _Answer, run: Run) -> _Answer:
-    """Add how far the run can be trusted, above all in the rigid window, else in the flight up to td.
+    """Add the health of the run in the rigid window, else in the flight up to td, with its warnings.
 
-    What comes after td does not matter for the choice.
+    The time after td does not matter for the choice.
     """
     answer = replace(
         answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources))
     )
-    history, td = answer.situation.history, answer.situation.td
+    history = answer.situation.history
+    td = answer.situation.td
     balance = read_balance(run.databases, history.parts, td)
     if balance is None:
         return answer
     if isinstance(answer, Verdict):
         start: float | None = answer.candidate.tr
     else:
-        start = (
-            answer.recommended.tr
-            if answer.recommended
-            else answer.situation.earliest_tr
-        )
+        if answer.recommended:
+            start = answer.recommended.tr
+        else:
+            start = answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health, flight = assess(balance, window, locked, td), answer.situation.flight
+    health = assess(balance, window, locked, td)
+    flight = answer.situation.flight
     flies = (
         window is not None
         and flight.within(history.time)[0] <= window[0]
         and answer.situation.in_flight
     )
-    found = cautions_of_health(health, at_rest=answer.situation.at_rest)
-    told: list[Caution] = [
-        one
-        for one in found
-        if not (flies and flight.by_parts and one.code in OF_THE_MODEL)
+    health_cautions = cautions_of_health(health, at_rest=answer.situation.at_rest)
+    relevant: list[Caution] = [
+        caution
+        for caution in health_cautions
+        if not (flies and flight.by_parts and caution.code in OF_THE_MODEL)
     ]
-    return replace(answer, health=health, cautions=(*answer.cautions, *told))
+    return replace(answer, health=health, cautions=(*answer.cautions, *relevant))

@@ -1,18 +1,20 @@
-"""Weights of a site, fitted to what its own runs took.
+"""Fit the weights of a site to the CPU times of its own runs.
 
-With the elements that were computed in a leg, its cycles and its processor time,
+A leg of a run is an engine run of Radioss or a restart segment of LS-DYNA.  For each leg, with its computed elements,
+cycles and CPU time,
 
     E = sum of w_k n_k,     T = E + b N + r R
 
-per cycle: E of the elements and T of all work [us], n_k deformable elements of a formulation, N nodes, R nodes of rigid
-bodies.  Fitted are the w_k, b and r, each relative to its measured value.  What the legs do not tell apart keeps its
-measured ratio to the others.
+per cycle: E is the time of the elements and T that of all work [us], n_k the number of deformable elements of a
+formulation, N that of nodes, R that of rigid-body nodes.  The w_k, b and r are fitted, each relative to its measured
+value.  Unknowns that the legs do not determine keep their measured ratio to the others.
 """
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -42,17 +44,17 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Times of a leg are right within some 5 %, measured ratios of weights within a half: one over the other.
+# CPU times are right within 5 %, the measured ratios of weights within 50 %: the ratio of both [-].
 _DOUBT: Final = 0.1
-# A weight is told by the legs where, with this doubt, they decide more than half of it.
+# A weight is determined by the legs if they decide more than this share of it, at the given doubt [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
 
 class Observation(NamedTuple):
-    """What one leg took per cycle [us], and what it computed.
+    """CPU time of one leg of a run per cycle [us], and what the leg computed.
 
-    ``counts`` are deformable elements by class; ``elements`` is None where the solver gives the total alone.
+    ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
 
     name: str
@@ -65,7 +67,10 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """Weights with what they rest on: ``told`` are the classes that the legs decide, ``misfit`` is relative [-]."""
+    """Fitted weights and their origin.
+
+    ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
+    """
 
     weights: Weights
     told: tuple[str, ...]
@@ -82,52 +87,59 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
     ConfigurationError
         If there is no leg without rigid parts, or none of its elements has a class with a measured weight.
     """
-    deformable = [one for one in observations if not one.rigid_nodes]
-    classes = sorted(
-        {
-            name
-            for one in observations
-            for name, count in one.counts.items()
-            if count and name in MEASURED
-        }
-    )
+    deformable = [
+        observation for observation in observations if not observation.rigid_nodes
+    ]
+    names = set[str]()
+    for observation in observations:
+        names.update(name for name, count in observation.counts.items() if count)
+    classes = sorted(names & MEASURED.keys())
     if not deformable or not classes:
         raise ConfigurationError(
             "no leg without rigid parts has elements of a known formulation; give such a run too"
         )
     start = _start(deformable, classes)
-    matrix, right = _rows(observations, classes)
-    scaled = matrix * start / right[:, np.newaxis]
-    found, told = _solved(scaled)
-    values = dict(zip((*classes, _REST, _RIGID), (found * start).tolist(), strict=True))
-    share = [_share(one, values) for one in deformable]
+    matrix, right_side = _rows(observations, classes)
+    scaled = matrix * start / right_side[:, np.newaxis]
+    solution, is_determined = _solved(scaled)
+    values = dict(
+        zip((*classes, _REST, _RIGID), (solution * start).tolist(), strict=True)
+    )
+    share = [_share(observation, values) for observation in deformable]
     weights = Weights(
         {name: values[name] for name in classes}, float(np.mean(share)), values[_RIGID],
         f"calibrated by {len(observations)} legs",
     )  # fmt: skip
-    misfit = float(np.sqrt(np.mean((scaled @ found - 1) ** 2)))
-    names = (*classes, _REST, _RIGID)
+    misfit = float(np.sqrt(np.mean((scaled @ solution - 1) ** 2)))
+    unknowns = (*classes, _REST, _RIGID)
     return Calibration(
-        weights, tuple(np.array(names)[told].tolist()), misfit, tuple(observations)
+        weights,
+        tuple(np.array(unknowns)[is_determined].tolist()),
+        misfit,
+        tuple(observations),
     )
 
 
 def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples:
-    """Measured weights in the unit of these runs, then the rest per node, then what a node of a rigid body costs."""
+    """Return start values: the measured weights in the unit of these runs, the rest per node, the rigid-node cost."""
     measured = [
-        sum(MEASURED[name] * one.counts.get(name, 0.0) for name in classes)
-        for one in deformable
+        sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
+        for observation in deformable
     ]
     elements = [
-        ELEMENT_SHARE * one.total if one.elements is None else one.elements
-        for one in deformable
+        ELEMENT_SHARE * observation.total
+        if observation.elements is None
+        else observation.elements
+        for observation in deformable
     ]
     scale = float(np.median(np.array(elements) / np.array(measured)))
-    rest = [
-        max(one.total - spent, 1e-6 * one.total)
-        for one, spent in zip(deformable, elements, strict=True)
+    rests = [
+        max(observation.total - spent, 1e-6 * observation.total)
+        for observation, spent in zip(deformable, elements, strict=True)
     ]
-    per_node = float(np.median(np.array(rest) / [one.nodes for one in deformable]))
+    per_node = float(
+        np.median(np.array(rests) / [observation.nodes for observation in deformable])
+    )
     return np.array(
         [*(scale * MEASURED[name] for name in classes), per_node, scale * RIGID_NODE]
     )
@@ -136,36 +148,44 @@ def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples
 def _rows(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
-    rows, right = [], []
-    for one in observations:
-        counts = [one.counts.get(name, 0.0) for name in classes]
-        if one.elements is not None and any(counts):
+    """Return the matrix and the right-hand side of the equations of all legs."""
+    rows, right_side = [], []
+    for observation in observations:
+        counts = [observation.counts.get(name, 0.0) for name in classes]
+        if observation.elements is not None and any(counts):
             rows.append([*counts, 0.0, 0.0])
-            right.append(one.elements)
-        rows.append([*counts, float(one.nodes), float(one.rigid_nodes)])
-        right.append(one.total)
-    return np.array(rows), np.array(right)
+            right_side.append(observation.elements)
+        rows.append([*counts, float(observation.nodes), float(observation.rigid_nodes)])
+        right_side.append(observation.total)
+    return np.array(rows), np.array(right_side)
 
 
 def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Least squares, none below 0, over the unknowns that the rows decide; the others stay 1.  Give both."""
+    """Solve non-negative least squares for the unknowns that the rows determine; return all unknowns and which are.
+
+    Undetermined unknowns stay 1.
+    """
     from scipy.optimize import lsq_linear
 
     normal = scaled.T @ scaled
     resolution = np.linalg.solve(normal + _DOUBT**2 * np.eye(len(normal)), normal)
-    told = np.diag(resolution) > _TOLD
-    found = np.ones(len(normal))
-    if told.any():
-        left = 1 - scaled[:, ~told].sum(axis=1)
-        found[told] = lsq_linear(scaled[:, told], left, bounds=(0.0, np.inf)).x
-    return found, told
+    is_determined = np.diag(resolution) > _TOLD
+    solution = np.ones(len(normal))
+    if is_determined.any():
+        right_side = 1 - scaled[:, ~is_determined].sum(axis=1)
+        solution[is_determined] = lsq_linear(
+            scaled[:, is_determined], right_side, bounds=(0.0, np.inf)
+        ).x
+    return solution, is_determined
 
 
-def _share(one: Observation, values: Mapping[str, float]) -> float:
-    """Share of the elements in a step."""
-    spent = sum(values.get(name, 0.0) * count for name, count in one.counts.items())
-    elements = spent if one.elements is None else one.elements
-    return min(1.0, elements / one.total)
+def _share(observation: Observation, values: Mapping[str, float]) -> float:
+    """Return the share of the elements in the CPU time of a step [-]."""
+    spent = sum(
+        values.get(name, 0.0) * count for name, count in observation.counts.items()
+    )
+    elements = spent if observation.elements is None else observation.elements
+    return min(1.0, elements / observation.total)
 
 
 _US: Final = 1e6
@@ -182,109 +202,116 @@ class _Rigid(NamedTuple):
 def observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
-    """Read what the legs of several runs took; a file of the same content, in a folder named twice or a copy, once.
+    """Read the CPU times of the legs of several runs; files of equal content are used once.
 
     Raises
     ------
     DeckError, FormatError
-        As `observations_of`.
+        As ``observations_of``.
     """
-    found: dict[str, tuple[Observation, ...]] = {}
+    legs_by_content: dict[str, tuple[Observation, ...]] = {}
     cautions = []
     for folder in folders:
         by_file: dict[str, list[Observation]] = {}
-        for one in observations_of(folder):
-            by_file.setdefault(one.name, []).append(one)
+        for observation in observations_of(folder):
+            by_file.setdefault(observation.name, []).append(observation)
         for name, legs in by_file.items():
             with Path(name).open("rb") as stream:
                 content = hashlib.file_digest(stream, "sha256").hexdigest()
-            if content in found:
-                same = found[content][0].name
-                what = (
-                    "is given twice"
-                    if Path(same).samefile(name)
-                    else f"has the content of {same}"
-                )
+            if content in legs_by_content:
+                same = legs_by_content[content][0].name
+                if Path(same).samefile(name):
+                    reason = "is given twice"
+                else:
+                    reason = f"has the content of {same}"
                 cautions.append(
-                    Caution("same-leg-twice", f"{name} {what}; it counts once")
+                    Caution("same-leg-twice", f"{name} {reason}; it counts once")
                 )
             else:
-                found[content] = tuple(legs)
-    return tuple(one for legs in found.values() for one in legs), tuple(
-        dict.fromkeys(cautions)
-    )
+                legs_by_content[content] = tuple(legs)
+    observations = tuple(chain.from_iterable(legs_by_content.values()))
+    return observations, tuple(dict.fromkeys(cautions))
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:
-    """Read what the legs of the run in a folder took.
+    """Read the CPU times of the legs of the run in a folder.
 
     Parameters
     ----------
     folder : str
-        Holds the deck of one run, and its Radioss listings, d3hsp or glstat.
+        Contains the deck of one run, and its Radioss listings, d3hsp or glstat.
 
     Raises
     ------
     DeckError
-        If there is not one main deck.
+        If the folder does not contain exactly one main deck.
     FormatError
-        If no file says what the run took.
+        If no file contains CPU times of the run.
     """
     decks = find_main_decks(folder)
     if len(decks) != 1:
-        count = (
-            f"{len(decks)} main decks were found" if decks else "no main deck was found"
-        )
+        if decks:
+            count = f"{len(decks)} main decks were found"
+        else:
+            count = "no main deck was found"
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
-    found = tuple(
+    observations = tuple(
         _of_radioss(decks[0]) if list_run_files(decks[0]) else _of_ls_dyna(decks[0])
     )
-    if not found:
+    if not observations:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
         raise FormatError(f"{folder}: nothing says what the run took; {wanted}")
-    return found
+    return observations
 
 
 def _of_radioss(deck: str) -> Iterator[Observation]:
+    """Read the CPU times of a Radioss run from the listings of its engine runs."""
     run = read_run(deck)
     inventory = radioss_inventory.read_radioss_inventory(run)
     windows = find_run_windows(run).windows.windows
     rigid = [
-        _Rigid(one.unit.id, one.tr, one.td or np.inf)
-        for one in windows
-        if not one.unit.is_body
+        _Rigid(switched.unit.id, switched.tr, switched.td or np.inf)
+        for switched in windows
+        if not switched.unit.is_body
     ]
     start = 0.0
     for leg in run.legs:
         listing = Path(deck).parent / f"{leg.name}_{leg.number:04d}.out"
-        middle, start = (start + leg.stop.value) / 2, leg.stop.value
+        middle = (start + leg.stop.value) / 2
+        start = leg.stop.value
         if listing.is_file():
-            parts = {one.part for one in rigid if one.tr <= middle < one.td}
+            parts = {
+                switched.part
+                for switched in rigid
+                if switched.tr <= middle < switched.td
+            }
             yield _of_timing(
                 read_timing(str(listing)), inventory, dict.fromkeys(parts, 1.0)
             )
 
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
-    read = read_deck(deck)
-    inventory = ls_dyna_inventory.read_ls_dyna_inventory(read)
-    windows = find_windows(read_switching(read), read_parts(read)).windows
+    """Read the CPU times of an LS-DYNA run from d3hsp and glstat."""
+    content = read_deck(deck)
+    inventory = ls_dyna_inventory.read_ls_dyna_inventory(content)
+    windows = find_windows(read_switching(content), read_parts(content)).windows
     rigid = [
-        _Rigid(one.part, one.tr, one.td or np.inf)
-        for one in windows
-        if one.part is not None
+        _Rigid(switched.part, switched.tr, switched.td or np.inf)
+        for switched in windows
+        if switched.part is not None
     ]
-    for name in sorted(
-        one.name for one in Path(deck).parent.iterdir() if one.is_file()
-    ):
-        path = str(Path(deck).parent / name)
+    folder = Path(deck).parent
+    for name in sorted(file.name for file in folder.iterdir() if file.is_file()):
+        path = str(folder / name)
         if name == "d3hsp":
-            end = _end(read)
-            lasting = (
-                {one.part: (min(one.td, end) - one.tr) / end for one in rigid}
-                if end
-                else {}
-            )
+            end = _end(content)
+            if end:
+                lasting = {
+                    window.part: (min(window.td, end) - window.tr) / end
+                    for window in rigid
+                }
+            else:
+                lasting = {}
             if not rigid or end:
                 yield _of_timing(read_timing(path), inventory, lasting)
         elif name.startswith("glstat") and is_glstat(path):
@@ -292,7 +319,7 @@ def _of_ls_dyna(deck: str) -> Iterator[Observation]:
 
 
 def _end(deck: Deck) -> float:
-    """End of an LS-DYNA run; 0 where it is not known."""
+    """Return the termination time of an LS-DYNA run [time]; 0 if it is unknown."""
     cards = deck.named("CONTROL_TERMINATION")
     rows = [row for row in cards[0].rows if not row.blank] if cards else []
     return float(cards[0].real(rows[0], 0).value) if rows else 0.0
@@ -301,7 +328,7 @@ def _end(deck: Deck) -> float:
 def _of_timing(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Take a leg in which parts were rigid for a fraction of it."""
+    """Return the observation of a leg in which each part was rigid for the fraction ``lasting`` of the time."""
     counts, nodes = _computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
@@ -317,16 +344,18 @@ def _of_timing(
 def _of_zones(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]
 ) -> Iterator[Observation]:
-    """Take the median over states in which the same parts are rigid."""
+    """Yield an observation for each set of rigid parts: the median over the states with this set."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(
         zones.time.tolist(), zones.per_zone.tolist(), strict=True
     ):
-        now = frozenset(one.part for one in rigid if one.tr < time <= one.td)
-        states.setdefault(now, []).append(per_zone)
-    for now, times in states.items():
-        counts, nodes = _computed(inventory, dict.fromkeys(now, 1.0))
+        rigid_parts = frozenset(
+            part.part for part in rigid if part.tr < time <= part.td
+        )
+        states.setdefault(rigid_parts, []).append(per_zone)
+    for rigid_parts, times in states.items():
+        counts, nodes = _computed(inventory, dict.fromkeys(rigid_parts, 1.0))
         total = float(np.median(times)) * number * _US
         yield Observation(
             zones.name, counts, len(inventory.coordinates), nodes, total, None
@@ -336,7 +365,7 @@ def _of_zones(
 def _computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Deformable elements by class, with their further points, and nodes of rigid bodies, on the average of a leg."""
+    """Return the average number of deformable elements by class, with further points, and of rigid-body nodes."""
     always = {
         part
         for part, data in inventory.parts.items()
@@ -346,18 +375,22 @@ def _computed(
     _count(
         computed,
         inventory,
-        {part: one for part, one in inventory.counts.items() if part not in always},
+        {
+            part: counts
+            for part, counts in inventory.counts.items()
+            if part not in always
+        },
         1.0,
     )
     nodes = 0.0
     for fraction in sorted(set(lasting.values())):
         parts = [part for part, value in lasting.items() if value == fraction]
         nodes += fraction * inventory.rigid_nodes(parts)
-        within = inventory.elements_within(parts)
+        elements = inventory.elements_within(parts)
         _count(
             computed,
             inventory,
-            {part: one for part, one in within.items() if part not in always},
+            {part: counts for part, counts in elements.items() if part not in always},
             -fraction,
         )
     return computed, nodes
@@ -369,7 +402,7 @@ def _count(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add elements of known cost by their class, so many times."""
+    """Add the elements of known cost by class, multiplied by ``times``."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

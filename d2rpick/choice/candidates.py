@@ -1,13 +1,13 @@
-"""Candidates for tr at a given td: where they are, how far they can be trusted, what speaks against them.
+"""Find and judge the candidates for tr at a given td: their times, their accuracy, and the objections to them.
 
-They are judged as columns; a `Candidate` is made only where one is looked at.
+All candidates are judged at once, as columns; a `Candidate` is made only when it is looked up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
@@ -31,30 +31,31 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch
 
 
-# Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
+# Largest number of candidates judged at once: larger arrays are no faster, and noise makes tens of thousands per td.
 _MOST: Final = 20_000
-_MORE: Final = 8  # times as many td at once as before: the first may have few candidates, and the last many
-# A residual that may be so much higher is worth a note.
+_MORE: Final = 8  # growth of the number of td judged at once: the first may have few candidates, the last many
+# A residual that may be higher by this much gets a note [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
-_SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
+_SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
 
 
 class Candidate(Measured, Record):
-    """One tr for the td of a situation; fields are the keys of the JSON output, None where nothing can be said.
+    """One tr for the td of a situation; the fields are the keys of the JSON output, None for unknown values.
 
-    Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
-    without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
-    parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
-    ``level_ratio``: E(tr)/E(td).  ``admissible``: in the flight, same sign, error within tolerance; else ``notes`` say
-    why not.  ``acceptable``: with a residual of at most a half as well.  ``run_time_share``:
-    expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
-    that hardly anything is saved.  ``residual_high``: how large the residual may be if what the model leaves over
-    is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
-    ``position_error``: how far a body is out of place at td [length], because ``position_error_part`` is frozen
-    elsewhere; of several bodies the largest, ``position_error_body`` has the parts of that one.
-    ``position_error_assumes`` says what is taken for granted where no deck tells which parts become one body;
-    ``position_error_is_lower_bound``: it may be further off, by inner motion that passes for the rotation of the body.
+    Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
+    unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several parts
+    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is
+    E(tr)/E(td).  ``admissible``: the tr lies in the flight, with the sign of td and an error within the tolerance;
+    otherwise ``notes`` give the reasons.  ``acceptable``: admissible, with a residual of at most 0.5.
+    ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
+    than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
+    model does not explain is a further mode.  ``parts`` lists the mismatch of each part, empty if single parts are
+    unknown.  ``position_error`` is the distance of a body from its place at td [length], because
+    ``position_error_part`` is frozen elsewhere.  Of several bodies it is the largest; ``position_error_body`` lists the
+    parts of that body.  ``position_error_assumes`` names the assumption made if no deck defines which parts become one
+    body.  ``position_error_is_lower_bound``: the error may be larger, through internal motion that looks like rotation
+    of the body.
     """
 
     rank: int
@@ -83,13 +84,16 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """What the order goes by: the residual, on basis "energy" the level error; infinite when unknown."""
+        """Error that ranks candidates [-]: the residual, on basis "energy" the level error; infinite if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
 
 class Pair(NamedTuple):
-    """A recommended (tr, td) [time]; pairs of other td are compared by ``error``, the ``residual`` if it is known."""
+    """A recommended (tr, td) [time].
+
+    Pairs of different td are compared by ``error``, which is the ``residual`` if that is known.
+    """
 
     tr: float
     td: float
@@ -105,11 +109,11 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged:
-    """Times that may serve as tr for one td or many of a record, held against flight, sign and tolerance.
+    """Times that may serve as tr for one or many td of a record, judged by flight, sign and tolerance.
 
-    All is of shape (n,), that of each td together, in the order of the ``situations``: ``place`` in these, ``moments``,
-    and ``columns`` by the names of fields of a candidate: its measures, ``energy``, ``level_error``, ``same_swing`` and
-    ``position_error``, NaN where nothing can be said.
+    All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``place`` is the index
+    into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``, ``level_error``,
+    ``same_swing`` and ``position_error``, NaN for unknown values.
     """
 
     situations: Sequence[Situation]
@@ -119,55 +123,57 @@ class Judged:
     objections: tuple[Objection, ...]
 
     @classmethod
-    def of(cls, situations: Sequence[Situation], each: Sequence[Moments]) -> Judged:
-        """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
-        sizes = [len(one) for one in each]
+    def of(
+        cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
+    ) -> Judged:
+        """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure counts."""
+        sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
-        moments, place = (
-            Moments.joined(each),
-            np.repeat(np.arange(len(sizes), dtype=np.int32), sizes),
-        )
-        if len(each) == 1:  # of a noisy record, which memory is to hold once
-            moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
+        if len(moments_of_each) == 1:
+            # a noisy record: keep its arrays in memory once
+            moments = moments_of_each[0]
+            place = np.broadcast_to(np.int32(0), sizes[0])
+        else:
+            moments = Moments.joined(moments_of_each)
+            place = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
         tr = moments.tr
-        energy, known = measure_all([one.vibration for one in situations], tr, ends)
-        still = np.array([one.at_rest for one in situations])[place]
-        level_error = measures.level_error(
-            energy, np.array([one.energy_td for one in situations])[place]
-        )
-        if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
-            level_error[still] = 0.0
-            known = {
-                name: np.where(still, np.nan, column) for name, column in known.items()
+        td = np.array([situation.td for situation in situations])
+        at_rest = np.array([situation.at_rest for situation in situations])[place]
+        energy_td = np.array([situation.energy_td for situation in situations])[place]
+        vibrations = [situation.vibration for situation in situations]
+        energy, measured = measure_all(vibrations, tr, ends)
+        level_error = measures.level_error(energy, energy_td)
+        if at_rest.any():
+            # the ratio of two round-off energies is no error
+            level_error[at_rest] = 0.0
+            measured = {
+                name: np.where(at_rest, np.nan, column)
+                for name, column in measured.items()
             }
         turns = situations[0].history.turns
-        few = (
-            np.searchsorted(turns, [one.td for one in situations])[place]
-            - np.searchsorted(turns, tr, "right")
-            < 2
-        )
-        off = [
-            one.position_errors(tr[slice(*rows)])
-            for one, rows in zip(situations, pairwise(ends), strict=True)
+        turns_to_td = np.searchsorted(turns, td)[place]
+        turns_to_tr = np.searchsorted(turns, tr, "right")
+        position_errors = [
+            situation.position_errors(tr[slice(*rows)])
+            for situation, rows in zip(situations, pairwise(ends), strict=True)
         ]
+        if len(position_errors) == 1:
+            position_error = position_errors[0]
+        else:
+            position_error = np.concatenate(position_errors)
         columns = {
-            **known,
+            **measured,
             "energy": energy,
             "level_error": level_error,
-            "same_swing": few & ~still,
-            "position_error": off[0] if len(off) == 1 else np.concatenate(off),
+            "same_swing": (turns_to_td - turns_to_tr < 2) & ~at_rest,
+            "position_error": position_error,
         }
-        return cls(
-            situations,
-            place,
-            moments,
-            columns,
-            tuple(objections(situations, place, tr, columns)),
-        )
+        problems = tuple(objections(situations, place, tr, columns))
+        return cls(situations, place, moments, columns, problems)
 
     @property
     def ends(self) -> list[int]:
-        """Where the candidates of each situation begin, and where the last ones end."""
+        """Index of the first candidate of each situation, and the number of all candidates."""
         ends: list[int] = np.searchsorted(
             self.place, np.arange(len(self.situations) + 1)
         ).tolist()
@@ -175,35 +181,37 @@ class Judged:
 
     @property
     def td(self) -> Samples:
-        """That of each candidate [time]."""
-        return np.array([one.td for one in self.situations])[self.place]
+        """The td of each candidate, shape (n,) [time]."""
+        return np.array([situation.td for situation in self.situations])[self.place]
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
-        """Which of them nothing speaks against."""
-        return np.asarray(~np.logical_or.reduce([one.holds for one in self.objections]))
+        """True for each candidate without objections, shape (n,)."""
+        return np.asarray(
+            ~np.logical_or.reduce([objection.holds for objection in self.objections])
+        )
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
-        settings, found = self.situations[0].settings, self.acceptable
+        """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
+        settings = self.situations[0].settings
+        keeps = self.acceptable
         if settings.max_kinetic_share is not None:
             shares = [
-                np.inf if one.kinetic_share is None else one.kinetic_share
-                for one in self.situations
+                np.inf if situation.kinetic_share is None else situation.kinetic_share
+                for situation in self.situations
             ]
-            found = found & (np.array(shares) <= settings.max_kinetic_share)[self.place]
+            keeps = keeps & (np.array(shares) <= settings.max_kinetic_share)[self.place]
         if settings.max_residual is not None:
-            found = found & (
-                self.columns["residual"] <= settings.max_residual
-            )  # not where unknown, NaN
-        return found
+            # False if the residual is unknown, NaN
+            keeps = keeps & (self.columns["residual"] <= settings.max_residual)
+        return keeps
 
     @property
     def error(self) -> Samples:
-        """What the order goes by, as ``Candidate.error`` [-]."""
+        """Error by which the candidates are ranked, as `Candidate.error`, shape (n,) [-]."""
         residual = self.columns["residual"]
-        # the least of many that are not known exactly is too good to be true: a wide band counts against it
+        # The smallest of many uncertain estimates is too optimistic: a wide band counts against a candidate.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -214,30 +222,29 @@ class Judged:
 
     @property
     def modal(self) -> NDArray[np.bool_]:
-        """Which of them are judged by many modes."""
-        return np.array([one.basis == "modal" for one in self.situations])[self.place]
+        """True for each candidate that is judged by many modes, shape (n,)."""
+        return np.array([situation.basis == "modal" for situation in self.situations])[
+            self.place
+        ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """Which of them, judged by many modes, lie in the last part of the flight up to td, and so save little."""
-        first = [
-            -np.inf if one.earliest_tr is None else one.earliest_tr
-            for one in self.situations
-        ]
-        flown = self.td - np.array(first)[self.place]
+        """True for each candidate of many modes in the last part of the flight before td, which saves little."""
+        starts = [_start_of_flight(situation) for situation in self.situations]
+        flown = self.td - np.array(starts)[self.place]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
-        """Which of them leave a body so far out of place that it is worth a warning."""
+        """True for each candidate whose position error deserves a warning, shape (n,)."""
         limits = [
-            np.inf if one.bodies is None else one.bodies.limit
-            for one in self.situations
+            np.inf if situation.bodies is None else situation.bodies.limit
+            for situation in self.situations
         ]
         return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Keep some that nothing speaks against, in ascending order."""
+        """Select the rows of candidates without objections, ascending."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.place[rows], self.moments.at(rows), columns, ()
@@ -246,10 +253,10 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Candidates of one td in some order, made where they are looked at, of what was ``judged``.
+    """Candidates of one td in some order; each is made when it is looked up in ``judged``.
 
-    ``order`` has the places there of the candidates in their order, that of the ranks where it is ``ranked``;
-    ``recommended`` is the place in it of the one that is.
+    ``order`` has the rows of the candidates in ``judged``; they are ranked if ``ranked`` is True.  ``recommended`` is
+    the place of the recommended candidate in ``order``, None without one.
     """
 
     situation: Situation
@@ -260,42 +267,42 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def tr(self) -> Samples:
-        """Times of the switch to rigid, in their order [time]."""
+        """Times of the switch to rigid, in the order of the candidates [time]."""
         return self.judged.moments.tr[self.order]
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Which of them, in their order, are acceptable and keep the limits asked for."""
+        """True for each candidate, in order, that is acceptable and within the limits of the settings."""
         return self.judged.kept[self.order]
 
     @cached_property
     def chosen(self) -> Candidate | None:
-        """The one that is recommended."""
+        """The recommended candidate, None without one."""
         return None if self.recommended is None else self[self.recommended]
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The same as a pair, which takes less."""
+        """The recommended pair, which is quicker to compute than the candidate; None without one."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
-        found = {
+        values = {
             name: self.judged.columns[name][i].item()
             for name in ("residual", "level_error", "same_swing")
         }
-        residual = _known(found["residual"])
-        error = found["level_error"] if residual is None else residual
+        residual = _known(values["residual"])
+        error = values["level_error"] if residual is None else residual
         return Pair(
             self.judged.moments.tr[i].item(),
             self.situation.td,
             residual,
             error,
-            found["same_swing"],
+            values["same_swing"],
         )
 
     @property
     def saving(self) -> Pair | None:
-        """The recommended pair, where it saves something."""
+        """The recommended pair if it saves run time, else None."""
         return None if self.pair is None or self.pair.same_swing else self.pair
 
     def __len__(self) -> int:
@@ -306,11 +313,11 @@ class Candidates(Sequence[Candidate]):
     @overload
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
-        """Make the candidate, or the candidates, at some place."""
+        """Make the candidate, or the candidates, at a place of the order."""
         if not isinstance(place, slice):
             i = range(len(self))[place]
             return self[i : i + 1][0]
-        # how far the true time may lie away is asked of these only: of all it takes longer than the choice
+        # The accuracy of the time is computed only for these, since it takes longer than the choice.
         reach = self.situation.vibration.reach(
             _as_found(self.situation, self.judged.moments.at(self.order[place]))
         )
@@ -320,154 +327,170 @@ class Candidates(Sequence[Candidate]):
         return iter(self[:])
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
-        i, situation, found = int(self.order[rank]), self.situation, self.judged
-        tr, kind, rising = found.moments[i]
+        i = int(self.order[rank])
+        situation = self.situation
+        judged = self.judged
+        tr, kind, rising = judged.moments[i]
         values: dict[str, Any] = {
-            name: _known(column[i].item()) for name, column in found.columns.items()
+            name: _known(column[i].item()) for name, column in judged.columns.items()
         }
-        known = (
-            values["sign_match"] is not None
-        )  # whether its deformation was compared with that at td
-        values["sign_match"] = values["sign_match"] > 0 if known else None
-        history, td, energy = situation.history, situation.td, values["energy"]
+        # True if the deformation at tr was compared with that at td
+        is_compared = values["sign_match"] is not None
+        values["sign_match"] = values["sign_match"] > 0 if is_compared else None
+        history = situation.history
+        td = situation.td
         if values["position_error"] is not None and situation.bodies:
             values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
-        parts = situation.vibration.part_matches(tr) if known else ()
-        against = tuple(
-            chain.from_iterable(one.told(i) for one in found.objections if one.holds[i])
-        )
-        remarks = _remarks(situation, reach, values if known else {}, parts)
+        parts = situation.vibration.part_matches(tr) if is_compared else ()
+        notes = list[str]()
+        for objection in judged.objections:
+            if objection.holds[i]:
+                notes += objection.told(i)
+        admissible = not notes
         residual = values["residual"]
-        kept = residual is None or residual <= POOR_RESIDUAL
+        is_kept = residual is None or residual <= POOR_RESIDUAL
+        if values["same_swing"]:
+            notes.append(_SAME_SWING)
+        notes += _remarks(situation, reach, values if is_compared else {}, parts)
+        level_ratio = None
+        if situation.energy_td > 0 and not situation.at_rest:
+            level_ratio = values["energy"] / situation.energy_td
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            level_ratio=energy / situation.energy_td
-            if situation.energy_td > 0 and not situation.at_rest
-            else None,
+            level_ratio=level_ratio,
             rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,
-            admissible=not against,
-            acceptable=not against and kept,
+            admissible=admissible,
+            acceptable=admissible and is_kept,
             recommended=rank == self.recommended,
-            notes=(*against, *_SAME_SWING * values["same_swing"], *remarks),
+            notes=tuple(notes),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
             parts=parts,
             **values,
         )
 
 
+def _start_of_flight(situation: Situation) -> float:
+    """Return the earliest tr in the flight [time]; minus infinity if it is unknown."""
+    return -np.inf if situation.earliest_tr is None else situation.earliest_tr
+
+
 def _known(value: Any) -> Any:
-    """Give what a column holds, None where it is no number."""
+    """Return the value of a column, None for NaN."""
     return None if value != value else value
 
 
 def judged_of(
     situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
 ) -> Iterator[Judged]:
-    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
+    """Judge all level crossings before td, extrema near the level and closest matches, in time order.
 
-    Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
-    acceptable, may be left out: noise in a long record makes tens of thousands.  The situations are of one record, by
-    one set of rules: at once so many td are judged as have ``most`` candidates.
+    If nothing vibrates in the flight, its start is the only candidate.  With ``in_flight``, candidates before the
+    flight may be left out, since none of them is acceptable: noise in a long record makes tens of thousands.  All
+    situations must have one record and one set of rules.  As many td are judged at once as have ``most`` candidates.
     """
     first, together = 0, 1
     while first < len(situations):
-        asked = situations[first : first + together]
-        starts = [
-            one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf
-            for one in asked
-        ]
-        found = find_moments(
-            [one.vibration for one in asked], asked[0].settings.tolerance, starts
+        batch = situations[first : first + together]
+        starts = [-np.inf] * len(batch)
+        if in_flight:
+            starts = [_start_of_flight(situation) for situation in batch]
+        moments_of_each = find_moments(
+            [situation.vibration for situation in batch],
+            batch[0].settings.tolerance,
+            starts,
         )
-        kept = [
-            _at_start(one) or _distinct(one, moments)
-            for one, moments in zip(asked, found, strict=True)
+        distinct = [
+            _at_start(situation) or _distinct(situation, moments)
+            for situation, moments in zip(batch, moments_of_each, strict=True)
         ]
-        yield Judged.of(asked, kept)
+        yield Judged.of(batch, distinct)
         first += together
-        together = max(1, min(_MORE * together, most // max(1, *map(len, kept))))
+        together = max(1, min(_MORE * together, most // max(1, *map(len, distinct))))
 
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
-    """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
+    """Measure each of the ``times`` before td as tr, and judge it by flight, sign and tolerance."""
     judged = Judged.of([situation], [Moments.of("given", [*times])])
     return Candidates(situation, judged, np.arange(judged.place.size))
 
 
 def _at_start(situation: Situation) -> Moments | None:
-    """Where nothing vibrates in the flight, its start, not before it as it is read; else nothing."""
+    """Return the start of a flight in which nothing vibrates, rounded up to printed digits; None if it vibrates."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
     first = max(start, float(situation.history.time[0]))
-    read = round_up_as_read(first)
-    return Moments.of("start", [read if read < situation.td else first])
+    printed = round_up_as_read(first)
+    return Moments.of("start", [printed if printed < situation.td else first])
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
-    """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
-    given, vibration = moments.are("given"), situation.vibration
-    if situation.at_rest or not (given.any() and vibration.profile):
+    """Mark each given tr as a match if a match lies there, since its accuracy does not depend on who names it."""
+    is_given = moments.are("given")
+    vibration = situation.vibration
+    if situation.at_rest or not (is_given.any() and vibration.profile):
         return moments
-    found = _distinct(situation, vibration.moments(situation.settings.tolerance))
-    if not found.are("match").any():
+    matches = _distinct(situation, vibration.moments(situation.settings.tolerance))
+    if not matches.are("match").any():
         return moments
-    nearest = found.at(np.array([np.abs(found.tr - tr).argmin() for tr in moments.tr]))
-    same = given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
+    nearest = matches.at(
+        np.array([np.abs(matches.tr - tr).argmin() for tr in moments.tr])
+    )
+    same = is_given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
     return Moments(
         moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising
     )
 
 
-def _distinct(situation: Situation, found: Moments) -> Moments:
-    """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
-    matches = found.are("match")
+def _distinct(situation: Situation, moments: Moments) -> Moments:
+    """Return the moments in time order, without matches next to a crossing or an extremum."""
+    matches = moments.are("match")
     if matches.any():
-        kept, of_level = ~matches, found.tr[~matches]
-        for place in np.flatnonzero(matches).tolist():
-            kept[place] = np.all(
-                np.abs(of_level - found.tr[place]) > situation.history.step
+        is_distinct = ~matches
+        of_level = moments.tr[~matches]
+        for row in np.flatnonzero(matches).tolist():
+            is_distinct[row] = np.all(
+                np.abs(of_level - moments.tr[row]) > situation.history.step
             )
-        found = found.at(kept)
-    return (
-        found
-        if np.all(found.tr[1:] >= found.tr[:-1])
-        else found.at(np.argsort(found.tr, kind="stable"))
-    )
+        moments = moments.at(is_distinct)
+    if np.all(moments.tr[1:] >= moments.tr[:-1]):
+        return moments
+    return moments.at(np.argsort(moments.tr, kind="stable"))
 
 
 def _remarks(
     situation: Situation,
     reach: float,
-    known: Mapping[str, Any],
+    measured: Mapping[str, Any],
     parts: Sequence[PartMatch],
 ) -> Iterator[str]:
-    """What to know of this tr beside its acceptance."""
-    if not (known or situation.vibration.unknown or situation.at_rest):
+    """Yield notes on a tr that do not concern its acceptance."""
+    if not (measured or situation.vibration.unknown or situation.at_rest):
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
-    if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
+    if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
+        # imported here: a table has no parts
         from d2rpick.vibration.part_signs import (
             name_main_contributors,
-        )  # not above: a table has no parts
+        )
 
         yield f"mismatch of {name_main_contributors(parts)}"
-    if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
-        yield f"residual up to {known['residual_high']:.2g} if the record hides a further mode"
-    if known and reach > known["timing_tolerance"]:
-        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known['timing_tolerance']:.2g}"
-    if not known and reach >= situation.history.step:
+    if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
+        yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
+    if measured and reach > measured["timing_tolerance"]:
+        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {measured['timing_tolerance']:.2g}"
+    if not measured and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
 
 
 def _position(worst: Off | None) -> dict[str, Any]:
-    """How far the body is off that is off most; nothing where that is not known."""
+    """Return the fields of a candidate for the largest position error; empty if it is unknown."""
     if worst is None:
         return {}
     return {

@@ -1,6 +1,6 @@
-"""A finished switched run held against its reference: what was locked in, what came back, whether the motion is right.
+"""Compare a finished switched run with its reference run: the energy locked in, the energy at td, and the motion.
 
-Between the switches nothing is compared but energy: a rigid part reports neither kinetic energy nor momentum.
+Between tr and td only the energy is compared: a rigid part reports neither kinetic energy nor momentum.
 """
 
 from __future__ import annotations
@@ -25,33 +25,34 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
+# Largest deviation of the momentum after td; beyond this share of it the motion differs from the reference run [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Momentum below this share of the largest of the run is hardly any: a body that has come to rest cannot be off by much.
+# Smaller momenta than this share of the largest of the run count as this share: a resting body cannot deviate much [-].
 _AT_REST = 0.01
-# Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
-# from state to state anyway, that is worth a note.
+# Some solvers report a wrong energy for rigid solid elements. A difference beyond this share, and beyond the usual
+# change from state to state, gets a note [-].
 _REPORTED_OFF = 0.01
-# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.  Of an
-# energy that is mostly plastic the vibration is little: what stands still changes by less than that share of it, too.
+# Largest change of a constant energy, as a share of the energy and of the vibration [-]. A rigid body keeps the energy
+# to its digits; a vibrating one changes by more from state to state. If most of the energy is plastic work, the
+# vibration is a small part of it, hence the second share.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
-# about tr is left to that.
+# Tolerance for the energy about tr, as a share of it [-]: a solver switches at the first step from tr on, and output
+# may miss that by a state or two.
 _ABOUT = 0.05
-# Times between two states at which it is looked when a run was switched.
+# Number of times between two states at which the switch to rigid is searched.
 _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
+    """Measures of a switched run; the fields are the keys of the JSON output, None if the files lack the quantity.
 
-    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.
-    ``rigid_from`` and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which
-    its energy stands still [time], None where it does not.  Means and spreads
-    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
-    momentum behind the first state from td on, relative to the largest that the reference has there;
-    ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
-    ``notes``: what was left out or assumed in reading the switched run and not the reference, and what is odd in it.
+    ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
+    and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
+    switched run is constant [time], None if it is not.  Means and spreads (standard deviations) are taken from td to
+    ``end``.  ``momentum_error`` is the largest deviation of the momentum after the first state from td on, relative to
+    the largest momentum of the reference run there; ``displacement`` is the largest distance there between the centres
+    of the parts in both runs [length].  ``notes`` list what was left out or assumed when reading the switched run but
+    not the reference run, and anomalies of the switched run.
     """
 
     source: tuple[str, ...]
@@ -78,40 +79,47 @@ def compare(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Hold a finished switched run against the reference, by the parts that tell how right it is.
+    """Compare a finished switched run with its reference run, by the parts that show how right it is.
 
-    Both are read in the same way; ``situation`` is that of td in the reference, and ``min_mean`` as for `compare_runs`.
+    Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
+    ``compare_runs``.
 
     Raises
     ------
     RangeError
-        If one of the two runs does not go on after td.
+        If one of the two runs does not continue after td.
     """
-    flight, parts, run = situation.flight, situation.history.parts, reference.run
+    flight = situation.flight
+    parts = situation.history.parts
+    run = reference.run
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
     judged = same_parts(reference, switched, pair)
-    found = compare_runs(
+    end = np.inf
+    if situation.latest_td > situation.td:
+        end = situation.latest_td
+    centres: tuple[Track | None, Track | None] = (None, None)
+    if parts:
+        centres = (run.centre(parts), switched.run.centre(parts))
+    comparison = compare_runs(
         judged.reference,
         judged.switched,
         pair,
-        situation.latest_td if situation.latest_td > situation.td else np.inf,
+        end,
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(switched.run, together)),
-        centres=(run.centre(parts), switched.run.centre(parts))
-        if parts
-        else (None, None),
-        known=judged.known,
+        centres=centres,
+        is_reported=judged.is_reported,
         min_mean=min_mean,
     )
-    return found._replace(
-        objections=(*judged.objections, *found.objections),
-        notes=(*judged.notes, *found.notes),
+    return comparison._replace(
+        objections=(*judged.objections, *comparison.objections),
+        notes=(*judged.notes, *comparison.notes),
     )
 
 
 def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
-    """Momentum of some parts, None also where the run does not have them all."""
+    """Return the momentum of some parts; None if the run lacks one of them or their momenta."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 
@@ -125,10 +133,10 @@ def compare_runs(
     momenta: tuple[Track | None, Track | None],
     centres: tuple[Track | None, Track | None],
     *,
-    known: bool = True,
+    is_reported: bool = True,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Hold a switched run against its reference: was it rigid from tr to td, and what came after td.
+    """Compare a switched run with its reference run: whether it was rigid from tr to td, and its energy after td.
 
     Parameters
     ----------
@@ -139,40 +147,49 @@ def compare_runs(
     end : float
         The next contact, or the end of the records [time].
     tolerance : float
-        On the error of the amplitude that was locked in [-].
+        Largest error of the locked-in amplitude [-].
     momenta, centres : pair of Track or None
-        Of the reference and of the switched run, None where it has none.
-    known : bool
-        Whether the switched run reports its energies right after td; else nothing is made of them.
+        Of the reference run and of the switched run, None for a run without them.
+    is_reported : bool
+        True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
-        Mean energy after td as a share of the reference's, at least; it may be as far above 1 as below [-].
+        Smallest mean energy after td as a share of that of the reference run [-]; 2 - ``min_mean`` is the largest.
 
     Raises
     ------
     RangeError
-        If a run holds fewer than three states in that window.
+        If a run has fewer than three states from td to ``end``.
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    after, reference_after = switched.between(td, end)[1], reference.between(td, end)[1]
-    _refuse_few(reference, switched, min(after.size, reference_after.size), td, end)
-    before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
-    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
-        after, rest = (
-            after[1:],
-            rest[1:],
-        )  # the switch comes at the first step from td on: this state was still rigid
-    frozen, wanted = float(after[0]), reference.energy_at(td)
+    energies_after = switched.between(td, end)[1]
+    reference_after = reference.between(td, end)[1]
+    _refuse_few(
+        reference, switched, min(energies_after.size, reference_after.size), td, end
+    )
+    energies_before = switched.energy[switched.time < td]
+    energies_to_end = switched.between(td, np.inf)[1]
+    if (
+        energies_before.size
+        and energies_after[0] == energies_before[-1]
+        and _reported_wrong(energies_before[-1], energies_to_end[1:])
+    ):
+        energies_after = energies_after[1:]
+        # the switch comes at the first step from td on: this state was still rigid
+        energies_to_end = energies_to_end[1:]
+    frozen = float(energies_after[0])
+    energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
-    if before.size and _reported_wrong(before[-1], rest):
-        found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
-        notes.append(f"{found}; some solvers report rigid solid elements wrongly")
+    if energies_before.size and _reported_wrong(energies_before[-1], energies_to_end):
+        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, at td {frozen:.6g} came back"
+        notes.append(f"{reported}; some solvers report rigid solid elements wrongly")
     still = _still(reference, switched, tr, td)
-    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td, still)
-    mean, mean_reference = float(after.mean()), float(reference_after.mean())
+    error = _relative(*momenta, td, end)
+    rigid = _rigid_window(switched, tr, td, still)
+    mean, mean_reference = float(energies_after.mean()), float(reference_after.mean())
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
-    if known:
-        objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
+    if is_reported:
+        objections += _not_locked_in(reference, tr, frozen, energy_td, tolerance)
         if mean_reference > round_off(reference):
             objections += _another_mean(mean / mean_reference, min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
@@ -181,12 +198,12 @@ def compare_runs(
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
-        energy_td=wanted,
-        level_ratio=frozen / wanted if wanted > 0 else None,
+        energy_td=energy_td,
+        level_ratio=frozen / energy_td if energy_td > 0 else None,
         end=end,
         mean_after=mean,
         mean_after_reference=mean_reference,
-        spread_after=float(after.std()),
+        spread_after=float(energies_after.std()),
         spread_after_reference=float(reference_after.std()),
         momentum_error=error,
         displacement=_distance(*centres, td, end),
@@ -200,48 +217,43 @@ def compare_runs(
 def _refuse_few(
     reference: History, switched: History, states: int, td: float, end: float
 ) -> None:
-    """RangeError where a run holds too few states after td."""
+    """Raise RangeError if a run has too few states after td."""
     if states < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
-        name, last = ", ".join(short.source), float(short.time[-1])
+        name = ", ".join(short.source)
+        last = float(short.time[-1])
         if last <= td:
             raise RangeError(
                 f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
             )
-        found = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{name}: {found}; too few to compare the runs")
+        states_text = f"fewer than 3 states from td {td:g} to {end:g}"
+        raise RangeError(f"{name}: {states_text}; too few to compare the runs")
 
 
 def _still(reference: History, switched: History, tr: float, td: float) -> float:
-    """Give the change up to which an energy stands still: beside what vibrates it is nothing, or digits [energy]."""
+    """Return the largest change of a constant energy [energy]: small relative to the vibration, or digits."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
-    vibrates, least = _range(reference, tr, td), round_off(reference)
-    return max(
-        digits,
-        least
-        if level + vibrates <= least
-        else min(_STILL * level, _STILL_OF_VIBRATION * vibrates),
-    )
+    vibrates = _range(reference, tr, td)
+    rounding = round_off(reference)
+    if level + vibrates <= rounding:
+        return max(digits, rounding)
+    return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
 
 
 def _range(history: History, start: float, end: float) -> float:
-    """Range of the energy between two times [energy]."""
-    return float(
-        np.ptp(
-            np.append(
-                history.between(start, end)[1],
-                history.energies_at(np.array([start, end])),
-            )
-        )
-    )
+    """Return the range of the energy between two times [energy]."""
+    inside = history.between(start, end)[1]
+    at_ends = history.energies_at(np.array([start, end]))
+    return float(np.ptp(np.append(inside, at_ends)))
 
 
 def _rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
-    """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
-    time, energy = switched.time, switched.energy
+    """Return the first and last state of constant energy around the middle of (tr, td) [time]; None without one."""
+    time = switched.time
+    energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
     if not tr <= time[middle] <= td:
         return None
@@ -259,9 +271,9 @@ def _not_rigid(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Object when the energy does not stand still from about tr to about td, as far as the states tell.
+    """Yield an objection if the energy is not constant from about tr to about td, as far as the states show.
 
-    That it does so before or after as well tells something only where that of the reference does not.
+    A constant energy before tr or after td matters only if that of the reference run is not constant there.
     """
     if rigid is None:
         yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
@@ -271,25 +283,25 @@ def _not_rigid(
         yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
         return
 
-    def longer(start: float, end: float) -> bool:
+    def lasts_longer(start: float, end: float) -> bool:
         return end - start > room and _range(reference, start, end) > limit
 
     if (
         rigid[0] > tr + room
         or rigid[1] < td - room
-        or longer(rigid[0], tr)
-        or longer(td, rigid[1])
+        or lasts_longer(rigid[0], tr)
+        or lasts_longer(td, rigid[1])
     ):
-        found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
-        yield f"{found}, not from tr {tr:g} to td {td:g}"
+        rigid_text = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
 def _not_locked_in(
-    reference: History, tr: float, frozen: float, wanted: float, tolerance: float
+    reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Object when the energy that came back is not one that the reference has about tr, or not that of td."""
-    if max(frozen, wanted) <= round_off(reference):
-        return  # nothing vibrates: what nothing is off by means nothing
+    """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
+    if max(frozen, energy_td) <= round_off(reference):
+        return  # nothing vibrates: the error of nothing means nothing
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -297,88 +309,113 @@ def _not_locked_in(
             f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
-    if measures.level_error(frozen, wanted) > tolerance:
-        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+    if measures.level_error(frozen, energy_td) > tolerance:
+        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {energy_td:.6g}"
 
 
-def _another_mean(share: float, least: float) -> Iterator[str]:
-    """Object when the mean energy after td is another one than that of the reference."""
-    if not least <= share <= 2 - least:
-        found = f"the mean energy after td is {share:.2g} times that of the reference"
-        yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
+def _another_mean(share: float, min_mean: float) -> Iterator[str]:
+    """Yield an objection if the mean energy after td differs from that of the reference run."""
+    if not min_mean <= share <= 2 - min_mean:
+        mean_text = (
+            f"the mean energy after td is {share:.2g} times that of the reference"
+        )
+        yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
 
 
 def times_of(switched: History, reference: History) -> tuple[float, float]:
-    """Read off a switched run when its parts were rigid: its energy stands still, and that of the reference does not.
+    """Find tr and td of a switched run: its energy is constant between them, that of the reference run is not.
 
     Returns
     -------
     tr, td : float
-        tr between the last state that moves and the first that does not, where the reference has that energy; td is
-        the last state that does not [time].
+        tr lies between the last changing state and the first constant one, at the time at which the reference run has
+        that energy; td is the last constant state [time].
 
     Raises
     ------
     RangeError
-        If there is no such time, as where nothing vibrates in the flight.
+        If there is no such time, as in a flight in which nothing vibrates.
     """
-    time, energy = switched.time, switched.energy
+    time = switched.time
+    energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     still = find_stretches(
         np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST
     )
-    spans = [(max(one.start - 1, 0), one.stop - 1) for one in still]
-    least = round_off(reference)
-    moving = [
-        (first, last)
-        for first, last in spans
-        if _range(reference, float(time[first]), float(time[last]))
-        > max(least, 2 * limit[first : last + 1].max())
-    ]
+    spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
+    rounding = round_off(reference)
+    moving = []
+    for first, last in spans:
+        largest = max(rounding, 2 * limit[first : last + 1].max())
+        if _range(reference, float(time[first]), float(time[last])) > largest:
+            moving.append((first, last))
     if not moving:
-        found = "its energy stands still nowhere, or that of the reference does so too"
+        reason = _explain_why_no_times(switched, reference, spans)
         cure = switched.left_beside or "; give `tr` and `td`"
-        raise RangeError(f"{', '.join(switched.source)}: {found}{cure}")
-    first, last = max(moving, key=lambda one: time[one[1]] - time[one[0]])
-    before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
-    tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]
+        raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
+    first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
+    times_before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
+    tr = times_before[
+        np.abs(reference.energies_at(times_before) - energy[first]).argmin()
+    ]
     return float(tr), float(time[last])
 
 
-def _reported_wrong(rigid: float, after: Samples) -> bool:
-    """Whether the energy reported while rigid is not the one that comes back."""
-    usual = np.abs(np.diff(after)).max()
-    return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
+def _explain_why_no_times(
+    switched: History, reference: History, spans: Sequence[tuple[int, int]]
+) -> str:
+    """Explain why no rigid window is found; ``spans`` are the first and last states of constant energy."""
+    if np.array_equal(switched.time, reference.time) and np.array_equal(
+        switched.energy, reference.energy
+    ):
+        return "the energies of the switched run and of the reference run are the same"
+    if not spans:
+        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
+    first, last = spans[0]
+    start, end = switched.time[first], switched.time[last]
+    return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"
+
+
+def _reported_wrong(rigid: float, energies_after: Samples) -> bool:
+    """Return True if the energy reported while rigid differs from the energy at td."""
+    usual = np.abs(np.diff(energies_after)).max()
+    return bool(
+        abs(rigid - energies_after[0])
+        > max(usual, _REPORTED_OFF * abs(energies_after[0]))
+    )
 
 
 def _relative(
-    reference: Track | None, other: Track | None, td: float, end: float
+    reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
-    distance = _distance(reference, other, td, end)
+    """Return the largest distance between two tracks over the largest size of the reference track [-]."""
+    distance = _distance(reference, switched, td, end)
     if reference is None or distance is None:
         return None
     sizes = np.linalg.norm(reference.values, axis=1)
-    there = sizes[(reference.time >= td) & (reference.time <= end)]
-    largest = max(float(there.max(initial=0.0)), _AT_REST * float(sizes.max()))
+    sizes_after = sizes[(reference.time >= td) & (reference.time <= end)]
+    largest = max(float(sizes_after.max(initial=0.0)), _AT_REST * float(sizes.max()))
     return distance / largest if largest > 0 else None
 
 
 def _distance(
-    reference: Track | None, other: Track | None, td: float, end: float
+    reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
-    """Largest distance of the second track from the first between two times; None where one is missing.
+    """Return the largest distance of the second track from the first between two times; None if one is missing.
 
     The first state from td on is left out, since it may still be rigid.
     """
-    if reference is None or other is None:
+    if reference is None or switched is None:
         return None
-    inside = np.flatnonzero((other.time >= td) & (other.time <= end))[1:]
+    inside = np.flatnonzero((switched.time >= td) & (switched.time <= end))[1:]
     if not inside.size:
         return None
-    there = [
-        np.interp(other.time[inside], reference.time, column)
+    reference_values = [
+        np.interp(switched.time[inside], reference.time, column)
         for column in reference.values.T
     ]
     return float(
-        np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max()
+        np.linalg.norm(
+            switched.values[inside] - np.stack(reference_values, axis=1), axis=1
+        ).max()
     )

@@ -1,14 +1,14 @@
-"""What a time step costs, and what of it is saved while some parts are rigid: one model for all of d2rpick.
+"""Model the cost of a time step, and the share of it that is saved while some parts are rigid.
 
-A step costs C = E / s, with E the sum of weight x number over the elements that are computed, by formulation, and of
-their integration points through the thickness, and s the share of the elements in a step, with what is done for each of
-them beside.  While parts are one rigid body its elements cost nothing, and each of its n nodes costs r, so the share
-that is saved is
+A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
+integration points through the thickness. s is the share of the elements in the cost of a step; assembly, contact and
+output take the rest.  While parts are one rigid body their elements cost nothing, and each of its n nodes costs r, so
+the saved share is
 
     c = (E_rigid - r n) / C.
 
-A run that is rigid for a fraction f of its time takes 1 - f (1 - (1 - c)/m) of the time without switching, with m the
-step while rigid over that before (`d2rpick.vibration.measures.run_time_share`).
+A run that is rigid for a fraction f of its time takes 1 - f (1 - (1 - c)/m) of the time without switching; m is the
+time step while rigid over that before (`d2rpick.vibration.measures.run_time_share`).
 """
 
 from __future__ import annotations
@@ -27,28 +27,29 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# us per element and cycle, of shells with one point through the thickness, and of each further integration point: a fit
-# to legs of a car of 1516 elements after its first impact, with and without rigid sets, and with its shells in one
-# formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).  Beams and springs are hardly separated.
+# Cost per element and cycle [us] of shells with one integration point through the thickness, and of each further point.
+# Fitted to runs of a car of 1516 elements after its first impact, with and without rigid parts, and with its shells in
+# one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).  Beams and springs are not well
+# separated.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Elements over all work of a deformable step, 0.88, with the 0.03 to 0.04 that their assembly, contact and output take.
+# Share of the elements in a deformable step: 0.88, plus 0.03 to 0.04 for their assembly, contact and output [-].
 ELEMENT_SHARE: Final = 0.91
-# us per node of a rigid body and cycle, of the same legs.
+# Cost per rigid-body node and cycle [us], fitted to the same runs.
 RIGID_NODE: Final = 0.04
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
-# Sums over all elements stay finite below this; no unit of time comes near.
+# Sums over all elements stay finite below this; costs in any unit of time are far smaller.
 _LARGEST: Final = 1e100
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Cost of an element per cycle by its formulation or class, of a node of a rigid body, and the elements' share.
+    """Costs of an element per cycle by formulation or class, and of a rigid-body node; share of elements in a step.
 
-    Only ratios count: the unit is that of ``per_element``.  ``file`` is what they were read from, None where they were
-    not.
+    Only ratios count: all costs have the unit of ``per_element``.  ``file`` is the file that the weights were read
+    from, None if they were not read.
     """
 
     per_element: Mapping[str, float] = field(default_factory=lambda: MEASURED)
@@ -58,7 +59,7 @@ class Weights:
     file: Source | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError with the name of a number that makes no sense."""
+        """Raise ConfigurationError naming a number outside of its range."""
         for name, value in self.per_element.items():
             _check(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
@@ -73,6 +74,7 @@ class Weights:
 
 
 def _check(name: str, value: float) -> None:
+    """Raise ConfigurationError if a cost is negative or too large."""
     if not 0 <= value <= _LARGEST:
         raise ConfigurationError(
             f"{name} is {value:g}, a number of at least 0 and at most {_LARGEST:g} was expected"
@@ -80,51 +82,51 @@ def _check(name: str, value: float) -> None:
 
 
 def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
-    """Share of a step that is saved while elements of the cost ``rigid`` are off, c above [-]; at least 0.
+    """Return the share c of a step that is saved while elements of the cost ``rigid`` are rigid, at least 0 [-].
 
     Parameters
     ----------
     weights : Weights
     total, rigid : float
-        Cost of all elements, and of those that are rigid, in the unit of the weights.
+        Costs of all elements, and of the rigid ones, in the unit of the weights.
     nodes : int
-        Of the rigid bodies.
+        Number of nodes of the rigid bodies.
 
     Examples
     --------
     >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
     0.45
     """
-    return (
-        max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total)
-        if total
-        else 0.0
-    )
+    if total:
+        return max(
+            0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total
+        )
+    return 0.0
 
 
 class Amount(NamedTuple):
-    """Cost of some elements in the unit of the weights, and the formulations whose weight is not known."""
+    """Cost of some elements in the unit of the weights, and their formulations without a weight."""
 
     cost: float
     unknown: tuple[str, ...] = ()
 
 
 class Share(NamedTuple):
-    """Share of a step that is saved while some parts are rigid [-], or None and the reason."""
+    """Share of a step that is saved while some parts are rigid [-]; None with the reason if it is unknown."""
 
     value: float | None
     reason: str | None = None
 
 
 class ByDeck(NamedTuple):
-    """Where what a deck tells comes from: its files, and the weights, None where the cost was given."""
+    """Sources of the values that a deck gives: its files, and the weights, None if the cost share was given."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
 
 
 class CostModel:
-    """Cost of the elements of a deck with some weights; elements that are rigid from the start cost nothing."""
+    """Cost of the elements of a deck by weights; elements that are rigid from the start cost nothing."""
 
     def __init__(self, inventory: Inventory, weights: Weights | None = None) -> None:
         self.inventory = inventory
@@ -136,7 +138,7 @@ class CostModel:
         }
 
     def of_part(self, part: int) -> Amount:
-        """Cost of the elements of a part."""
+        """Return the cost of the elements of a part."""
         return self._of(part, self.inventory.counts.get(part, Counter()))
 
     @cached_property
@@ -145,18 +147,22 @@ class CostModel:
         return _sum(self.of_part(part) for part in self.inventory.counts)
 
     def share_of(self, part: int) -> Share:
-        """Share of a part's elements in the cost of all elements [-]."""
-        own, total = self.of_part(part), self.total
-        return self._share(own, own.cost / total.cost if total.cost else 0.0)
+        """Return the share of a part's elements in the cost of all elements [-]."""
+        cost_of_part = self.of_part(part)
+        total = self.total
+        return self._share(
+            cost_of_part, cost_of_part.cost / total.cost if total.cost else 0.0
+        )
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Share of a step that is saved while these parts are rigid, c above [-]; unknown of parts beside the deck."""
-        if absent := sorted(set(parts) - self.inventory.parts.keys()):
+        """Return the share c of a step saved while ``parts`` are rigid [-]; unknown for parts not in the deck."""
+        absent = sorted(set(parts) - self.inventory.parts.keys())
+        if absent:
             return Share(
                 None, f"{name_units(absent)} {choose_verb(absent)} not in the deck"
             )
-        within = self.inventory.elements_within(parts)
-        rigid = _sum(self._of(part, counts) for part, counts in within.items())
+        elements = self.inventory.elements_within(parts)
+        rigid = _sum(self._of(part, counts) for part, counts in elements.items())
         total = self.total
         nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
         return self._share(
@@ -165,22 +171,25 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Formulations of the deck whose weight is that of one alike, not their own."""
-        found = dict.fromkeys(
-            one.name
-            for part, counts in self.inventory.counts.items()
-            if part not in self._rigid
-            for one in (self.inventory.formulation(part, kind) for kind in counts)
-            if one.cost is not None
-            and not one.measured
-            and one.name not in self.weights.per_element
-        )
-        return tuple(found)
+        """Formulations of the deck that have the weight of a similar formulation."""
+        names: dict[str, None] = {}
+        for part, counts in self.inventory.counts.items():
+            if part in self._rigid:
+                continue
+            for kind in counts:
+                formulation = self.inventory.formulation(part, kind)
+                if formulation.cost is None or formulation.measured:
+                    continue
+                if formulation.name not in self.weights.per_element:
+                    names[formulation.name] = None
+        return tuple(names)
 
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
+        """Return the cost of elements of a part, by class and number."""
         if part in self._rigid:
             return Amount(0.0)
-        cost, unknown = 0.0, list[str]()
+        cost = 0.0
+        unknown = list[str]()
         for kind, count in counts.items():
             formulation = self.inventory.formulation(part, kind)
             weight = self.weights.per_element.get(formulation.name)
@@ -195,18 +204,16 @@ class CostModel:
                 ) * count
         return Amount(cost, tuple(unknown))
 
-    def _share(self, own: Amount, value: float) -> Share:
-        """Give a share that is known; of all elements, also of those outside, the weights must be known."""
+    def _share(self, amount: Amount, value: float) -> Share:
+        """Return a share if the weights of all elements are known, else None with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
-            return Share(
-                None,
-                f"not all elements are known: {self.inventory.notes[0]}"
-                if self.inventory.notes
-                else None,
-            )
-        if unknown := sorted({*own.unknown, *self.total.unknown}):
+            if not self.inventory.notes:
+                return Share(None)
+            return Share(None, f"not all elements are known: {self.inventory.notes[0]}")
+        unknown = sorted({*amount.unknown, *self.total.unknown})
+        if unknown:
             return Share(
                 None,
                 f"no weight is known for {', '.join(unknown)}; give one with `weights`",
@@ -215,56 +222,59 @@ class CostModel:
 
 
 def _sum(amounts: Iterable[Amount]) -> Amount:
-    cost, unknown = 0.0, list[str]()
-    for one in amounts:
-        cost += one.cost
-        unknown += one.unknown
+    """Return the sum of costs, with all formulations without a weight."""
+    cost = 0.0
+    unknown = list[str]()
+    for amount in amounts:
+        cost += amount.cost
+        unknown += amount.unknown
     return Amount(cost, tuple(dict.fromkeys(unknown)))
 
 
-# Keys of the TOML file of weights that `d2rpick calibrate` writes.
+# Keys of the TOML file of weights that ``d2rpick calibrate`` writes.
 _NUMBERS: Final = ("element_share", "rigid_node")
 _KEYS: Final = (*_NUMBERS, "per_element", "source")
 
 
 def read_weights(path: str) -> Weights:
-    """Read weights; what the file does not say of the share and of rigid nodes is as measured.
+    """Read weights from a TOML file; a missing element share or node cost has its measured value.
 
     Raises
     ------
     ConfigurationError
-        If the file cannot be read, has unknown keys, or a number that makes no sense.
+        If the file cannot be read, has unknown keys, or has a number outside of its range.
     """
     import tomllib
     from pathlib import Path
 
     try:
         content = Path(path).read_bytes()
-        found = tomllib.loads(content.decode("utf-8"))
+        values = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ConfigurationError(
             f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
         ) from None
-    if unknown := [key for key in found if key not in _KEYS]:
+    unknown = [key for key in values if key not in _KEYS]
+    if unknown:
         raise ConfigurationError(
             f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}"
         )
-    per_element = found.get("per_element")
+    per_element = values.get("per_element")
     if not isinstance(per_element, dict) or not per_element:
         raise ConfigurationError(
             f"{path}: no table [per_element], the cost of each formulation was expected there"
         )
-    given: dict[str, Any] = {
-        key: _number(path, key, found[key]) for key in _NUMBERS if key in found
+    numbers: dict[str, Any] = {
+        key: _number(path, key, values[key]) for key in _NUMBERS if key in values
     }
     weights = {name: _number(path, name, value) for name, value in per_element.items()}
     try:
         return Weights(
             weights,
-            source=str(found.get("source", path)),
+            source=str(values.get("source", path)),
             file=Source(path, content),
-            **given,
+            **numbers,
         )
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None
@@ -294,12 +304,14 @@ def weights_as_toml(weights: Weights) -> str:
 
 
 def _quoted(text: str) -> str:
+    """Quote a text as a TOML string."""
     import json
 
-    return json.dumps(text, ensure_ascii=False)  # TOML has no pairs of surrogates
+    return json.dumps(text, ensure_ascii=False)  # TOML does not allow surrogate pairs
 
 
 def _number(path: str, name: str, value: object) -> float:
+    """Return a value of a TOML file as a number, or raise ConfigurationError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:

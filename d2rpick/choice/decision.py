@@ -1,6 +1,6 @@
-"""One verdict for a pair of times: use it or not, why, what comes after td, the worst case, and what would be better.
+"""Give one verdict on a pair of times, with its reason, the time after td, the worst case, and a better pair.
 
-Every command, form and page takes its words from here, so that none says another thing of the same pair.
+All commands, forms and pages take their words from here, so that none contradicts another.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ if TYPE_CHECKING:
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.situation import Situation
 
-# Of the vibration [-]: a worst case within this of what is expected is the same to people.
+# A worst case within this difference of the expected residual is shown as the same [-].
 _ALIKE: Final = 5e-3
 
 
 class Decision(NamedTuple):
-    """What to do with a pair of times.
+    """Verdict on a pair of times.
 
     Parameters
     ----------
     grade : str
-        "good", "fair" or "poor"; `verdict` says it in words.
+        "good", "fair" or "poor"; `verdict` gives it in words.
     quality : Quality
-        The two statements that it rests on: motion and vibration.
+        The two grades that it rests on: of motion and of vibration.
     objections : tuple of str
-        Why the pair is not admissible at all; empty if it is.
+        Reasons why the pair is not admissible; empty if it is.
     at_rest : bool
-        Whether nothing vibrates in the flight up to td.
+        True if nothing vibrates in the flight up to td.
     kept : Kept or None
-        Bounds of the mean energy after td over that of the reference [-]; None if nothing tells it.
+        Bounds of the mean energy after td over that of the reference run [-]; None if they are unknown.
     residual : float or None
-        Error of the vibration after td that is expected [-].
+        Expected residual [-].
     worst_residual : float
-        The largest that the record allows [-].
+        Largest residual that the record allows [-].
     better : Pair or None
-        A pair that is better, if one was looked for and exists.
+        A better pair, if one was searched and found.
     """
 
     grade: str
@@ -63,12 +63,12 @@ class Decision(NamedTuple):
         return VERDICTS[self.grade]
 
     def reaches(self, grade: str) -> bool:
-        """Whether the pair is as good as a grade asks for."""
+        """Return True if the pair has at least the given grade."""
         return GRADES.index(self.grade) >= GRADES.index(grade)
 
     @property
     def reason(self) -> str:
-        """Why the verdict is what it is."""
+        """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
         if self.quality.reasons:
@@ -79,7 +79,7 @@ class Decision(NamedTuple):
 
     @property
     def expected(self) -> str:
-        """What is expected after td."""
+        """Description of the expected time after td."""
         if self.at_rest:
             return (
                 "the same as in the reference: nothing vibrates in the flight up to td"
@@ -95,19 +95,19 @@ class Decision(NamedTuple):
 
     @property
     def worst_case(self) -> str:
-        """The worst that the record allows after td."""
+        """Description of the worst time after td that the record allows."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
-            wrong = f"vibration wrong by {self.worst_residual:.0%}"
-            return f"{wrong}, if the deformation at tr is opposite to that at td"
+            text = f"vibration wrong by {self.worst_residual:.0%}"
+            return f"{text}, if the deformation at tr is opposite to that at td"
         if self.worst_residual - self.residual <= _ALIKE:
             return "the same"
         return f"vibration wrong by {self.worst_residual:.0%}"
 
     @property
     def cure(self) -> str:
-        """What would make the pair better; empty if it is good."""
+        """Change that would make the pair better; empty if it is good."""
         if self.grade == GOOD:
             return ""
         cures = dict.fromkeys(cause.cure for cause in self.quality.causes)
@@ -125,7 +125,7 @@ def decide(
     objections: Sequence[str] = (),
     better: Pair | None = None,
 ) -> Decision:
-    """Decide on a tr in a situation; ``objections`` are why it is not admissible, ``better`` is a better pair."""
+    """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair."""
     quality = quality_of(situation, candidate)
     return Decision(
         grade=POOR if objections else quality.grade,
@@ -140,7 +140,10 @@ def decide(
 
 
 def _worst_residual(situation: Situation, candidate: Candidate) -> float:
-    """Largest residual that the record allows [-]; of an unknown deformation that of equal levels, opposite signs."""
+    """Return the largest residual that the record allows [-].
+
+    If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
+    """
     if situation.at_rest:
         return 0.0
     if candidate.residual is None:
@@ -149,23 +152,25 @@ def _worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _why_good(quality: Quality, residual: float | None) -> str:
-    """Say why a pair is good: its vibration is kept, or hardly matters."""
+    """Explain why a pair is good: its vibration is kept, or hardly matters."""
     if quality.alone.grade == GOOD:
-        off = "" if residual is None else f": it is wrong by {residual:.1%}"
-        return f"the flight is certain, and the vibration after td is kept{off}"
+        error = "" if residual is None else f": it is wrong by {residual:.1%}"
+        return f"the flight is certain, and the vibration after td is kept{error}"
     share = quality.worth.share if quality.worth else 0.0
-    wrong = "; ".join(quality.alone.reasons)
-    return f"{wrong}, but that is at most {share:.2%} of the energy of the next contact"
+    reasons = "; ".join(quality.alone.reasons)
+    return (
+        f"{reasons}, but that is at most {share:.2%} of the energy of the next contact"
+    )
 
 
 def span_of(kept: Kept) -> str:
-    """Write the bounds of the mean energy, one number if they read alike."""
+    """Write the bounds of the mean energy, as one number if both look alike."""
     low, high = f"{kept.low:.0%}", f"{kept.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 
 def _named(pair: Pair) -> str:
-    """Name a pair, and its residual if that is known."""
+    """Describe a pair, with its residual if that is known."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:
         return times

@@ -1,6 +1,6 @@
-"""What the deck of a run tells about it, which rigid bodies its parts become, and what may be wrong with what it says.
+"""Apply the deck of a run: rigid bodies, supports, gravity and costs, and doubts about the deck.
 
-The deck of another model tells numbers of parts that have nothing to do with the run: nothing of it is used.
+The part ids of a deck of another model have nothing to do with the run, so nothing of it is used.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 
 def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:
-    """Give the rigid bodies that these parts become; none where elements, or ties between bodies, are not known.
+    """Return the rigid bodies that ``parts`` become; empty if elements, or ties between bodies, are unknown.
 
-    A part in pieces that nothing joins is one body all the same in LS-DYNA, which switches parts; in Radioss, where a
-    body is a set of nodes, each piece may have a body of its own.
+    In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
+    bodies are sets of nodes, each piece may have a body of its own.
     """
     if not inventory.complete or not inventory.counts.keys() >= set(parts):
         return ()
@@ -43,6 +43,7 @@ def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, 
 
 
 def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
+    """Return True if a rigid body is one connected piece, or Radioss can treat its pieces separately."""
     alone = len(body) == 1 and inventory.solver == "radioss"
     return (
         alone
@@ -52,72 +53,71 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 
 
 def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
-    """Give the rigid body that parts become which are merged, whatever ``bodies`` they would be."""
-    whole = len(parts) > 1 or any(
-        body.whole for body in bodies
-    )  # a part alone may be of pieces
+    """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
+    # a single part may consist of pieces
+    whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
 def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
-    """Say why a deck is not that of a run; None where nothing shows it.
+    """Return a warning if a deck is not that of a run, else None.
 
-    It is not where more of the parts that both have differ in their titles than agree, or where all of the deck was
-    read and parts with energy are not in it.
+    It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
+    have energy.
     """
     titled = [
-        one
-        for one in run.parts
-        if one.id in inventory.parts and one.title and _title(one, inventory)
+        part
+        for part in run.parts
+        if part.id in inventory.parts and part.title and _title(part, inventory)
     ]
-    other = [one for one in titled if _differ(one.title, _title(one, inventory))]
-    found = _named(other, inventory) if 2 * len(other) > len(titled) else ""
-    known = inventory.parts.keys() | inventory.history_groups
-    absent = [one for one in run.parts if one.id not in known]
-    if not found and inventory.complete and _has_energy(run, absent):
-        found = f"{name_units(one.id for one in absent)} of the history {choose_verb(absent)} not in the deck"
-    told = f"{found}: nothing of the deck is used; name that of the run"
-    return Caution("deck-of-another-model", told) if found else None
+    differing = [
+        part for part in titled if _differ(part.title, _title(part, inventory))
+    ]
+    difference = (
+        _named(differing, inventory) if 2 * len(differing) > len(titled) else ""
+    )
+    ids_in_deck = inventory.parts.keys() | inventory.history_groups
+    absent = [part for part in run.parts if part.id not in ids_in_deck]
+    if not difference and inventory.complete and _has_energy(run, absent):
+        difference = f"{name_units(part.id for part in absent)} of the history {choose_verb(absent)} not in the deck"
+    text = f"{difference}: nothing of the deck is used; name that of the run"
+    return Caution("deck-of-another-model", text) if difference else None
 
 
 def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
-    """Whether parts are seen to have energy."""
+    """Return True if the history contains energy of any of the parts."""
     return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where some parts of a history have other titles in the deck: what it says may be of another model."""
-    other = [
+    """Yield a warning if some parts have other titles in the deck than in the history."""
+    differing = [
         part
         for part in parts
         if part.id in inventory.parts and _differ(part.title, _title(part, inventory))
     ]
-    if other:
+    if differing:
         yield Caution(
             "deck-of-another-model",
-            f"{_named(other, inventory)}: is this the deck of the run?",
+            f"{_named(differing, inventory)}: is this the deck of the run?",
         )
 
 
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where ties that are not followed may join the rigid bodies that parts become, or one has loose pieces."""
+    """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
-        more = (
-            f" and {len(inventory.ties) - 1} more ties"
-            if len(inventory.ties) > 1
-            else ""
-        )
-        found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
+        if len(inventory.ties) > 1:
+            more_ties = f" and {len(inventory.ties) - 1} more ties"
+        else:
+            more_ties = ""
+        ties_text = f"{inventory.ties[0]}{more_ties} may join parts that share no nodes, which is not followed"
         yield Caution(
             "ties-not-followed",
-            f"{found}; parts that are tied belong in one rigid body",
+            f"{ties_text}; parts that are tied belong in one rigid body",
         )
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
-    cure = (
-        cure
-        if inventory.solver == "ls-dyna"
-        else "each of them needs a rigid body of its own"
-    )
+    if inventory.solver != "ls-dyna":
+        cure = "each of them needs a rigid body of its own"
     for body in bodies_of(inventory, parts):
         if not (body.whole or inventory.ties):
             lies = (
@@ -130,12 +130,15 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
 
 
 def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say what ruins a run, what is not known of its supports, and which parts would spring back wrongly if turned."""
+    """Yield warnings about what ruins a run, unknown supports, and parts whose stresses do not rotate with them."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
     for part in parts:
-        if part in inventory.parts and (why := inventory.parts[part].unswitchable):
+        if part not in inventory.parts:
+            continue
+        why = inventory.parts[part].unswitchable
+        if why:
             yield Caution(
                 "unswitchable-part", f"{name_units([part])}: {why}; leave it out"
             )
@@ -145,25 +148,27 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
         if part in inventory.parts and not inventory.parts[part].section.turns
     ]
     if unturned and inventory.solver == "radioss":
-        found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
+        parts_text = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
         yield Caution(
-            "stresses-unturned", f"{found}; expect an error after a large rotation"
+            "stresses-unturned", f"{parts_text}; expect an error after a large rotation"
         )
 
 
 def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
-    """Say which parts a deck keeps rigid, in a run that switches others, although they deform."""
-    left = inventory.left_rigid
-    if left and _has_energy(run, [part for part in run.parts if part.id in left.parts]):
-        where = f"{left.place.file}:{left.place.line}"
+    """Yield a warning if a deck keeps parts rigid that deform in the history."""
+    left_rigid = inventory.left_rigid
+    if left_rigid and _has_energy(
+        run, [part for part in run.parts if part.id in left_rigid.parts]
+    ):
+        where = f"{left_rigid.place.file}:{left_rigid.place.line}"
         yield Caution(
             LEFT_RIGID,
-            f"{where}: {left.found}, which deform in the history; {left.way_out}",
+            f"{where}: {left_rigid.found}, which deform in the history; {left_rigid.way_out}",
         )
 
 
 def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
-    """Say what was not followed of a deck and, where its cost is ``used``, which weights were not measured."""
+    """Yield warnings about what was not followed in a deck and, if its cost is ``used``, about weights not measured."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
@@ -171,22 +176,27 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
         yield Caution("weights-by-analogy", taken)
 
 
-def _named(other: Sequence[Part], inventory: Inventory) -> str:
-    """Name the first of the parts whose titles differ."""
-    first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
-    return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
+def _named(differing: Sequence[Part], inventory: Inventory) -> str:
+    """Describe the first of the parts whose titles differ."""
+    first = differing[0]
+    more_parts = f", and {len(differing) - 1} more" if len(differing) > 1 else ""
+    title_in_deck = _title(first, inventory)
+    return f"part {first.id} is {first.title!r} in the history and {title_in_deck!r} in the deck{more_parts}"
 
 
 def _title(part: Part, inventory: Inventory) -> str:
+    """Return the title of a part in the deck."""
     return inventory.parts[part.id].title
 
 
-def _differ(one: str, other: str) -> bool:
-    """Whether two titles are there and differ, but for blanks, capitals, and where a format cuts them.
+def _differ(first_title: str, second_title: str) -> bool:
+    """Return True if two titles differ, except in spaces, case, and length if one is cut off.
 
-    Letters beyond ASCII are not compared: files of one run encode them in different ways.
+    Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
-    plain = ("".join(filter(str.isascii, title)) for title in (one, other))
+    plain = (
+        "".join(filter(str.isascii, title)) for title in (first_title, second_title)
+    )
     first, second = (" ".join(title.split()).casefold() for title in plain)
     shorter = min(len(first), len(second))
     return first[:shorter] != second[:shorter]
@@ -195,60 +205,64 @@ def _differ(one: str, other: str) -> bool:
 def with_deck(
     settings: Settings, reference: Reference, model: CostModel
 ) -> tuple[Settings, tuple[Caution, ...]]:
-    """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
+    """Return settings with the cost share and the rigid bodies that the deck defines for the parts of a history.
 
-    What stays unknown is in the cautions; the deck of another model tells nothing.
+    A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
     """
     inventory = model.inventory
-    if foreign := of_another_model(reference.run, inventory):
+    foreign = of_another_model(reference.run, inventory)
+    if foreign:
         return replace(settings, bodies=()), (foreign,)
     ids = [part.id for part in reference.history.parts or ()]
-    told = (*doubts_of_solver(ids, inventory), *left_rigid_in(reference.run, inventory))
+    doubts_of_parts = (
+        *doubts_of_solver(ids, inventory),
+        *left_rigid_in(reference.run, inventory),
+    )
     ruined = tuple(
-        RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS
+        RUINS[code]
+        for code in dict.fromkeys(caution.code for caution in doubts_of_parts)
+        if code in RUINS
     )
-    history, settings = (
-        reference.history,
-        replace(settings, kept_off=inventory.kept_off, ruined=ruined),
-    )
+    history = reference.history
+    settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
-        open_ = (
-            [Caution("cost-unknown", f"the run time stays open: {why}")]
-            if settings.cost_share is None
-            else []
-        )
-        return replace(settings, bodies=()), (*told, *open_)
-    asked = settings.cost_share is None
-    share = model.saved(ids) if asked else Share(settings.cost_share)
-    found = replace(
+        if settings.cost_share is None:
+            open_ = [Caution("cost-unknown", f"the run time stays open: {why}")]
+        else:
+            open_ = []
+        return replace(settings, bodies=()), (*doubts_of_parts, *open_)
+    is_computed = settings.cost_share is None
+    share = model.saved(ids) if is_computed else Share(settings.cost_share)
+    with_cost = replace(
         settings,
         cost_share=share.value,
         bodies=bodies_of(inventory, ids),
         placement=Placement(inventory),
-        by_deck=ByDeck(inventory.files, model.weights if asked else None),
+        by_deck=ByDeck(inventory.files, model.weights if is_computed else None),
     )
     doubts = [
         *doubts_of(history.parts, inventory),
-        *doubts_of_cost(model, used=asked and share.value is not None),
+        *doubts_of_cost(model, used=is_computed and share.value is not None),
         *doubts_of_bodies(ids, inventory),
-        *told,
+        *doubts_of_parts,
     ]
     if share.reason:
         doubts.append(
             Caution("cost-unknown", f"the run time stays open: {share.reason}")
         )
-    return found, tuple(doubts)
+    return with_cost, tuple(doubts)
 
 
 def in_deck(run: Run, inventory: Inventory | None) -> Run:
-    """Give a run with what its deck tells; as it is without one, or with that of another model."""
+    """Return a run with the surroundings that its deck defines; unchanged without a deck of the model."""
     if inventory is None or of_another_model(run, inventory):
         return run
     return run.within(_surroundings(inventory))
 
 
 def _surroundings(inventory: Inventory) -> Surroundings:
+    """Return gravity, supports and connected parts according to the deck."""
     by_part, whole = find_supports(inventory)
     supports: dict[int | None, tuple[Support, ...]] = {
         part: _supports(holds) for part, holds in by_part.items()
@@ -258,34 +272,39 @@ def _surroundings(inventory: Inventory) -> Surroundings:
     on_free = {
         gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()
     }
-    if len(on_free) == 1 and (common := on_free.pop()) is not None:
-        gravity[None] = common
+    if len(on_free) == 1:
+        (common,) = on_free
+        if common is not None:
+            gravity[None] = common
     return Surroundings(gravity, supports, partial(_bodies, inventory))
 
 
 def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
-    """Parts that hang together; none where some may be missing, or ties that are not followed may join them."""
-    known = inventory.complete and not inventory.ties
-    return inventory.bodies(inventory.nodes_by_part.keys()) if known else ()
+    """Return the groups of connected parts; empty if parts may be missing, or ties may join the groups."""
+    is_complete = inventory.complete and not inventory.ties
+    return inventory.bodies(inventory.nodes_by_part.keys()) if is_complete else ()
 
 
 def _supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
-    return tuple(dict.fromkeys(Support(one.name, one.start, one.end) for one in holds))
+    """Return the supports with their names and times, each once."""
+    return tuple(
+        dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
+    )
 
 
 def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Accelerations that gravity may have for each part of which they are known."""
+    """Yield the possible accelerations of gravity for each part for which they are known."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
-        acting = [(one, _acts(one, part, nodes)) for one in loads or ()]
+        acting = [(load, _acts(load, part, nodes)) for load in loads or ()]
         if all(acts is not None for _, acts in acting):
-            together = _together([one for one, acts in acting if acts])
+            together = _together([load for load, acts in acting if acts])
             if together is not None:
                 yield part, together
 
 
 def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
-    """Whether gravity acts on a part with these nodes; None where on some of them."""
+    """Return True if gravity acts on a part with these nodes; None if it acts on some nodes only."""
     if load.nodes is None or part in load.parts:
         return True
     inside = np.isin(nodes, load.nodes)
@@ -293,14 +312,13 @@ def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Sizes of several loads together; None where their sum is not known."""
+    """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
-        return tuple(
-            sorted({abs(value) for one in loads for value in one.values} or {0.0})
-        )
-    if any(one.axis is None or len(one.values) > 1 for one in loads):
+        values = loads[0].values if loads else ()
+        return tuple(sorted({abs(value) for value in values} or {0.0}))
+    if any(load.axis is None or len(load.values) > 1 for load in loads):
         return None
     along = [
-        sum(one.values[0] for one in loads if one.axis == axis) for axis in range(3)
+        sum(load.values[0] for load in loads if load.axis == axis) for axis in range(3)
     ]
     return (float(np.linalg.norm(along)),)

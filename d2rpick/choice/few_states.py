@@ -1,4 +1,4 @@
-"""Whether the states of a file that is written seldom show the level of an energy that swings."""
+"""Warn if a file with few states does not show the level of a fluctuating energy."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# What LS-DYNA writes more often than a d3plot.
+# Files that LS-DYNA usually writes more often than a d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
 def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
-    """Say so where the states up to td are too few for the level at td: fewer than ten in a period that they show.
+    """Yield a warning if the states up to td are too few for the level at td: fewer than 10 per visible period.
 
-    Whoever sees no period may have missed all of them, since a d3plot has some hundred states at most.
+    If no period is visible, all periods may have been missed, since a d3plot has some hundred states at most.
     """
-    history, td, start = situation.history, situation.td, situation.flight.start
+    history = situation.history
+    td = situation.td
+    start = situation.flight.start
     if history.energy_format not in FAMILIES or situation.at_rest:
         return
     begin = float(history.time[0]) if start is None else start
@@ -37,8 +39,8 @@ def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
     ):
         return
     oftener = list_names([name for name in _OFTENER if name != history.energy_format])
-    found = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
+    text = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
     yield Caution(
         "few-states",
-        f"{found}, so its level at td is unsure; name what was written more often: {oftener}",
+        f"{text}, so its level at td is unsure; name what was written more often: {oftener}",
     )

@@ -1,4 +1,4 @@
-"""The flights of a record, in which td may lie."""
+"""Find the flights of a record, in which td may lie."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.span import Fits
 
-# Parts of the record at which a vibration that goes on by itself is looked for.
+# Places in the record at which a continuing vibration is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
+_NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
 
 
 def longest_flight(
@@ -29,59 +30,67 @@ def longest_flight(
     *,
     otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
-    """Give the longest flight as a window for td within the record [time].
+    """Return the longest flight as a window for td within the record [time].
 
-    The energy alone may show no end of the flight to the td in it: then the margin is kept from the one that was found.
-    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
+    A td in a flight known by the energy alone may show another end of the flight; then the window keeps the margin.
+    ``otherwise`` is returned if there is no flight.
+
+    Raises
+    ------
+    RangeError
+        If there is no flight and no ``otherwise``.
     """
     flights = flights_of(history, settings, fits)
-    if settings.landing is not None and (
-        last := _last_before(settings.landing, flights)
-    ):
-        flights = (last,)
+    if settings.landing is not None:
+        last = _last_before(settings.landing, flights)
+        if last:
+            flights = (last,)
     if not flights and otherwise:
         return otherwise
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
-        found = (
-            held or "nothing in the record shows a flight, in which td could be chosen"
-        )
-        cure = (
-            "give `td`"
-            if settings.after is not None
-            else "give the end of the load as `after` where it is known"
-        )
-        cure = "only what nothing holds can be switched" if held else cure
-        raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
+        if held:
+            reason = held
+            cure = "only what nothing holds can be switched"
+        elif settings.after is not None:
+            reason = _NO_FLIGHT
+            cure = "give `td`"
+        else:
+            reason = _NO_FLIGHT
+            cure = "give the end of the load as `after` where it is known"
+        raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
-    (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
+    (start, end), longest = max(
+        windows,
+        key=lambda window_and_flight: window_and_flight[0][1] - window_and_flight[0][0],
+    )
     latest = last_td(end, margin_of(history, longest, settings, fits).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
 
 def last_td(end: float, margin: float) -> float:
-    """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
+    """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
 def flights_of(
     history: History, settings: Settings, fits: Fits | None = None
 ) -> tuple[Flight, ...]:
-    """Find every flight of a record, ascending in time, that of the landing that is given up to there.
+    """Find all flights of a record, ascending in time; the flight of a given landing ends there.
 
     Parameters
     ----------
     history : History
-        With its evidence, as a run gives it.
+        With its evidence, as a run provides it.
     settings : Settings
-        How an oscillator is looked for where no better evidence shows a flight.
+        Options for the search for an oscillator if no better evidence shows a flight.
     fits : Fits, optional
-        Those of an earlier look at the record; none of its windows is fitted twice.
+        Fits of an earlier call for the record; no window is fitted twice.
 
     Returns
     -------
     tuple of Flight
-        ``end`` is None where the record ends in flight.  A flight shorter than a twentieth of the record is not seen.
+        ``end`` is None if the record ends in flight.  Flights shorter than 1/20 of the record are not found.
 
     Raises
     ------
@@ -94,60 +103,69 @@ def flights_of(
             history, settings, _flights_of(history, settings, fits), fits
         )
     history.check(landing, argument="landing")
-    found = _flights_of(history, replace(settings, landing=None), fits)
-    last = _last_before(landing, found)
+    flights = _flights_of(history, replace(settings, landing=None), fits)
+    last = _last_before(landing, flights)
     if last and landing <= last.within(history.time)[1]:
-        found = tuple(
-            one._replace(end=landing) if one is last else one for one in found
+        flights = tuple(
+            flight._replace(end=landing) if flight is last else flight
+            for flight in flights
         )
-        return _with_given_start(history, settings, found, fits)
+        return _with_given_start(history, settings, flights, fits)
     from d2rpick.choice.situation import examine
 
-    before = examine(history, landing, settings, fits).flight
-    return (
-        _in_order(history, found, before)
-        if before.end == landing and not before.refusal
-        else found
-    )
+    landing_flight = examine(history, landing, settings, fits).flight
+    if landing_flight.end == landing and not landing_flight.refusal:
+        return _in_order(history, flights, landing_flight)
+    return flights
 
 
 def _with_given_start(
-    history: History, settings: Settings, found: tuple[Flight, ...], fits: Fits | None
+    history: History, settings: Settings, flights: tuple[Flight, ...], fits: Fits | None
 ) -> tuple[Flight, ...]:
-    """Add the flight that begins where the user says that the load ends, if none of those found holds that time."""
-    after, last = settings.after, float(history.time[-1])
-    windows = [one.within(history.time) for one in found]
-    if after is None or any(start <= after < end for start, end in windows):
-        return found
+    """Add the flight that starts at the end of the load given by the user, unless a flight contains that time."""
+    load_end = settings.after
+    last = float(history.time[-1])
+    windows = [flight.within(history.time) for flight in flights]
+    if load_end is None or any(start <= load_end < end for start, end in windows):
+        return flights
     from d2rpick.choice.situation import examine
 
-    end = min((start for start, _ in windows if start > after), default=last)
+    end = min((start for start, _ in windows if start > load_end), default=last)
     end = end if settings.landing is None else min(end, settings.landing)
-    given = examine(history, (after + end) / 2, settings, fits).flight
-    if given.source != "given" or given.refusal or given.start != after:
-        return found
-    return _in_order(
-        history,
-        found,
-        given if given.end is not None or end == last else given._replace(end=end),
-    )
+    given_flight = examine(history, (load_end + end) / 2, settings, fits).flight
+    if (
+        given_flight.source != "given"
+        or given_flight.refusal
+        or given_flight.start != load_end
+    ):
+        return flights
+    if given_flight.end is None and end != last:
+        given_flight = given_flight._replace(end=end)
+    return _in_order(history, flights, given_flight)
 
 
 def _in_order(
-    history: History, found: tuple[Flight, ...], given: Flight
+    history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
-    """Give flights ascending in time, with the one that is given in place of those that it overlaps."""
-    first, last = given.within(history.time)
-    windows = ((one, *one.within(history.time)) for one in found)
-    others = [one for one, start, end in windows if end <= first or start >= last]
-    return tuple(sorted((*others, given), key=lambda one: one.within(history.time)))
+    """Return flights ascending in time, with the given flight replacing those that it overlaps."""
+    first, last = given_flight.within(history.time)
+    windows = ((flight, *flight.within(history.time)) for flight in flights)
+    kept_flights = [
+        flight for flight, start, end in windows if end <= first or start >= last
+    ]
+    return tuple(
+        sorted(
+            (*kept_flights, given_flight),
+            key=lambda flight: flight.within(history.time),
+        )
+    )
 
 
 def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
-    """Give the last flight that begins before a landing [time]."""
+    """Return the last flight that starts before a landing [time]; None without one."""
     return max(
-        (one for one in flights if (one.start or 0.0) < landing),
-        key=lambda one: one.start or 0.0,
+        (flight for flight in flights if (flight.start or 0.0) < landing),
+        key=lambda flight: flight.start or 0.0,
         default=None,
     )
 
@@ -155,23 +173,24 @@ def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
 def _flights_of(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
-    """Find them without a landing: where the energy is all there is, by what describes it, or none."""
-    seen = find_all_seen(history)
-    if seen:
+    """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
+    witnessed = find_all_seen(history)
+    if witnessed:
         return tuple(
             Flight(
-                one.start,
-                one.end if one.end_seen else None,
+                window.start,
+                window.end if window.end_seen else None,
                 source,
-                one.parts,
-                one.damping,
-                gravity=one.gravity,
+                window.parts,
+                window.damping,
+                gravity=window.gravity,
             )
-            for source, one in seen
+            for source, window in witnessed
         )
+    # imported here: evidence better than the energy does not need it
     from d2rpick.choice.situation import (
         looking,
-    )  # not above: better evidence than the energy does without it
+    )
 
     look = looking(history, settings, fits)
     if settings.replay and not list_witnesses(history):
@@ -180,51 +199,57 @@ def _flights_of(
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                return (
-                    flight,
-                )  # it ends with the vibration, also if its start is given
+                # this flight ends with the vibration, even if its start is given
+                return (flight,)
         look = looking(history, replace(settings, replay=False))
-    found: list[Flight] = []
-    for td in sorted(
-        list_moments(history.time), reverse=True
-    ):  # the last quiet time before td tells most of the flight
-        if found and found[-1].start is not None and td > found[-1].start:
+    flights: list[Flight] = []
+    # the last quiet time before td shows most of the flight
+    for td in sorted(list_moments(history.time), reverse=True):
+        if flights and flights[-1].start is not None and td > flights[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
-        # one that lasts into the next misses the load before that one, so its end is not known
+        # a flight that lasts into the next one misses the load between them, so its end is unknown
         lasts = (
-            found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
+            flights
+            and flight.within(history.time)[1] > flights[-1].within(history.time)[0]
         )
         if situation.in_flight and not flight.refusal and not lasts:
-            found.append(flight)
-    return tuple(reversed(found))
+            flights.append(flight)
+    return tuple(reversed(flights))
 
 
 def momentum_of_flight(history: History) -> dict[str, Samples]:
-    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
+    """Return columns of the momentum that shows the flight, and of the mass.
 
-    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
-    energy.
+    They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
+    are columns of the velocity.  The result is empty if neither is written at the times of the energy.
     """
     import numpy as np
 
+    # imported here: most evidence does not need it
     from d2rpick.flight.momentum import (
         find_all_flights,
         select_momenta_for_flight,
-    )  # not above: most evidence is found without
+    )
 
-    asked = [
-        one
-        for one in select_momenta_for_flight(history.momenta)
-        if np.array_equal(one.time, history.time)
+    momenta_at_states = [
+        momenta
+        for momenta in select_momenta_for_flight(history.momenta)
+        if np.array_equal(momenta.time, history.time)
     ]
-    if not asked:
+    if not momenta_at_states:
         return {}
     momenta = next(
-        (one for one in asked if find_all_flights(one, history.balance)), asked[0]
+        (
+            momenta
+            for momenta in momenta_at_states
+            if find_all_flights(momenta, history.balance)
+        ),
+        momenta_at_states[0],
     )
-    flights, members = find_all_flights(momenta, history.balance), momenta.chosen
+    flights = find_all_flights(momenta, history.balance)
+    members = momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         members = tuple(

@@ -1,10 +1,10 @@
-"""Grades of a pair of times, and the verdict that each stands for; apart from what finds them, which takes numpy."""
+"""Define the grades of a pair of times, and the verdict for each; apart from the grading, which needs numpy."""
 
 from __future__ import annotations
 
 from typing import Final
 
-# From the worst to the best.
+# In order from the worst to the best.
 POOR: Final = "poor"
 FAIR: Final = "fair"
 GOOD: Final = "good"

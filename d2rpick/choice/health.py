@@ -1,7 +1,7 @@
-"""Health of a run: whether its energies can be trusted, what acts in the window, and which runs cannot be judged.
+"""Judge the health of a run: whether its energies can be trusted, what acts in the window, and when to refuse it.
 
-A term that the files do not have gives None, never 0.  Shares are of the peak of the internal energy, as practice
-takes them, and left out where that is tiny.
+A term that the files do not have gives None, never 0.  Shares refer to the peak of the internal energy, as is usual in
+practice, and are left out if that peak is tiny.
 """
 
 from __future__ import annotations
@@ -25,40 +25,40 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
 
-# Hourglass energy is to stay below a tenth of the peak internal energy, of the model and of each part: rule of thumb of
-# DYNAmore (dynasupport.com/howtos/element/hourglass); the same tenth in NCHRP Web-Only Document 179 (2010), table E-1.
+# Largest hourglass energy as a share of the peak internal energy, for the model and for each part: rule of thumb of
+# DYNAmore (dynasupport.com/howtos/element/hourglass); NCHRP Web-Only Document 179 (2010), table E-1, has the same 10 %.
 MOST_HOURGLASS = 0.10
-# The total energy must not vary by more than a tenth: NCHRP Web-Only Document 179 (2010), table E-1.
+# Largest variation of the total energy: NCHRP Web-Only Document 179 (2010), table E-1.
 MOST_IMBALANCE = 0.10
-# Without friction contacts should hold less than a tenth of the peak internal energy
-# (dynasupport.com/howtos/general/contact-energy).  Negative energy has no physical cause but comes from penetrations;
-# a twentieth is what Oasys' energy check allows of either sign.
+# Largest contact energy without friction, as a share of the peak internal energy
+# (dynasupport.com/howtos/general/contact-energy). Negative energy has no physical cause but comes from penetrations;
+# Oasys' energy check allows 5 % of either sign.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
 # In free flight contacts do not work either.  Deleted elements may not hold more: LS-DYNA keeps their energy in the
 # internal energy of the model (ftp.lstc.com, FAQ energy_balance).
 
-# Below a millionth of the largest energy of the run, internal energy is rounding: single precision and glstat print
-# six to seven digits of the sum.  LS-DYNA's internal energy begins at a floor of 2e-20 per process.
+# Internal energy below this share of the largest energy of the run, or below this floor, is rounding: single precision
+# and glstat print six to seven digits of the sum. LS-DYNA's internal energy starts at a floor of 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
-# A part whose internal energy is below a hundredth of that of another one does not matter for their sum.
+# A part with less than this share of the largest internal energy of a part does not matter for the sum [-].
 _SMALL_PART = 0.01
-# Where the run has hardly any energy yet, a small error is a large ratio (Altair, Radioss FAQ on the energy error): the
-# ratio counts where its reference exceeds a tenth of its peak, so that the tenth allowed is 1 % of that peak or more.
+# While a run has hardly any energy, a small error is a large ratio (Altair, Radioss FAQ on the energy error). The ratio
+# is used while its reference exceeds this share of its peak; then 10 % are 1 % of the peak or more.
 _COUNTING_REFERENCE = 0.1
-# Code of the warning of an engine that reports wrong energies.
+# Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
-# Codes of what says nothing of parts whose own momentum is that of free flight.
+# Codes of warnings that do not concern parts whose own momentum shows a free flight.
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 
 class Health(NamedTuple):
-    """How a run stands up to the time ``until``; fields are the keys of the JSON output, None for what is not written.
+    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if not written.
 
-    Shares are of the peak internal energy of the model (``part_hourglass_share``: of ``part``, the worst of those
-    chosen); the ratio is the total energy over the initial energy and the external work.  The last three are over
-    ``window`` [time]: how much the energy of the contacts changes, what the external work holds beyond gravity and
-    damping, how much the eroded energy grows, as shares of the mean energy of the chosen parts there.  ``reason`` says
-    why shares are None although there are energies, ``window_reason`` why the work in the window is.
+    Shares refer to the peak internal energy of the model; ``part_hourglass_share`` to that of ``part``, the worst of
+    the chosen parts.  The energy ratio is the total energy over the initial energy and the external work.  The last
+    three shares refer to the mean energy of the chosen parts in ``window`` [time]: the change of the contact energy,
+    the external work beyond gravity and damping, and the growth of the eroded energy.  ``reason`` states why shares are
+    None although energies are written, ``window_reason`` why the work in the window is.
     """
 
     hourglass_share: float | None = None
@@ -84,7 +84,7 @@ def assess(
     locked: float | None = None,
     until: float | None = None,
 ) -> Health:
-    """Judge the balance of a run.
+    """Judge the energy balance of a run.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def assess(
     window : (float, float), optional
         Free flight, or the rigid window [time].
     locked : float, optional
-        Mean energy of the chosen parts in the window; without it that of the model [energy].
+        Mean energy of the chosen parts in the window; default: that of the model [energy].
     until : float, optional
-        Where the balance ends, to be said with each of its figures [time].
+        End of the balance, which messages give with each figure [time].
     """
     peak = _peak(balance)
     if balance.internal is not None and peak is None:
@@ -103,14 +103,15 @@ def assess(
             "shares of it are meaningless"
         )
         return Health(**_ratio(balance), window=window, reason=reason, until=until)
+    negative_sliding = None
+    if balance.sliding is not None:
+        negative_sliding = -balance.sliding
     return Health(
         hourglass_share=_share(balance.against_hourglassing, peak),
         **_worst_part(balance),
         **_ratio(balance),
         sliding_share=_share(_without_friction(balance), peak),
-        negative_sliding_share=None
-        if balance.sliding is None
-        else _share(-balance.sliding, peak),
+        negative_sliding_share=_share(negative_sliding, peak),
         eroded_share=_share(balance.eroded, peak),
         window=window,
         **(_in_window(balance, *window, locked) if window else {}),
@@ -120,7 +121,7 @@ def assess(
 
 
 def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
-    """Say so when the work in the window is written, but in too few states to tell a load from gravity."""
+    """Return a message if the window has too few states to distinguish a load from gravity, else None."""
     states = int(
         np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
     )
@@ -130,9 +131,9 @@ def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
 
 
 def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
-    """What of the health of a run should be known, with stable codes.
+    """Yield the warnings about the health of a run, with stable codes.
 
-    Where nothing vibrates (``at_rest``) no level of the internal energy is matched, so hourglass does not matter.
+    If nothing vibrates (``at_rest``), no level of the internal energy is matched, so hourglass energy does not matter.
     """
     up_to = "" if health.until is None else f" up to {health.until:.6g}"
     where = "from {:.6g} to {:.6g}".format(*health.window) if health.window else ""
@@ -142,25 +143,30 @@ def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Cau
 
 
 def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
-    """Say so where listings beside the files of a run show an engine that reports wrong energies."""
-    if not any("T0" in name for name in sources):  # none is a leg of a Radioss run
+    """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
+    if not any("T0" in name for name in sources):  # not an engine run of Radioss
         return
+    # imported here: other histories do not need it
     from d2rpick.histories.listings import (
         find_wrong_energies,
-    )  # not above: other histories do without it
+    )
 
-    if found := list(find_wrong_energies(sources)):
+    listings = list(find_wrong_energies(sources))
+    if listings:
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
-        told = f"{found[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
-        yield Caution(WRONG_ENERGY, told)
+        text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        yield Caution(WRONG_ENERGY, text)
 
 
 def _above(value: float | None, limit: float) -> bool:
+    """Return True if a value is known and exceeds its limit."""
     return value is not None and value > limit
 
 
 def _gains_or_loses(health: Health) -> bool:
-    low, high = health.energy_ratio_min, health.energy_ratio_max
+    """Return True if the energy ratio leaves its limits."""
+    low = health.energy_ratio_min
+    high = health.energy_ratio_max
     return (
         low is not None
         and high is not None
@@ -169,7 +175,7 @@ def _gains_or_loses(health: Health) -> bool:
 
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# Codes of what should be known of a run, when it holds, and what is said then.
+# Code of each warning, the condition for it, and its text.
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _above(h.hourglass_share, MOST_HOURGLASS),
      f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
@@ -199,44 +205,53 @@ _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
 
 
 def _peak(balance: Balance) -> float | None:
-    """Peak of the internal energy; None where it is unknown or tiny."""
+    """Return the peak of the internal energy [energy]; None if it is unknown or tiny."""
     if balance.internal is None:
         return None
-    most = find_largest(
+    highest = find_largest(
         balance.internal, balance.kinetic, balance.total, balance.external_work
     )
     peak = float(balance.internal.max())
-    return peak if peak > max(_FLOOR, _TINY_SHARE * most) else None
+    return peak if peak > max(_FLOOR, _TINY_SHARE * highest) else None
 
 
 def _share(energy: Samples | None, peak: float | None) -> float | None:
-    """Highest value over the peak of the internal energy, 0 where it is never positive."""
-    return (
-        None if energy is None or peak is None else max(0.0, float(energy.max())) / peak
-    )
+    """Return the highest value over the peak of the internal energy [-], 0 if it is never positive."""
+    if energy is None or peak is None:
+        return None
+    return max(0.0, float(energy.max())) / peak
 
 
 def _without_friction(balance: Balance) -> Samples | None:
+    """Return the contact energy minus the frictional part, if that is known."""
     if balance.sliding is None or balance.friction is None:
         return balance.sliding
     return balance.sliding - balance.friction
 
 
 def _worst_part(balance: Balance) -> dict[str, Any]:
-    least = max(
+    """Return the largest hourglass share of a part, and the part, as fields of `Health`."""
+    smallest_peak = max(
         _FLOOR,
         _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0),
     )
-    shares = [(h / e, part) for part, h, e in balance.hourglass_of_parts if e > least]
+    shares = [
+        (h / e, part) for part, h, e in balance.hourglass_of_parts if e > smallest_peak
+    ]
     if not shares:
         return {}
-    share, part = max(shares, key=lambda one: one[0])
+    share, part = max(shares, key=lambda share_and_part: share_and_part[0])
     return {"part_hourglass_share": share, "part": part}
 
 
 def _ratio(balance: Balance) -> dict[str, Any]:
-    """Range of the energy ratio, the solver's own or that of its terms, where its reference counts."""
-    ratio, total, reference = balance.ratio, _total(balance), None
+    """Return the range of the energy ratio, as fields of `Health`, while the reference energy is large enough.
+
+    The ratio is that of the solver, or else computed from the terms.
+    """
+    ratio = balance.ratio
+    total = _total(balance)
+    reference = None
     if ratio is not None and balance.total is not None:
         reference = np.divide(
             balance.total, ratio, out=np.zeros_like(ratio), where=ratio != 0
@@ -259,56 +274,54 @@ def _ratio(balance: Balance) -> dict[str, Any]:
 
 
 def _total(balance: Balance) -> Samples | None:
-    """Total energy as the solver keeps it, or else the sum of all terms; None where one of the main ones is unknown."""
+    """Return the total energy of the solver, else the sum of all terms; None if a main term is unknown."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
         return None
-    others = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
+    further_terms = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
     return np.asarray(
         balance.internal
         + balance.kinetic
-        + sum(term for term in others if term is not None)
+        + sum(term for term in further_terms if term is not None)
     )
 
 
 def _in_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
-    """What should not happen in free flight, as shares of the energy there."""
+    """Return contact, eroded and external energy in the window as fields of `Health`: shares of its energy."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
-        locked = (
-            float(np.mean(balance.internal[inside]))
-            if balance.time[inside].size
-            else None
-        )
+        if balance.time[inside].size:
+            locked = float(np.mean(balance.internal[inside]))
+        else:
+            locked = None
     if locked is None or locked <= _FLOOR:
         return {}
-    found = {}
+    fields = {}
     for name, energy in (
         ("window_sliding", balance.sliding),
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            open_ = balance.precision.quantum(
-                float(np.abs(energy[inside]).max())
-            )  # by its printed digits
-            found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
+            # printed digits
+            quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
+            fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
     if work is not None:
-        found["window_work"] = work / locked
-    return found
+        fields["window_work"] = work / locked
+    return fields
 
 
-# A run that blew up gains energy from nothing: within a twentieth of the record its kinetic energy exceeds all that
-# was there before by nine orders of magnitude, and the internal energy then by six, which has grown a thousandfold as
-# well.  A load on a body at rest deforms it as it moves it, a velocity that is given to all of it does not deform it.
+# Criteria of a run that blew up: within 5 % of the record its kinetic energy exceeds all earlier energy by 9 orders of
+# magnitude, the internal energy times 1e6 is still smaller, and the internal energy grows by a factor of 1000. A load
+# on a body at rest deforms it while moving it; a velocity given to the whole body does not deform it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# So many states with energy have to lie before: the first ones of a body at rest hold round-off, or nothing.
+# Number of earlier states with energy that are needed: the first states of a body at rest contain round-off or 0.
 _FEWEST: Final = 12
-# No unit makes energies of a structure that small: LS-DYNA's begin at 2e-20 per process.
+# Energies below this are none in any unit: those of LS-DYNA start at 2e-20 per process.
 _NOTHING: Final = 1e-20
 
 
@@ -319,13 +332,14 @@ def refuse_unsound(
     *,
     choosing: bool = True,
 ) -> None:
-    """RangeError where no number of the run can be used, and for ``choosing`` where there is nothing to choose by.
+    """Raise RangeError if no number of the run can be used, or a given time seems to have another unit.
 
-    Also where a time that was asked for, ``td`` or a window for it among them, looks to be in another unit.
+    With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
+    and end of the flight in the settings.
     """
-    for one in unsound(history):
-        if choosing or one.code != "nothing-to-judge":
-            raise RangeError(f"{', '.join(history.source)}: {one.message}")
+    for caution in unsound(history):
+        if choosing or caution.code != "nothing-to-judge":
+            raise RangeError(f"{', '.join(history.source)}: {caution.message}")
     times = {"after": settings.after, "landing": settings.landing}
     for name, time in {
         **times,
@@ -338,22 +352,24 @@ def refuse_unsound(
 
 
 def unsound(history: History) -> Iterator[Caution]:
-    """Say why a run cannot be judged, with stable codes."""
-    most = find_largest(history.energy)
-    if most > LARGEST_ENERGY:
+    """Yield the reasons why a run cannot be judged, with stable codes."""
+    highest = find_largest(history.energy)
+    if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {most:g}, at most {LARGEST_ENERGY:g} was expected",
+            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
         )
-    elif found := _blew_up(history):
-        yield Caution("blew-up", found)
+        return
+    reason = _blew_up(history)
+    if reason:
+        yield Caution("blew-up", reason)
     elif _has_nothing(history):
-        found = f"nothing to judge: no internal energy exceeds {most:.3g}, so nothing deforms"
-        yield Caution("nothing-to-judge", found)
+        reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"
+        yield Caution("nothing-to-judge", reason)
 
 
 def _blew_up(history: History) -> str | None:
-    """Name the time at which the energy exceeds all sense, and by how much; None in a sound run."""
+    """Return a message with the time at which the energy diverges; None for a sound run."""
     balance = history.balance
     if (
         balance is None
@@ -362,39 +378,37 @@ def _blew_up(history: History) -> str | None:
         or balance.time.size <= _FEWEST
     ):
         return None
-    time, kinetic, internal = (
-        balance.time,
-        np.abs(balance.kinetic),
-        np.abs(balance.internal),
-    )
-    earlier = np.searchsorted(
-        time, time - _WITHIN * (time[-1] - time[0])
-    )  # states before the twentieth up to each
+    time = balance.time
+    kinetic = np.abs(balance.kinetic)
+    internal = np.abs(balance.internal)
+    # states more than 5 % of the record before each state
+    earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
     )
-    before, deformed = (
-        np.concatenate([[0.0], np.maximum.accumulate(one)])[earlier]
-        for one in (kinetic + internal, internal)
+    earlier_energy, deformed = (
+        np.concatenate([[0.0], np.maximum.accumulate(energies)])[earlier]
+        for energies in (kinetic + internal, internal)
     )
-    gained = counted & (deformed > 0) & (kinetic > _GAIN * before)
-    gained &= (kinetic / _SPEED > internal) & (
-        internal / _TORN > deformed
-    )  # products might overflow
+    gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
+    # divide, since products might overflow
+    gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)
-    at = int(np.argmax(gained))
-    if not gained[at]:
+    state = int(np.argmax(gained))
+    if not gained[state]:
         return None
-    found = f"the run blew up: from {before[at]:.3g} before, its energy reaches {kinetic[at]:.3g} at {time[at]:.6g}"
-    return f"{found}; nothing in it can be trusted"
+    return (
+        f"the run blew up: from {earlier_energy[state]:.3g} before, its energy reaches {kinetic[state]:.3g} "
+        f"at {time[state]:.6g}; nothing in it can be trusted"
+    )
 
 
 def _has_nothing(history: History) -> bool:
-    """Whether the internal energy of chosen parts and model is always zero, or all energies are nothing."""
+    """Return True if the internal energies of chosen parts and model are always 0, or all energies are negligible."""
     balance = history.balance
     if balance is None:
         return False
     highest = find_largest(history.energy, balance.internal)
-    beside = find_largest(balance.kinetic, balance.external_work, balance.total)
-    return highest == 0 or max(highest, beside) <= _NOTHING
+    other_energies = find_largest(balance.kinetic, balance.external_work, balance.total)
+    return highest == 0 or max(highest, other_energies) <= _NOTHING

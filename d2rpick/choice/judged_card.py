@@ -1,8 +1,9 @@
-"""Cards whose times were judged by an energy history, as they are printed."""
+"""Print cards whose times were judged by an energy history."""
 
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
@@ -21,20 +22,21 @@ if TYPE_CHECKING:
 
 
 class CardRequest(NamedTuple):
-    """What is known of a card before its times: ``solver`` None is the one that wrote the history.
+    """Options of a card before its times are known; without a ``solver`` it is the one that wrote the history.
 
-    What ``printing`` leaves open the history fills in: its chosen parts, and its end for that of the run.
+    The history completes ``printing``: its chosen parts, and its end as the end of the run.
     """
 
     solver: str | None = None
     printing: Printing = Printing()
 
     def of(self, history: History) -> tuple[str, Printing]:
-        """Name the solver, and say what its card needs."""
+        """Return the solver, and the complete options of its card."""
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
-        end = (
-            float(history.time[-1]) if self.printing.end is None else self.printing.end
-        )
+        if self.printing.end is None:
+            end = float(history.time[-1])
+        else:
+            end = self.printing.end
         solver = self.solver or find_solver(history.format)
         printing = self.printing._replace(part=ids, end=end)
         if "contact" in SOLVERS[solver].takes:
@@ -42,53 +44,55 @@ class CardRequest(NamedTuple):
         return solver, printing
 
     def whom(self, history: History) -> tuple[int, ...]:
-        """Give the parts or main nodes that the card switches; none where nobody says it."""
+        """Return the parts or main nodes that the card switches; empty if none are given."""
         solver, printing = self.of(history)
         switched: tuple[int, ...] = getattr(printing, SOLVERS[solver].switches)
         return switched
 
     def by(self, settings: Settings) -> CardRequest:
-        """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
+        """Return the request with the rigid bodies of a deck as merged parts, and its inactive bodies kept inactive."""
         bodies = tuple(body.parts for body in settings.bodies or ())
-        off = tuple(
+        inactive = tuple(
             node
             for node in settings.kept_off
             if node not in (*self.printing.node, *self.printing.replaced)
         )
-        return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
+        return self._replace(
+            printing=self.printing._replace(bodies=bodies, off=inactive)
+        )
 
 
 def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Say when the named contact or rigid wall pushes, and how fast the parts come to it.
+    """Add the times at which the named contact or rigid wall pushes, and the closing speed of the parts.
 
-    The force that the solver wrote of it shows the times, else the momenta of the parts do; only these show the speed.
+    The contact force of the solver shows the times, or else the momenta of the parts; only momenta show the speed.
     """
+    # imported here: other cards do not need it
     from d2rpick.flight.contact_times import (
         find_contact_times,
         find_force_times,
-    )  # not above: other cards do without
+    )
     from d2rpick.histories.contact_forces import find_force
 
-    momenta = next((one for one in history.momenta if one.parts), None)
+    momenta = next((momenta for momenta in history.momenta if momenta.parts), None)
     by_momenta = find_contact_times(momenta) if momenta else None
     contact = "interface" if solver == "Radioss" else "contact"
-    named = (
-        ("rigid wall", printing.wall)
-        if printing.contact is None
-        else (contact, printing.contact)
-    )
-    kind, number = named
+    if printing.contact is None:
+        push = ("rigid wall", printing.wall)
+    else:
+        push = (contact, printing.contact)
+    kind, number = push
     force = find_force(history.evidence.forces, kind, number or 0)
-    found = (find_force_times(force) if force else None) or by_momenta
+    times = (find_force_times(force) if force else None) or by_momenta
     speed = by_momenta.speed if by_momenta else None
-    return printing._replace(pushed=found.spans, speed=speed) if found else printing
+    return printing._replace(pushed=times.spans, speed=speed) if times else printing
 
 
 class SolverInput(NamedTuple):
-    """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
+    """Solver input for a pair of times: its ``text``, or ``refusal``, the reason why it cannot be printed.
 
-    Both are None where nobody says whom it switches.  ``solver`` is empty where it is the default, ``switches`` names
-    the option that says whom.
+    Both are None if no parts to switch are given.  ``solver`` is empty for the default solver, ``switches`` names the
+    option for the parts.
     """
 
     solver: str
@@ -100,20 +104,22 @@ class SolverInput(NamedTuple):
 def input_for(
     reference: Reference, situation: Situation, tr: float, request: CardRequest
 ) -> SolverInput:
-    """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
+    """Print the card of ``tr`` and the td of a situation, judged by the printed times."""
     solver, _ = request.of(situation.history)
-    named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
-    judge = partial(verify_of, reference, settings=situation.settings, known=situation)
+    solver_and_option = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
+    judge = partial(
+        verify_of, reference, settings=situation.settings, earlier=situation
+    )
     try:
-        found = judged_card(
+        card = judged_card(
             [(tr, situation.td)],
             situation.history,
             judge,
             request.by(situation.settings),
         )
     except D2RPickError as error:
-        return SolverInput(*named, refusal=str(error))
-    return SolverInput(*named, found[0].text if found else None)
+        return SolverInput(*solver_and_option, refusal=str(error))
+    return SolverInput(*solver_and_option, card[0].text if card else None)
 
 
 def judged_card(
@@ -123,30 +129,30 @@ def judged_card(
     request: CardRequest,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Print the card of windows, let ``judge`` judge each tr and td as printed, and print it with what it found.
+    """Print the card of windows with the verdicts that ``judge`` gives for the printed tr and td.
 
-    ``done`` are windows in which the run was switched already: they are printed too, and cannot be judged by it.
-    None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
+    ``done`` are windows in which the run was switched already: they are printed too, but cannot be judged by it.  The
+    result is None if the parts, or the main nodes for some solvers, are not given.
     """
     if not request.whom(history):
         return None
     solver, printing = request.of(history)
-    every = sorted((*done, *windows))
-    plain = print_cards(every, printing, solver)
+    all_windows = sorted((*done, *windows))
+    plain = print_cards(all_windows, printing, solver)
     printed = plain.windows
     if "contact" in SOLVERS[solver].takes:
         printed = _narrowed(printed, history)
     verdicts = tuple(
         judge(*times)
-        for asked, times in zip(every, printed, strict=True)
-        if asked not in done
+        for requested, times in zip(all_windows, printed, strict=True)
+        if requested not in done
     )
     remarks = tuple(_remarks(done, history, verdicts))
-    return print_cards(every, printing, solver, remarks), verdicts
+    return print_cards(all_windows, printing, solver, remarks), verdicts
 
 
 def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Give windows of switches by force as they are judged: between states."""
+    """Return the windows of switches by force as they are judged: between states."""
     from d2rpick.flight.contact_times import narrow_to_states  # as above
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)
@@ -156,37 +162,37 @@ def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
 def _remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[Verdict]
 ) -> Iterator[str]:
-    """Say which windows were not judged, whose level is not that of the parts, and what was found of the others."""
+    """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
         yield "The level is that of the whole model, whatever parts are switched."
     for verdict in verdicts:
-        which = (
-            f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
-            if len(verdicts) > 1
-            else ""
-        )
+        if len(verdicts) > 1:
+            which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
+        else:
+            which = ""
         yield from _judgement(verdict, which)
+    cautions = chain.from_iterable(verdict.cautions for verdict in verdicts)
     yield from dict.fromkeys(
-        f"{caution.code}: {caution.message}."
-        for one in verdicts
-        for caution in one.cautions
+        f"{caution.code}: {caution.message}." for caution in cautions
     )
 
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
-    candidate, history = verdict.candidate, verdict.situation.history
+    """Yield comments with the verdict on a pair."""
+    candidate = verdict.candidate
+    history = verdict.situation.history
     decision = verdict.decision
     word = decision.verdict
-    said = word.upper() if word == DO_NOT_USE else word
+    verdict_text = word.upper() if word == DO_NOT_USE else word
     judged = f"Judged by {', '.join(history.source)}, {history.channel}"
-    yield f"{judged}:{which} {said}. {_sentence(decision.reason)}"
+    yield f"{judged}:{which} {verdict_text}. {_sentence(decision.reason)}"
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # no level to match: the warning says so
+    if verdict.situation.at_rest:  # no level to match, as the warning states
         return
     measures = [
         f"{name} {value:.3f}"
@@ -203,5 +209,5 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
 
 
 def _sentence(text: str) -> str:
-    """Make a sentence of a reason."""
+    """Return a reason as a sentence."""
     return f"{text[:1].upper()}{text[1:]}."

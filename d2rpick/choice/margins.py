@@ -1,4 +1,4 @@
-"""The margin before the contact that ends a flight, by what the parts to be switched become."""
+"""Compute the margin before the contact that ends a flight, from the rigid bodies that the parts become."""
 
 from __future__ import annotations
 
@@ -15,41 +15,45 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.vibration.span import Fits
 
-# Times in a flight at which a body may be frozen: what moves in it does so slowly.
+# Number of times in a flight at which a body is tried as frozen: motion within it is slow.
 _TIMES: Final = 100
 
 
 def bodies_of(
     history: History, flight: Flight, settings: Settings, fits: Fits | None = None
 ) -> Bodies | None:
-    """Give how the bodies that the parts become drift in a flight, found once; None where no parts show it."""
+    """Return the drift of the rigid bodies of the parts in a flight, computed once; None without data of parts."""
     if flight.parts is None:
         return None
+    # imported here: a table has no parts
     from d2rpick.flight.position_error import (
         find_bodies_in_flight,
-    )  # not above: a table has no parts
+    )
 
-    known = history.known if fits is None else fits
-    told, placement = settings.bodies, settings.placement
-    return known.once(
-        ("drift", flight, told),
-        lambda: find_bodies_in_flight(history, flight, told, placement),
+    memory = history.known if fits is None else fits
+    rigid_bodies = settings.bodies
+    placement = settings.placement
+    return memory.once(
+        ("drift", flight, rigid_bodies),
+        lambda: find_bodies_in_flight(history, flight, rigid_bodies, placement),
     )
 
 
 def margin_of(
     history: History, flight: Flight, settings: Settings, fits: Fits | None = None
 ) -> Margin:
-    """Give the margin that is asked for, or by how much a switch in the flight may let the contact come earlier."""
+    """Return the given margin, or the time by which switching in the flight may make the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
     bodies = bodies_of(history, flight, settings, fits)
-    place = None if bodies is None else _largest_error(bodies, flight.start, flight.end)
-    return compute_margin(history, flight, place=place)
+    position_error = (
+        None if bodies is None else _largest_error(bodies, flight.start, flight.end)
+    )
+    return compute_margin(history, flight, place=position_error)
 
 
 def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:
-    """Largest distance of a body from its place at the end of a flight; None where it is unknown [length]."""
+    """Return the largest position error of a body at the end of a flight [length]; None if it is unknown."""
     errors = bodies.errors(np.linspace(start, end, _TIMES)[:-1], end)
-    known = errors[np.isfinite(errors)]
-    return float(known.max()) if known.size else None
+    known_errors = errors[np.isfinite(errors)]
+    return float(known_errors.max()) if known_errors.size else None

@@ -1,4 +1,4 @@
-"""What the files of a run hold, before anything is chosen from them."""
+"""Describe the files of a run before anything is chosen from them."""
 
 from __future__ import annotations
 
@@ -43,20 +43,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# Cards that write the momenta of parts.
+# Output that contains the momenta of parts.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 class PartOverview(NamedTuple):
-    """A part and the highest internal energy it ever has; None where that is not written, or not in every state."""
+    """A part and its highest internal energy; None if that is not written, or not in every state."""
 
     part: Part
     energy_max: float | None
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall by its name, and the times (start, end) in which it ``acts`` [time]."""
+    """A contact or rigid wall by name, and the times (start, end) in which it ``acts`` [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
@@ -71,16 +71,15 @@ class Sampling(NamedTuple):
 
 
 class Overview(NamedTuple):
-    """What the files of a run hold.
+    """Contents of the files of a run.
 
-    Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
-    there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
-    has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
-    ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
-    that of the run, with the longest of them as its window; None without energies.
-    ``unjudged`` says why no times can be chosen by the run; empty if they can.
-    ``should_write`` names the output that would show the flights for sure; None where it is there, or no state is.
+    Times are in the unit of the run, which ``time_unit`` gives only if a file names it.  ``sampling`` is None for a
+    single state.  It and the times are None without states; they and ``states`` are None if the time has to be chosen
+    among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its source:
+    ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
+    is that of the run, with the longest flight as its window; None without energies.  ``unjudged`` states why no times
+    can be chosen from the run; empty if they can.  ``should_write`` names the output that would show the flights for
+    certain; None if it is written, or there is no state.
     """
 
     source: tuple[str, ...]
@@ -105,24 +104,24 @@ class Overview(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Whether switch times can be chosen by this run: "use", "use with care" or "do not use"."""
+        """Verdict on choosing switch times by this run: "use", "use with care" or "do not use"."""
         if self.unjudged or not self.flights:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
     @property
     def reason(self) -> str:
-        """Why the verdict is what it is."""
+        """Reason for the verdict."""
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
             return "no free flight is seen, so nothing can be made rigid"
-        found = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
-        return "; ".join(self._doubts) or found
+        summary = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
+        return "; ".join(self._doubts) or summary
 
     @property
     def _doubts(self) -> list[str]:
-        """What makes a run that flies less than good."""
+        """Reasons why a run with flights is not good."""
         health = cautions_of_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
@@ -135,20 +134,20 @@ class Overview(NamedTuple):
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What to know of the health of the run and of its engine, and why it cannot be judged."""
+        """Warnings about the health of the run and its engine, and reasons why it cannot be judged."""
         health = cautions_of_health(self.health) if self.health else ()
         return (*self.alarms, *health, *cautions_of_engine(self.source))
 
 
 def _flights_of(flights: Sequence[tuple[str, FreeFlight]]) -> str:
-    """Say how many flights there are, and how long the longest is."""
+    """Describe the number of flights and the duration of the longest."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
     return f"{count}, the longest for {longest:.6g}"
 
 
 def _health_of(health: Health | None) -> str:
-    """Say that the energies keep to the limits, as far as they are written."""
+    """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
         return (
             "the files do not hold the energy balance that shows whether a run is sound"
@@ -157,36 +156,40 @@ def _health_of(health: Health | None) -> str:
 
 
 def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
-    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights, and the ``deck``."""
-    told: tuple[Caution, ...] = ()
+    """Describe all databases of a run; ``selection`` and ``deck`` matter for the flights."""
+    deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
-        run, told = _in_deck(run, deck)
+        run, deck_warnings = _in_deck(run, deck)
     first = run.databases[0]
-    notes = [
-        *run.left_out,
-        *(note for database in run.databases for note in _notes(database)),
-    ]
+    notes = list(run.left_out)
+    for database in run.databases:
+        notes += _notes(database)
     notes += note_doubts(run.databases)
     notes += run.unused_energies(selection)
-    states, time = None, np.empty(0)
+    states = None
+    time = np.empty(0)
+    # several columns may be the time; they can still be listed
     try:
         if first.span is not None:
             time = first.time if first.channels else first.part_time
         states = int(time.size)
-    except (
-        FormatError
-    ) as error:  # several columns may be the time: there is still a list of them
+    except FormatError as error:
         if (
             first.format == "csv"
             and give_if_written(lambda: first.energy_channel) is not None
         ):
-            raise  # by its one energy it is known which column is the time: the table cannot be read
+            raise  # one energy shows which column is the time, so the table itself cannot be read
         notes.append(str(error))
-    steps = np.diff(time)
     history = _history(run, selection)
     flaws = tuple(unsound(history)) if history else tuple(_of_energy(run, selection))
     rigid = rigid_times(Reference(run, history)) if history else ()
     flights = _flights(by_the_model(history) if rigid else history) if history else ()
+    channels: dict[str, None] = {}
+    for database in run.databases:
+        channels |= dict.fromkeys(database.channels)
+    should_write = None
+    if states != 0 and not any(momenta.parts for momenta in run.momenta(None, None)):
+        should_write = _missing(run)
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -196,25 +199,15 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(
-            float(steps.min()), float(compute_median(steps)), float(steps.max())
-        )
-        if steps.size
-        else None,
+        sampling=_sampling(time),
         complete=all(database.complete for database in run.databases),
-        channels=tuple(
-            dict.fromkeys(
-                name for database in run.databases for name in database.channels
-            )
-        ),
+        channels=tuple(channels),
         parts=tuple(_overviews(run)),
         flights=flights,
-        should_write=None
-        if states == 0 or any(one.parts for one in run.momenta(None, None))
-        else _missing(run),
+        should_write=should_write,
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *told),
+        alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *deck_warnings),
         unjudged=flaws,
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
@@ -222,40 +215,53 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     )
 
 
+def _sampling(time: Samples) -> Sampling | None:
+    """Return the output intervals between the states; None for fewer than two states."""
+    steps = np.diff(time)
+    if not steps.size:
+        return None
+    return Sampling(
+        float(steps.min()), float(compute_median(steps)), float(steps.max())
+    )
+
+
 def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
-    """Let a deck tell what acts on a run; DeckError where it cannot be read."""
+    """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
+    # imported here: few runs are given with a deck
     from d2rpick.choice.deck_of_run import (
         doubts_of_solver,
         in_deck,
         of_another_model,
-    )  # not above: few name a deck
+    )
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
     foreign = of_another_model(run, inventory)
-    return in_deck(run, inventory), (foreign,) if foreign else tuple(
-        doubts_of_solver((), inventory)
-    )
+    if foreign:
+        return run, (foreign,)
+    return in_deck(run, inventory), tuple(doubts_of_solver((), inventory))
 
 
 def _missing(run: Run) -> str:
-    """Say in the words of the solver how the momenta of parts are written, which these files do not have."""
+    """Name the output of the solver that contains the momenta of parts, which these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
-        what = _RADIOSS
+        output = _RADIOSS
     elif written & {"glstat", "matsum", "binout", "d3plot", "d3thdt"}:
-        what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
+        output = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
     else:
-        momentum = (
-            ""
-            if run.momenta(None, None)
-            else ", at least columns x_momentum, y_momentum, z_momentum of the model"
-        )
-        what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
-    return f"{what}: only momenta of the parts show for sure when they fly"
+        if run.momenta(None, None):
+            momentum = ""
+        else:
+            momentum = (
+                ", at least columns x_momentum, y_momentum, z_momentum of the model"
+            )
+        output = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
+    return f"{output}: only momenta of the parts show for sure when they fly"
 
 
 def _notes(database: Legs) -> tuple[str, ...]:
+    """Return the notes of a database, or its error as a note."""
     try:
         return database.notes
     except FormatError as error:
@@ -263,12 +269,12 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
-    energies = (
-        give_if_written(lambda: run.part_energies(run.parts))
-        if run.parts
-        else np.empty((0, 0))
-    )
-    if energies is None:  # some parts come and go, so that their columns have holes
+    """Yield each part with its highest internal energy."""
+    if run.parts:
+        energies = give_if_written(lambda: run.part_energies(run.parts))
+    else:
+        energies = np.empty((0, 0))
+    if energies is None:  # some parts come and go, so their columns have gaps
         return (PartOverview(part, _highest(run, part)) for part in run.parts)
     return (
         PartOverview(part, _most(column))
@@ -277,18 +283,21 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
 
 
 def _highest(run: Run, part: Part) -> float | None:
+    """Return the highest internal energy of a part [energy]; None if it is not written."""
     return give_if_written(lambda: _most(run.part_energies([part])))
 
 
 def _most(energies: Samples) -> float | None:
+    """Return the highest of some energies; None without any."""
     return float(energies.max()) if energies.size else None
 
 
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
+    """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
-        told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
-        yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
+        effect = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
+        yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
 
 def _health(
@@ -297,16 +306,16 @@ def _health(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
+    """Return the health of the run outside of rigid windows; None without energies."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
     if balance is None or not balance.time.size:
         return None
     if rigid:
-        states = ~np.any(
-            [(balance.time >= start) & (balance.time <= end) for start, end in rigid],
-            axis=0,
-        )
+        states = np.ones(balance.time.shape, dtype=bool)
+        for start, end in rigid:
+            states &= (balance.time < start) | (balance.time > end)
         if not states.any():
             return Health(
                 reason="its legs are rigid: energies mean nothing there",
@@ -325,7 +334,7 @@ def _health(
 
 
 def _history(run: Run, selection: Selection) -> History | None:
-    """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
+    """Return the history that would be judged; None if an energy has to be chosen first, or there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
@@ -335,7 +344,7 @@ def _history(run: Run, selection: Selection) -> History | None:
 
 
 def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
-    """Say why no internal energy can be read: one has to be chosen first, or there is none."""
+    """Yield a warning if no internal energy can be read: one has to be chosen first, or there is none."""
     try:
         run.history(selection)
     except FormatError as error:
@@ -343,10 +352,11 @@ def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Give those that ``plan`` and ``suggest`` choose from; none where they refuse the run."""
+    """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
     try:
-        refuse_unsound(history, settings := Settings())
-        found = flights_of(history, settings)
+        settings = Settings()
+        refuse_unsound(history, settings)
+        flights = flights_of(history, settings)
     except RangeError:
         return ()
     return tuple(
@@ -359,6 +369,6 @@ def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
                 flight.damping,
             ),
         )
-        for flight in found
+        for flight in flights
         if flight.source
     )

@@ -1,12 +1,11 @@
-"""A plan for a run: every flight with its switch times, and which windows this one reference supports.
+"""Plan the rigid windows of a run: the times for every flight, and the windows that this reference run supports.
 
-A window in which nothing vibrates locks in nothing and leaves all landings where they are.  One that locks in energy
-moves the next landing by a little, for which the margin is kept, and those after it by more than any margin.  So one
-reference supports every window up to and with the first that locks in energy; the next ones are planned from the run
-that was switched so (docs/explanation/planning.md, "Why one run does not support all
-windows").
+A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
+moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
+reference run supports all windows up to the first that locks in energy, including it.  Later windows are planned from
+the run switched in these windows (docs/explanation/planning.md, "Why one run does not support all windows").
 
-Each window that locks in energy costs a run of its own, so a short one is left out for a longer one behind it.
+Each window that locks in energy costs another run, so a short one is left out for a longer one after it.
 """
 
 from __future__ import annotations
@@ -38,20 +37,20 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# A rigid window shorter than this share of the record saves less than a restart costs.
+# Rigid windows shorter than this share of the record save less than a restart costs [-].
 MIN_RIGID: Final = 0.05
-# A window is left out for one behind it that is rigid for more than so many times as long.  With w rigid in the first
-# and W in the other, one after the other saves w in the next run and w + W in that after it; the other alone saves W in
-# both, which is more from W = 2 w on.
+# A window is left out for a later one that is more than this factor longer [-]. With w rigid in the first and W in the
+# other, one after the other saves w in the next run and w + W in the run after that. The other alone saves W in both
+# runs, which is more if W > 2 w.
 _LONGER: Final = 2.0
 
 
 class Planned(NamedTuple):
     """One flight of a run and the rigid window in it; times in the unit of the history.
 
-    ``status``: "supported" by this reference, "re-plan" from a switched run, "done", or "left-out"; ``reason`` says
-    why for all but the first.  ``answer`` is what ``suggest`` says for this flight, None where it was not asked.
-    ``done`` is what became of a window that is done; ``record`` is the length of the record.
+    ``status`` is "supported" by this reference run, "re-plan" from a switched run, "done", or "left-out"; ``reason``
+    explains all but the first.  ``answer`` is the suggestion for this flight, None if there is none.  ``done``
+    describes the result of a done window; ``record`` is the length of the record.
     """
 
     number: int
@@ -67,46 +66,45 @@ class Planned(NamedTuple):
 
     @property
     def window(self) -> Times | None:
-        """When the parts are rigid, (tr, td) [time]; None where nothing can be recommended."""
+        """Window in which the parts are rigid, (tr, td) [time]; None if nothing can be recommended."""
         if self.done:
             return self.done.tr, self.done.td
-        pair = (
-            self.answer.recommended
-            if self.answer and self.status in ("supported", "re-plan")
-            else None
-        )
+        if self.answer and self.status in ("supported", "re-plan"):
+            pair = self.answer.recommended
+        else:
+            pair = None
         return (pair.tr, pair.td) if pair else None
 
     @property
     def rigid_time(self) -> float | None:
-        """Length of the window [time]."""
+        """Length of the window [time]; None without one."""
         return self.window[1] - self.window[0] if self.window else None
 
     @property
     def rigid_fraction(self) -> float | None:
-        """Share of the record in which the parts are rigid by the window [-]."""
+        """Share of the record in which the parts are rigid by this window [-]; None without one."""
         return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
     def candidate(self) -> Candidate | None:
-        """The recommended tr with its measures."""
+        """The recommended tr with its measures; None without a window."""
         return self.answer.chosen if self.answer and self.window else None
 
     @property
     def decision(self) -> Decision | None:
-        """Whether to use the pair, and why, as ``suggest`` decides; None without a pair, or if it is done."""
+        """Verdict on the pair as in ``suggest``; None without a pair, or if it is done."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """How good the pair is, as ``suggest`` grades it; None without a window, or if it is done."""
+        """Grade of the pair as in ``suggest``; None without a window, or if it is done."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
     def locks_in(self) -> bool | None:
-        """Whether the window locks in energy, so that landings after it move; None without a window.
+        """True if the window locks in energy, so that later landings move; None without a window.
 
-        It does not where the energy stays the same but for round-off, as in a free fall from rest.
+        It locks in none if the energy is constant except for round-off, as in a free fall from rest.
         """
         if self.answer is None or self.window is None:
             return None
@@ -117,7 +115,7 @@ class Planned(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """Answer of ``plan``: all flights in the order of time, and what to be aware of.
+    """Answer of ``plan``: all flights in time order, and warnings.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
     """
@@ -131,7 +129,7 @@ class Plan:
 
     @property
     def supported(self) -> tuple[Planned, ...]:
-        """Windows that this reference supports."""
+        """Flights whose windows this reference run supports."""
         return tuple(row for row in self.flights if row.status == "supported")
 
     @property
@@ -141,7 +139,7 @@ class Plan:
 
     @property
     def all_windows(self) -> tuple[Times, ...]:
-        """The same of every window that is not done: also those that wait for a switched run [time]."""
+        """(tr, td) of all windows that are not done, including those that wait for a switched run [time]."""
         return tuple(
             row.window
             for row in self.flights
@@ -150,15 +148,15 @@ class Plan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """(tr, td) of the run to be computed next: the windows that are done and the supported ones, in order [time].
+        """(tr, td) of the next run, in order: the done and the supported windows; empty without new ones [time].
 
-        None where nothing is new.  The next run starts at the beginning again, so it needs both.
+        The next run starts again from the beginning, so it needs both.
         """
         return (*self.done, *self.windows) if self.windows else ()
 
     @property
     def rigid_time(self) -> float:
-        """Length of all supported windows [time]."""
+        """Total length of the supported windows [time]."""
         return sum(row.rigid_time or 0.0 for row in self.supported)
 
     @property
@@ -168,7 +166,7 @@ class Plan:
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the supported windows over that of the reference; None without a cost share [-]."""
+        """Expected run time with the supported windows over that of the reference [-]; None without a cost share."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -187,14 +185,14 @@ def plan_of(
     reference : Reference
         The run: without switching, or switched in the windows that are ``done``.
     settings : Settings
-        As for ``suggest``.  ``after`` counts in the flight that it lies in; what flies before is left out.
+        As for ``suggest``.  ``after`` applies to the flight that contains it; earlier flights are left out.
     min_rigid : float, optional
-        Shorter windows are left out [time].  Default: 5 % of the record; then too a window that locks in energy is left
-        out for one behind it that is rigid for more than twice as long.
+        Shorter windows are left out [time].  Default: 5 % of the record; then a window that locks in energy is also
+        left out for one after it that is rigid for more than twice as long.
     done : sequence of (float, float)
         Windows in which the run was switched, in order [time].
     before : Reference, optional
-        The run that these were planned from: by its landings it is told how far those of this run have moved.
+        The run that these were planned from: its landings show how far those of this run have moved.
 
     Returns
     -------
@@ -203,32 +201,31 @@ def plan_of(
     Raises
     ------
     RangeError
-        If ``after`` or a window lies outside the record, or the parts were deformable in a window that is done.
+        If ``after`` or a window lies outside the record, or the parts were deformable in a done window.
     """
     history = reference.history
     refuse_unsound(history, settings)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
-    history, found, cautions = switched_history(reference, done)
+    history, done_times, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()
     flights = flights_of(history, settings, fits)
-    earlier = before and flights_of(
-        switched_history(before, ())[0], settings
-    )  # it may have been switched itself
-    known = done_windows(history, flights, found, earlier)
+    # the earlier run may have been switched itself
+    earlier = before and flights_of(switched_history(before, ())[0], settings)
+    done_rows = done_windows(history, flights, done_times, earlier)
     judged: Iterable[Planned] = _rows(
-        reference, flights, settings, shortest, known, fits
+        reference, flights, settings, shortest, done_rows, fits
     )
     if min_rigid is None:
         judged = _without_short(list(judged))
-    rows = tuple(_with_status(list(judged), known))
+    rows = tuple(_with_status(list(judged), done_rows))
     cautions = (
         *cautions,
         *cautions_of_engine(reference.run.sources),
-        *_cautions(rows, known),
+        *_cautions(rows, done_rows),
     )
-    return Plan(history, settings, shortest, rows, cautions, found)
+    return Plan(history, settings, shortest, rows, cautions, done_times)
 
 
 def _rows(
@@ -236,22 +233,22 @@ def _rows(
     flights: Sequence[Flight],
     settings: Settings,
     shortest: float,
-    known: Sequence[Done],
+    done_rows: Sequence[Done],
     fits: Fits,
 ) -> Iterator[Planned]:
-    """Give every flight with its window, as if each were the first."""
-    last = max((one.td for one in known), default=None)
+    """Yield every flight with its window, as if each were the first."""
+    last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
-    landed: float | None = None  # of the flight before
-    for number, seen in enumerate(flights, start=1):
-        flight = _given(reference.history, seen, settings.after)
+    landed: float | None = None  # end of the previous flight
+    for number, found_flight in enumerate(flights, start=1):
+        flight = _given(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
         margin = margin_of(reference.history, flight, settings, fits)
         row = Planned(number, flight, start, end, margin, record, "left-out")
-        within = [one for one in known if one.flight == seen]
-        if within:
-            for one in within:
-                yield row._replace(status="done", reason=one.told, done=one)
+        done_in_flight = [done for done in done_rows if done.flight == found_flight]
+        if done_in_flight:
+            for done in done_in_flight:
+                yield row._replace(status="done", reason=done.told, done=done)
         elif last is not None and start < last:
             yield row._replace(reason="before the last window that is done")
         elif settings.after is not None and end <= settings.after:
@@ -267,14 +264,12 @@ def _rows(
         landed = flight.end
 
 
-def _given(history: History, flight: Flight, after: float | None) -> Flight:
-    """Let a flight in which the load is said to end begin there, as ``suggest`` does."""
+def _given(history: History, flight: Flight, load_end: float | None) -> Flight:
+    """Let a flight that contains the given end of the load begin there, as ``suggest`` does."""
     start, end = flight.within(history.time)
-    return (
-        flight
-        if after is None or not start <= after < end
-        else flight._replace(start=after, source="given")
-    )
+    if load_end is None or not start <= load_end < end:
+        return flight
+    return flight._replace(start=load_end, source="given")
 
 
 def _asked(
@@ -285,23 +280,29 @@ def _asked(
     landed: float | None,
     fits: Fits,
 ) -> Planned:
-    """Ask ``suggest`` for the window of a flight, which does not reach back beyond the landing of the one before.
+    """Return the row with the suggestion for its flight, which does not reach back beyond the previous landing.
 
-    The energy alone shows another beginning to each td, or an oscillator where another td has none: the flight is known
-    as the td that is chosen knows it.
+    The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
+    not: the row has the flight as seen from the chosen td.
     """
-    own = settings.after is not None and row.start <= settings.after <= row.end
-    asked = settings if own else replace(settings, after=None)
+    is_after_here = (
+        settings.after is not None and row.start <= settings.after <= row.end
+    )
+    flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
-        asked = replace(asked, landing=None)
-    # the energy alone may show no end of the flight to the td in it: the margin is kept from the one that is listed
+        flight_settings = replace(flight_settings, landing=None)
+    # the energy alone may show no end of the flight to a td in it: keep the margin before the listed end
     window = row.start, last_td(row.end, row.margin.time)
-    answer = suggest_of(reference, window, asked, since=landed, fits=fits)
-    known = answer.situation.flight
+    answer = suggest_of(reference, window, flight_settings, since=landed, fits=fits)
+    known_flight = answer.situation.flight
     row = row._replace(answer=answer)
-    if known.start is not None and (known.start < row.start or answer.recommended):
-        flight = row.flight._replace(start=known.start, source=known.source)
-        row = row._replace(flight=flight, start=known.start)
+    if known_flight.start is not None and (
+        known_flight.start < row.start or answer.recommended
+    ):
+        flight = row.flight._replace(
+            start=known_flight.start, source=known_flight.source
+        )
+        row = row._replace(flight=flight, start=known_flight.start)
     if answer.recommended is None:
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
@@ -316,45 +317,53 @@ def _asked(
 
 
 def _not_good_enough(decision: Decision, pair: Pair) -> str:
-    """Say why a pair is not planned, and how to plan it all the same."""
+    """Explain why a pair is not planned, and how to plan it nevertheless."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
-    way = f"with `min_quality` {decision.grade} it is planned all the same"
-    return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {way}"
+    advice = f"with `min_quality` {decision.grade} it is planned all the same"
+    return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
 
 
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
-    kept = (
-        f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
-    )
-    return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
+    """Explain that a window is too short."""
+    if margin.time:
+        margin_text = f", with the margin {margin.time:.3g} before the contact"
+    else:
+        margin_text = ""
+    return f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}, at least {shortest:.3g} was asked for"
 
 
 def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
-    """Leave a window that locks in energy out for a much longer one behind it, even where that waits for another."""
-    for at, row in enumerate(rows):
+    """Leave out each window that locks in energy before a much longer one, even if that has to wait for a run."""
+    for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
-        behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
+        longest_after = max(
+            rows[index + 1 :],
+            key=lambda row_after: row_after.rigid_time or 0.0,
+            default=row,
+        )
         if (
             row.status != "supported"
             or not row.locks_in
-            or not (behind.rigid_time or 0.0) > _LONGER * rigid
+            or not (longest_after.rigid_time or 0.0) > _LONGER * rigid
         ):
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
-        longer = f"flight {behind.number} behind it for {behind.rigid_time:.3g}"
-        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
+        longer = f"flight {longest_after.number} behind it for {longest_after.rigid_time:.3g}"
+        window_text = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
         why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
         cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
-        yield row._replace(status="left-out", reason=f"{own}: {why}; {cure}")
+        yield row._replace(status="left-out", reason=f"{window_text}: {why}; {cure}")
 
 
-def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
-    """Let windows after the first that locks in energy, or after a landing while rigid, wait for another run."""
-    wrong = next((one for one in known if one.rigid_in_contact), None)
+def _with_status(
+    rows: Sequence[Planned], done_rows: Sequence[Done]
+) -> Iterator[Planned]:
+    """Mark windows to be planned again after the first that locks in energy, and after a contact while rigid."""
+    in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
-    if wrong:
-        window = f"the window {wrong.tr:.6g} to {wrong.td:.6g}"
+    if in_contact:
+        window = f"the window {in_contact.tr:.6g} to {in_contact.td:.6g}"
         why = f"the run was rigid in a contact in {window}; plan the windows from there again"
     for row in rows:
         if row.status == "supported" and why:
@@ -368,7 +377,7 @@ def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Pla
 
 
 def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
-    """Say so where a short window takes the place of a longer one, which could be supported instead."""
+    """Yield a warning if a short window replaces a longer one that could be supported instead."""
     first = next(
         (row for row in rows if row.status == "supported" and row.locks_in), None
     )
@@ -384,23 +393,25 @@ def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
         and longest.rigid_time
         and longest.rigid_time > first.rigid_time
     ):
-        found = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
+        text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
         cure = "with a minimal rigid time between the two it would be supported instead"
-        yield Caution("longer-window-later", f"{found} {first.rigid_time:.3g}: {cure}")
+        yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
-def _cautions(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Caution]:
-    """What to be aware of in all windows, once each."""
-    for one in known:
-        window = f"the window {one.tr:.6g} to {one.td:.6g}: {one.told}"
-        if one.rigid_in_contact:
+def _cautions(rows: Sequence[Planned], done_rows: Sequence[Done]) -> Iterator[Caution]:
+    """Yield the warnings about all windows, each once."""
+    for done in done_rows:
+        window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.told}"
+        if done.rigid_in_contact:
             yield Caution("landed-rigid", window)
-        elif one.flight is None:
+        elif done.flight is None:
             yield Caution("done-without-flight", window)
     windows = [row for row in rows if row.status == "supported" and row.answer]
     for row in windows:
         for caution in row.answer.cautions if row.answer else ():
-            if caution.code == WRONG_ENERGY:  # said of the whole run
+            if (
+                caution.code == WRONG_ENERGY
+            ):  # this warning concerns the whole run, not a flight
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)

@@ -1,4 +1,4 @@
-"""How good a pair is: the order in which candidates are offered, the limits that it keeps, and its grade."""
+"""Rank candidates by quality, test the limits of a recommendation, and grade a pair."""
 
 from __future__ import annotations
 
@@ -27,55 +27,56 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
-# Errors of a deformation within this of the smallest count as equally good: then the earliest tr that is safe wins.
+# Errors of a deformation within this difference of the smallest are equally good [-]; the earliest safe tr wins then.
 EQUALLY_GOOD = 0.02
-# Of the level of the energy alone so much: it tells the mean energy after td within a tenth at best, and swings by as
-# much while td moves by less than the margin.  A timing tolerance allows the same change of an error.
+# Level errors within this difference are of like quality [-]: the level alone gives the mean energy after td to within
+# 10 % at best, and changes by as much while td moves by less than the margin. A timing tolerance allows the same change
+# of an error.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
+# Largest level error of a crossing by rounding, for levels above this share of the highest energy [-].
 ROUNDING: Final = 1e-3
-# Errors are compared to so many decimals.  Pairs of equal error, as on all swings of one mode, differ in the last
-# digits by how the numbers were written: those would decide which pair comes first.
+# Decimals to which errors are compared. Pairs of equal error, as on all swings of one mode, differ in the last digits
+# by rounding, which must not decide their order.
 _DECIMALS: Final = 4
-# Rigid times within this share of the longest are alike: there a body that stays in place is worth more.
+# Rigid times within this share of the longest are alike; there a small position error is worth more [-].
 _LIKE_TIMES = 0.1
 
 
 def candidates_at(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Give the candidates of each td of one record, by `judged_of`, best first, one of them recommended."""
+    """Yield the candidates of each td of one record, found by ``judged_of`` and ranked, one of them recommended."""
     return chain.from_iterable(map(ranked, judged_of(situations, in_flight=in_flight)))
 
 
 def ranked(judged: Judged) -> Iterator[Candidates]:
-    """Order the candidates of each td, best first, number them, and recommend the first that keeps the limits, if any.
+    """Rank the candidates of each td, number them, and recommend the first within the limits of the settings, if any.
 
-    Acceptable ones first, of them those on the same swing as td, or near it, last: they save little.  Of each group
-    first those of like quality, the earliest first, but where it is much the same those that leave the body out of
-    place behind the others; then the rest by their error.
+    Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
+    In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
+    longest, those with a large position error come after the others.  The rest follows by error.
     """
     rigid = judged.td - judged.moments.tr
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
-    room = np.repeat([like_quality(one) for one in judged.situations], 3)
-    places = order(group, judged.error, rigid, judged.out_of_place, room)
-    kept = judged.kept[places]
-    for one, (first, last) in zip(
+    room = np.repeat([like_quality(situation) for situation in judged.situations], 3)
+    rows = order(group, judged.error, rigid, judged.out_of_place, room)
+    is_kept = judged.kept[rows]
+    for situation, (first, last) in zip(
         judged.situations, pairwise(judged.ends), strict=True
     ):
-        best = np.flatnonzero(kept[first:last])
+        best = np.flatnonzero(is_kept[first:last])
         yield Candidates(
-            one,
+            situation,
             judged,
-            places[first:last],
+            rows[first:last],
             ranked=True,
             recommended=int(best[0]) if best.size else None,
         )
 
 
 def like_quality(situation: Situation) -> float:
-    """By how much errors of pairs alike in quality differ from the smallest: of a deformation, or of the level [-]."""
+    """Return the difference of errors up to which pairs are of like quality [-]: of deformations, or of levels."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
@@ -83,66 +84,78 @@ def order(
     group: NDArray[np.int32],
     error: Samples,
     rigid: Samples,
-    off: NDArray[np.bool_],
+    is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Give the places in the order of the groups, in each the errors within its ``room`` (g,) of the smallest first.
+    """Return the order of candidates by group, in each group first those with an error within ``room`` of the smallest.
 
-    Of these come the longest rigid times first, but behind those within a tenth of the longest those that are ``off``.
-    The others follow by error.
+    ``room`` has shape (groups,), the other arguments shape (n,).  The errors within ``room`` are ordered by descending
+    rigid time; but among rigid times within 10 % of the longest, those with ``is_off`` come last.  The others follow
+    by error.
     """
     error = np.round(error, _DECIMALS)
-    good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
-    longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
-    near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])
+    is_like = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
+    longest = _extreme(np.maximum, group, np.where(is_like, rigid, -np.inf), room.size)
+    is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
     return np.lexsort(
-        (-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group)
+        (
+            -rigid,
+            np.where(is_like, -rigid, error),
+            is_long & is_off,
+            is_like & ~is_long,
+            ~is_like,
+            group,
+        )
     )
 
 
 def _extreme(
-    which: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
+    extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Least or greatest of the values in each of so many groups."""
-    found = np.full(groups, np.inf if which is np.minimum else -np.inf)
-    which.at(found, group, values)
-    return found
+    """Return the smallest or largest value of each group, by the function ``extreme``."""
+    extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
+    extreme.at(extremes, group, values)
+    return extremes
 
 
 def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
-    """Which of --max-kinetic-share and --max-residual are not kept, or cannot be judged."""
+    """Return a message for each of --max-kinetic-share and --max-residual that is exceeded or cannot be judged."""
     settings = situation.settings
     limits = (
         ("kinetic share", situation.kinetic_share, settings.max_kinetic_share),
         ("residual", candidate.residual, settings.max_residual),
     )
-    return tuple(
-        f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {format_above_limit(value, limit)} above the limit {limit:g}"
-        for name, value, limit in limits
-        if limit is not None and (value is None or value > limit)
-    )  # fmt: skip
+    messages = []
+    for name, value, limit in limits:
+        if limit is None:
+            continue
+        if value is None:
+            messages.append(f"{name} unknown, at most {limit:g} was asked for")
+        elif value > limit:
+            exceeding = format_above_limit(value, limit)
+            messages.append(f"{name} {exceeding} above the limit {limit:g}")
+    return tuple(messages)
 
 
-# Of the vibration [-]: a good pair keeps what the tolerance on tr asks for by default.
+# Largest residual of a good pair [-]: the default tolerance for tr.
 MOST_GOOD = 0.2
-# What a further mode may make of it at most in a good pair: a good grade is a promise.
+# Largest residual of a good pair if the record hides a further mode [-]: a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
-# Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
+# An energy has passed its mean if it is this multiple of the standard deviation beyond it; smaller noise is ignored.
 _BAND: Final = 0.25
-# Of the energy that the next contact puts into the parts: an error of the vibration with less of it does not make a
-# pair worse than good, or than fair (docs/explanation/validation-vibration.md).
+# Limits for the energy of the vibration error as a share of that of the next contact [-]: up to the first a pair is
+# good, up to the second not poor (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 
 
 class Cause(NamedTuple):
-    """Why a grade is none better: the ``reason``, and the ``cure``, which would make it better."""
+    """Why a grade is not better: the ``reason``, and the ``cure`` that would make it better."""
 
     reason: str
     cure: str
 
 
-_NAMED: Final = 5  # parts in a sentence
+_NAMED: Final = 5  # number of parts that a sentence names
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the momenta of the parts (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
@@ -155,26 +168,26 @@ _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
 class Grade(NamedTuple):
-    """A ``grade``, one of `GRADES`, and the ``causes`` why it is none better; empty for "good"."""
+    """A ``grade``, one of `GRADES`, and the ``causes`` why it is not better; empty for "good"."""
 
     grade: str
     causes: tuple[Cause, ...] = ()
 
     @classmethod
     def of(cls, poor: Sequence[Cause], fair: Sequence[Cause]) -> Grade:
-        """Grade by the causes for "poor", else by those for "fair"."""
+        """Make a grade from the causes for "poor", else from those for "fair"."""
         if poor:
             return cls("poor", tuple(poor))
         return cls("fair", tuple(fair)) if fair else cls("good")
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why it is none better."""
+        """Reasons why the grade is not better."""
         return tuple(cause.reason for cause in self.causes)
 
 
 def grade_of_residual(residual: float) -> str:
-    """Give the grade that a residual alone has [-].
+    """Return the grade of a residual by itself [-].
 
     Examples
     --------
@@ -187,10 +200,10 @@ def grade_of_residual(residual: float) -> str:
 
 
 class Quality(NamedTuple):
-    """Two statements on a pair: how the ``motion`` comes out, and the ``vibration`` after td; the worse one counts.
+    """Two grades of a pair: of the ``motion``, and of the ``vibration`` after td; the worse one counts.
 
-    ``alone``: the grade of the vibration by itself, which ``worth`` may raise: what its error is worth in the next
-    contact, None if that is not known.
+    ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
+    relative to the next contact, None if that is unknown.
     """
 
     motion: Grade
@@ -205,27 +218,25 @@ class Quality(NamedTuple):
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """Why the grade is none better, and what would make it better."""
+        """Causes why the grade is not better, with their cures."""
         statements = (self.motion, self.vibration)
-        return tuple(
-            cause
-            for statement in statements
-            if statement.grade == self.grade
-            for cause in statement.causes
-        )
+        worst = [part.causes for part in statements if part.grade == self.grade]
+        return tuple(chain.from_iterable(worst))
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why the grade is none better."""
+        """Reasons why the grade is not better."""
         return tuple(cause.reason for cause in self.causes)
 
 
 def quality_of(situation: Situation, best: Candidate) -> Quality:
-    """Grade the recommended tr of a td: its motion, and its vibration, also by what its error is worth."""
+    """Grade the recommended tr of a td: its motion, and its vibration, also relative to the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
-    ruined = [Cause(what, _CORRECT_THE_DECK) for what in situation.settings.ruined]
-    motion = Grade.of((*ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain)
+    ruined = [Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined]
+    if flight.unknown_load:
+        ruined.append(_UNKNOWN_LOAD)
+    motion = Grade.of(ruined, uncertain)
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(_poor(situation, best), _fair(situation, best))
@@ -244,6 +255,7 @@ def _weighed(alone: Grade, worth: Worth | None) -> Grade:
 
 
 def _poor(situation: Situation, best: Candidate) -> list[Cause]:
+    """Return the causes for the grade "poor" of the vibration."""
     causes = []
     if best.residual is None:
         causes.append(_unknown_direction(situation))
@@ -258,7 +270,7 @@ def _poor(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def _unknown_direction(situation: Situation) -> Cause:
-    """Say that the deformations at tr and td cannot be compared, and why the modes could not be identified."""
+    """Return the cause that the directions of the deformation at tr and td are unknown."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(
@@ -268,18 +280,18 @@ def _unknown_direction(situation: Situation) -> Cause:
 
 
 def _way_to_the_modes(situation: Situation) -> str:
-    """What would show the modes of the vibration: other parts, or more states."""
+    """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
         return "name the parts to be switched with `parts`, if the files have parts"
-    beside = situation.together.beside.parts
-    if beside:
-        names = list_names([part.name for part in beside], most=_NAMED)
+    other_parts = situation.together.beside.parts
+    if other_parts:
+        names = list_names([part.name for part in other_parts], most=_NAMED)
         return f"name all parts that vibrate together with `parts`: {names} as well"
     return "write the energies more often"
 
 
 def _wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Say how wrong the vibration after td is, and whether td or tr is to blame."""
+    """Return the cause that the vibration after td is wrong, and whether tr or td has to be changed."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
@@ -291,7 +303,7 @@ def _wrong_vibration(situation: Situation, residual: float) -> Cause:
 
 
 def _of_record(situation: Situation) -> list[Cause]:
-    """Why the samples of the flight up to td are none that a level can be read from."""
+    """Return the causes why no level can be read from the samples of the flight up to td."""
     start = situation.flight.start
     _, energy = situation.history.between(
         -np.inf if start is None else start, situation.td
@@ -306,10 +318,10 @@ def _of_record(situation: Situation) -> list[Cause]:
         )
     states = states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        found = f"the record has {states:.2g} states per period"
+        states_text = f"the record has {states:.2g} states per period"
         causes.append(
             Cause(
-                f"{found}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+                f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
                 "write the energies more often",
             )
         )
@@ -317,7 +329,7 @@ def _of_record(situation: Situation) -> list[Cause]:
 
 
 def certainty(best: Candidate) -> int:
-    """How well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
+    """Return how well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
     if best.tr_high is None or best.timing_tolerance is None:
         return 2
     if _is_loose(best):
@@ -326,7 +338,7 @@ def certainty(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Whether the lock-in error may be above what is good, as far as tr is known."""
+    """Return True if the lock-in error may exceed that of a good pair, within the accuracy of tr."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -335,15 +347,16 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _fair(situation: Situation, best: Candidate) -> list[Cause]:
+    """Return the causes for the grade "fair" of the vibration."""
     if best.residual is None:
         return []
     high = best.residual_high or best.residual
     causes = []
     if best.residual > MOST_GOOD:
-        worst = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
+        worst_text = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
         causes.append(
             Cause(
-                f"the vibration after td is wrong by {best.residual:.0%}{worst}",
+                f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
                 "choose another td, as d2rpick explore lists them",
             )
         )
@@ -366,7 +379,7 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def states_per_period(energy: Samples) -> float | None:
-    """How many samples a period of the energy has on average: it passes its mean twice in one; None without a period.
+    """Return the average number of samples per period of the energy (it passes its mean twice); None without one.
 
     Examples
     --------
@@ -375,7 +388,7 @@ def states_per_period(energy: Samples) -> float | None:
     """
     if energy.size < 2:
         return None
-    off = energy - energy.mean()
-    side = np.sign(off[np.abs(off) > _BAND * off.std()])
+    deviation = energy - energy.mean()
+    side = np.sign(deviation[np.abs(deviation) > _BAND * deviation.std()])
     passes = np.flatnonzero(np.diff(side)).size
     return 2 * energy.size / passes if passes > 1 else None

@@ -1,4 +1,4 @@
-"""What a choice is asked about: a run, the energy in it that is meant, and how it is judged."""
+"""Define a question: a run, the energy of it that is meant, and the settings for the choice."""
 
 from __future__ import annotations
 
@@ -25,24 +25,25 @@ _DEFAULT = Selection()
 
 
 class Reference(NamedTuple):
-    """A run without switching, and the energy in it that a choice is about."""
+    """A reference run, and the energy of it that a choice is about."""
 
     run: Run
     history: History
 
     @classmethod
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
-        """Read what is selected of a run that is open; FormatError when it is not there."""
+        """Read the selected energy of an open run; FormatError if it is missing."""
         if selection.parts:
+            # imported here: a table has no parts
             from d2rpick.flight.momentum import (
                 replace_words_by_part_ids,
-            )  # not above: a table has no parts
+            )
 
             selection = replace_words_by_part_ids(run, selection)
         return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
-        """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
+        """Read the same parts from another run of the model, whatever names they were requested by."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)
@@ -54,30 +55,28 @@ class Reference(NamedTuple):
 def read(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> Reference:
-    """Open the files of a run and read what is selected; arguments and errors as of `open_run`."""
+    """Open the files of a run and read the selected energy; arguments and errors as for `open_run`."""
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Settings:
-    """What the analyst asks for; times in the unit of the history.
+    """Settings of the analyst; times in the unit of the history.
 
-    ``after``: the load ends here, ``landing``: the next contact comes here (None: found from the record).  ``margin``:
-    kept clear after the load and before the next contact (None: nothing, but where td is chosen or the landing given
-    what `d2rpick.flight.margin` derives before the contact).
-    ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
-    given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
-    ``keep_vibration``: grade the vibration by itself, however little its error is worth in the next contact.
-    ``min_quality``: least grade of a pair that is planned, and that a deck passes with.
-    ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
-    while deformable; without the first nothing is said of the run time.
-    ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
-    Then one body is assumed.
-    ``placement``: where the deck puts the parts, or None without one.
-    ``by_deck``: the files that these, and a cost share that is not given, come from; None where no deck tells anything.
-    ``kept_off``: main nodes of rigid bodies that the run of a Radioss deck keeps off.  ``ruined``: what ruins that run.
+    ``after``: end of the load, ``landing``: next contact (None: found from the record).  ``margin``: time kept clear
+    after the load and before the next contact (None: 0, but if td is chosen or the landing given, what
+    `d2rpick.flight.margin` derives before the contact).  ``tolerance``: limit of the lock-in error, or of the level
+    error without an oscillator [-].  ``max_kinetic_share``, ``max_residual``: further limits of a recommendation, or
+    None [-].  ``oscillator``: given instead of identified.  ``fit_window``: window in which the oscillator is
+    identified.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr of a flight that is not
+    certain.  ``keep_vibration``: grade the vibration itself, even if its error is small relative to the next contact.
+    ``min_quality``: lowest grade of a pair that is planned, and that a deck passes with.
+    ``cost_share``: share of the switched parts in the cost of a step; without it the run time stays unknown.
+    ``step_ratio``: time step while rigid over that while deformable.  ``bodies``: rigid bodies that the parts become,
+    according to a deck; None without a deck, empty if it does not define them; then one body is assumed.
+    ``placement``: places of the parts according to the deck, or None.  ``by_deck``: sources of these and of a cost
+    share that is not given; None without a deck.  ``kept_off``: main nodes of rigid bodies that a Radioss deck keeps
+    inactive.  ``ruined``: faults of the deck that ruin its run.
     """
 
     after: float | None = None
@@ -101,10 +100,8 @@ class Settings:
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def run_time_share(self, rigid_fraction: float) -> float | None:
-        """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
+        """Return the expected run time over that of the reference run [-]; None if the cost share is unknown."""
         share = self.cost_share
-        return (
-            None
-            if share is None
-            else run_time_share(rigid_fraction, share, self.step_ratio)
-        )
+        if share is None:
+            return None
+        return run_time_share(rigid_fraction, share, self.step_ratio)

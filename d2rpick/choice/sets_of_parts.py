@@ -1,4 +1,4 @@
-"""Sets of parts worth comparing: what each saves, how far it puts the body out of place, and which one to take."""
+"""Compare sets of parts: what each saves, its position error, and which one to make rigid."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from d2rpick.base.errors import (
 )
 from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.candidates import ONE_BODY
-from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (
     bodies_of,
     doubts_of,
@@ -46,29 +45,30 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import Run
 
-# Savings that differ by less cannot be told apart: the cost model is right within some points.
+# Savings that differ by less are equal: the cost model is right to within a few percent of the run time [-].
 _LIKE: Final = 0.01
-# The heaviest parts that together have this share of the mass of all that may be switched.
+# The set "heavy" has at least this share of the mass of all switchable parts [-].
 _HEAVY: Final = 0.5
 _ALL, _STILL = "all that may", "all but what moves"
 _NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
 
 
 class PartSet(NamedTuple):
-    """A set of parts, what it saves and what it does; None with a word in ``reasons`` where unknown.
+    """A set of parts with its saving and its errors; unknown values are None, with the cause in ``reasons``.
 
-    ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
-    ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
-    take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
-    the record [-].  ``angle_error`` is by how much a body is turned at td from where it should be [degrees]; it and the
-    position error may be larger where ``position_is_lower_bound``.  ``moving`` are the parts that move against the
-    rest, ``apart``: some of them fly away from the body that they are to become one with.
+    ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the share of a step that they save [-].
+    `step_growth` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
+    it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
+    ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
+    and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to
+    the rest; ``apart``: some of them fly away from the body that they are to become part of.
     """
 
     name: str
@@ -96,19 +96,20 @@ class PartSet(NamedTuple):
 
     @property
     def saving(self) -> float | None:
-        """Share of the run time that is saved [-]."""
+        """Share of the run time that is saved [-]; None if it is unknown."""
         return None if self.run_time_share is None else 1 - self.run_time_share
 
     @property
     def out_of_place(self) -> bool:
-        """Whether the position error is beyond its limit, or a part flies away from the body it is to be one with."""
-        error, limit = self.position_error, self.position_limit
+        """True if the position error exceeds its limit, or a part flies away from the body that it joins."""
+        error = self.position_error
+        limit = self.position_limit
         return self.apart or (error is not None and limit is not None and error > limit)
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Answer of ``parts``: every part, sets of them, and what to be aware of.
+    """Answer of ``parts``: all parts, sets of them, and warnings.
 
     ``inventory`` is None without a deck.
     """
@@ -124,8 +125,8 @@ class Parts:
 
     @property
     def recommended(self) -> PartSet | None:
-        """The set to take."""
-        return next((one for one in self.sets if one.recommended), None)
+        """The recommended set; None without one."""
+        return next((part_set for part_set in self.sets if part_set.recommended), None)
 
 
 def parts_of(
@@ -133,27 +134,27 @@ def parts_of(
     settings: Settings,
     model: CostModel | None,
     *,
-    given: Sequence[int] = (),
+    given_ids: Sequence[int] = (),
     times: Times | float | None = None,
-    beside: Sequence[str] = (),
+    deck_files: Sequence[str] = (),
 ) -> Parts:
-    """Judge every part of a run, and compare sets of them.
+    """Judge every part of a run, and compare sets of parts.
 
     Parameters
     ----------
     run : Run
-        Without switching.
+        The reference run.
     settings : Settings
         As for ``suggest``; its cost share is not used.
     model : CostModel or None
-        The deck with its cost; without it the cost and most verdicts stay open.
-    given : sequence of int
-        A set to be compared too.
+        The deck with its costs; without it the costs and most verdicts stay unknown.
+    given_ids : sequence of int
+        Part ids of a further set to compare.
     times : (float, float) or float, optional
-        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, for each set
-        with the tr of ``suggest``.
-    beside : sequence of str
-        The deck, in whose folder a d3hsp with the smallest steps of parts is looked for too.
+        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, and for each set
+        the tr of ``suggest``.
+    deck_files : sequence of str
+        The deck, in whose folder a d3hsp with the smallest time steps of parts is looked for too.
 
     Returns
     -------
@@ -163,44 +164,49 @@ def parts_of(
     model = None if foreign else model
     run = in_deck(run, model.inventory if model else None)
     facts = facts_of(run, settings)
-    rows = rows_of(facts, model, find_printed_steps(run, *(beside if model else ())))
+    rows = rows_of(
+        facts, model, find_printed_steps(run, *(deck_files if model else ()))
+    )
     comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
-    for one in _sets(rows, given):
-        td = next(
-            (other.window[1] for other in sets if other.window), None
-        )  # the same for all, to be compared
-        sets.append(comparison.of(one, times or td))
-        left = (
-            tuple(part for part in one.parts if part not in sets[-1].moving)
-            if one.name == _ALL
-            else ()
-        )
-        if left and sets[-1].moving:  # they may fly longer without what moves
-            sets.append(comparison.of(PartSet(_STILL, left), times))
-    found = tuple(_with_recommendation(_distinct(sets)))
+    for part_set in _sets(rows, given_ids):
+        # the same td for all sets, so that they can be compared
+        td = next((earlier.window[1] for earlier in sets if earlier.window), None)
+        sets.append(comparison.of(part_set, times or td))
+        if part_set.name == _ALL:
+            still_parts = tuple(
+                part for part in part_set.parts if part not in sets[-1].moving
+            )
+        else:
+            still_parts = ()
+        # the other parts may fly longer than the moving ones
+        if still_parts and sets[-1].moving:
+            sets.append(comparison.of(PartSet(_STILL, still_parts), times))
+    recommended_sets = tuple(_with_recommendation(_distinct(sets)))
     cautions = (
         *((foreign,) if foreign else ()),
-        *_cautions(run, facts, model, rows, found),
+        *_cautions(run, facts, model, rows, recommended_sets),
     )
     inventory, weights = (model.inventory, model.weights) if model else (None, None)
-    return Parts(run, inventory, weights, settings, facts, rows, found, cautions)
+    return Parts(
+        run, inventory, weights, settings, facts, rows, recommended_sets, cautions
+    )
 
 
 def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
-    """Give the numbers of the parts of a set that is to be compared too.
+    """Return the part ids of a further set to compare.
 
     Raises
     ------
     FormatError
-        If the run has no such parts, or the recommended set is asked for.
+        If the run has no such parts, or the recommended set is requested.
     """
     if not names:
         return ()
     if has_recommended(names, run.parts):
-        what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        cure = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(
-            f"{run.name}: the recommended set is what is looked for here; {what}"
+            f"{run.name}: the recommended set is what is looked for here; {cure}"
         )
     numbers = replace_words_by_part_ids(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
@@ -209,68 +215,76 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
 def recommended_parts(
     run: Run, settings: Settings, model: CostModel
 ) -> tuple[int, ...]:
-    """Give the parts of the recommended set; FormatError where none can be recommended."""
-    found = parts_of(run, settings, model)
-    if found.recommended is None:
-        if found.facts.reason:
-            raise FormatError(found.facts.reason)
-        absent = [
-            one.message for one in found.cautions if one.code == "parts-not-in-deck"
+    """Return the part ids of the recommended set.
+
+    Raises
+    ------
+    FormatError
+        If no set can be recommended.
+    """
+    answer = parts_of(run, settings, model)
+    if answer.recommended is None:
+        if answer.facts.reason:
+            raise FormatError(answer.facts.reason)
+        reasons = [
+            caution.message
+            for caution in answer.cautions
+            if caution.code == "parts-not-in-deck"
         ]
-        why = "; ".join(
-            dict.fromkeys(
-                [*absent, *(reason for one in found.sets for reason in one.reasons)]
-            )
-        )
+        for part_set in answer.sets:
+            reasons += part_set.reasons
+        why = "; ".join(dict.fromkeys(reasons)) or "no part may be switched"
         raise FormatError(
-            f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
+            f"{run.name}: no set of parts can be recommended ({why}); name the parts"
         )
-    return found.recommended.parts
+    return answer.recommended.parts
 
 
 def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
-    """Leave out what is there already under another name."""
+    """Leave out sets that repeat the parts of an earlier set under another name."""
     return [
-        one
-        for at, one in enumerate(sets)
-        if one.parts not in [other.parts for other in sets[:at]]
+        part_set
+        for at, part_set in enumerate(sets)
+        if part_set.parts not in [earlier.parts for earlier in sets[:at]]
     ]
 
 
-def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
-    """Name the sets worth comparing."""
+def _sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
+    """Yield the sets worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
-    named = {
+    rows_by_name = {
         _ALL: movable,
         "stopped deforming": stopped,
         "heavy": _heavy(movable),
-        "given": [row for row in rows if row.id in given],
+        "given": [row for row in rows if row.id in given_ids],
     }
     yield from (
         PartSet(name, tuple(row.id for row in members))
-        for name, members in named.items()
+        for name, members in rows_by_name.items()
         if members
     )
 
 
 def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
-    """The heaviest parts that have half of the mass together; none where a mass is not known."""
+    """Return the heaviest parts that together have half of the mass; empty if a mass is unknown."""
     masses = {row.id: row.mass for row in movable if row.mass is not None}
     if len(masses) < len(movable):
         return []
-    total, taken, found = sum(masses.values()), 0.0, set[int]()
+    total = sum(masses.values())
+    taken = 0.0
+    heaviest = set[int]()
     for part in sorted(masses, key=lambda part: -masses[part]):
         if taken >= _HEAVY * total:
             break
-        found.add(part)
+        heaviest.add(part)
         taken += masses[part]
-    return [row for row in movable if row.id in found]
+    return [row for row in movable if row.id in heaviest]
 
 
 @dataclass(frozen=True)
 class _Comparison:
-    """What all sets are compared by."""
+    """The run, settings, costs and parts that all sets are compared with."""
 
     run: Run
     settings: Settings
@@ -279,62 +293,69 @@ class _Comparison:
 
     @cached_property
     def placement(self) -> Placement | None:
-        """Where the deck puts the parts."""
+        """Places of the parts according to the deck; None without a deck."""
         return Placement(self.model.inventory) if self.model else None
 
-    def of(self, one: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set, in a window, or in that for a td."""
-        share = self.model.saved(one.parts) if self.model else Share(None)
-        reasons = [share.reason]
-        one = self._with_cost(one, self.model.inventory, share) if self.model else one
+    def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
+        """Complete a set with its costs and errors, for a given (tr, td) or td, or for a td of its own."""
+        reasons = list[str | None]()
+        if self.model:
+            share = self.model.saved(part_set.parts)
+            reasons.append(share.reason)
+            part_set = self._with_cost(part_set, self.model.inventory, share)
         try:
-            one = self._with_window(one, times)
+            part_set = self._with_window(part_set, times)
         except (FormatError, RangeError) as error:
             reasons.append(str(error))
-        if one.rigid_fraction is not None and one.cost_share is not None:
+        if part_set.rigid_fraction is not None and part_set.cost_share is not None:
             run_time = run_time_share(
-                one.rigid_fraction, one.cost_share, self.settings.step_ratio
+                part_set.rigid_fraction, part_set.cost_share, self.settings.step_ratio
             )
-            one = one._replace(run_time_share=run_time)
-        return one._replace(
-            reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason)
+            part_set = part_set._replace(run_time_share=run_time)
+        return part_set._replace(
+            reasons=tuple(reason for reason in (*reasons, *part_set.reasons) if reason)
         )
 
-    def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
-        within = {
+    def _with_cost(
+        self, part_set: PartSet, inventory: Inventory, share: Share
+    ) -> PartSet:
+        """Add the rigid bodies, the costs, and the growth of the time step."""
+        rigid_elements = {
             part: counts.total()
-            for part, counts in inventory.elements_within(one.parts).items()
+            for part, counts in inventory.elements_within(part_set.parts).items()
         }
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
-        rigid = {part for part, count in within.items() if count == whole[part]}
-        return one._replace(
-            bodies=inventory.bodies(one.parts),
-            moving=self._loose(inventory, one.parts),
-            elements=sum(within.values()),
-            element_fraction=sum(within.values()) / sum(whole.values())
-            if whole
-            else None,
-            mass_fraction=self._mass_fraction(one.parts),
+        rigid = {part for part, count in rigid_elements.items() if count == whole[part]}
+        elements = sum(rigid_elements.values())
+        element_fraction = None
+        if whole:
+            element_fraction = elements / sum(whole.values())
+        return part_set._replace(
+            bodies=inventory.bodies(part_set.parts),
+            moving=self._loose(inventory, part_set.parts),
+            elements=elements,
+            element_fraction=element_fraction,
+            mass_fraction=self._mass_fraction(part_set.parts),
             cost_share=share.value,
-            step_growth=step_growth(self.rows, {*one.parts, *rigid}),
+            step_growth=step_growth(self.rows, {*part_set.parts, *rigid}),
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
-        """Share of the mass of all parts that fly; None where one is not known."""
+        """Return the share of the parts in the mass of all flying parts [-]; None if a mass is unknown."""
         masses = {
             row.id: row.mass for row in self.rows if row.flight and row.flight.flies
         }
-        known = {part: mass for part, mass in masses.items() if mass is not None}
+        known_masses = {part: mass for part, mass in masses.items() if mass is not None}
         if (
-            len(known) < len(masses)
-            or not set(parts) <= known.keys()
-            or not sum(known.values())
+            len(known_masses) < len(masses)
+            or not set(parts) <= known_masses.keys()
+            or not sum(known_masses.values())
         ):
             return None
-        return sum(known[part] for part in parts) / sum(known.values())
+        return sum(known_masses[part] for part in parts) / sum(known_masses.values())
 
     def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
-        """Parts of other rigid bodies than the heaviest; none where ties that are not followed may join these."""
+        """Return the parts outside of the heaviest rigid body; empty if ties may join the bodies."""
         masses = {row.id: row.mass or 0.0 for row in self.rows}
         main = max(
             inventory.bodies(parts),
@@ -343,11 +364,19 @@ class _Comparison:
         )
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
-    def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
-        """Find when the set may be rigid; RangeError with the reason where it may not."""
-        reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
-        told = bodies_of(self.model.inventory, one.parts) if self.model else None
-        settings = replace(self.settings, bodies=told, placement=self.placement)
+    def _with_window(self, part_set: PartSet, times: Times | float | None) -> PartSet:
+        """Add the window in which the set may be rigid.
+
+        Raises
+        ------
+        RangeError
+            If no tr can be recommended, with the reason.
+        """
+        reference = Reference.of(
+            self.run, Selection(parts=tuple(map(str, part_set.parts)))
+        )
+        bodies = bodies_of(self.model.inventory, part_set.parts) if self.model else None
+        settings = replace(self.settings, bodies=bodies, placement=self.placement)
         if isinstance(times, tuple):
             situation = verify_of(reference, *times, settings).situation
             tr, td = times
@@ -360,27 +389,29 @@ class _Comparison:
                 (answer.recommended.tr, answer.recommended.td),
             )
         time = reference.history.time
-        one = one._replace(
+        part_set = part_set._replace(
             window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0])
         )
-        return _with_position(one, situation, tr)
+        return _with_position(part_set, situation, tr)
 
 
-def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
-    """Add how far the body that is off most is out of place at td since its parts moved against each other before."""
-    told = ("several-bodies", "moves-apart")
-    why = tuple(
+def _with_position(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
+    """Add the largest position error at td of a body whose parts moved relative to each other before tr."""
+    codes = ("several-bodies", "moves-apart")
+    reasons = tuple(
         caution.message
         for caution in out_of_place(situation, tr)
-        if caution.code in told
+        if caution.code in codes
     )
     bodies = situation.bodies
     worst = bodies.worst(tr, situation.td) if bodies else None
     if bodies is None or worst is None:
         apart = {part.id for part in bodies.apart} if bodies else set()
-        return one._replace(reasons=why, moving=one.moving | apart, apart=bool(apart))
+        return part_set._replace(
+            reasons=reasons, moving=part_set.moving | apart, apart=bool(apart)
+        )
     angle = float(worst.drift.angles(np.array([tr]), situation.td)[0])
-    placed = one._replace(
+    placed = part_set._replace(
         position_error=worst.error,
         position_limit=bodies.limit if worst.part else None,
         position_part=worst.drift.part if worst.part else None,
@@ -389,25 +420,29 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         angle_error=None if np.isnan(angle) else angle,
         position_is_lower_bound=worst.at_least,
     )
-    return (
-        placed._replace(moving=one.moving | {*worst.drift.moving})
-        if placed.out_of_place
-        else placed
-    )
+    if placed.out_of_place:
+        return placed._replace(moving=part_set.moving | {*worst.drift.moving})
+    return placed
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Recommend the set that saves most, and of those that save alike the one of fewest parts.
+    """Mark the recommended set: it saves most; of sets that save equally much it has the fewest parts.
 
-    A set that puts the body out of place counts only where all do.
+    A set with too large a position error is considered only if all sets have one.
     """
-    useful = [one for one in sets if one.saving is not None and one.saving > 0]
-    in_place = [one for one in useful if not one.out_of_place] or useful
-    most = max((one.saving or 0.0 for one in in_place), default=0.0)
-    alike = [one for one in in_place if (one.saving or 0.0) >= most - _LIKE]
-    best = min(alike, key=lambda one: len(one.parts), default=None)
-    for one in sets:
-        yield one._replace(recommended=one is best)
+    useful = [
+        part_set
+        for part_set in sets
+        if part_set.saving is not None and part_set.saving > 0
+    ]
+    in_place = [part_set for part_set in useful if not part_set.out_of_place] or useful
+    largest = max((part_set.saving or 0.0 for part_set in in_place), default=0.0)
+    alike = [
+        part_set for part_set in in_place if (part_set.saving or 0.0) >= largest - _LIKE
+    ]
+    best = min(alike, key=lambda part_set: len(part_set.parts), default=None)
+    for part_set in sets:
+        yield part_set._replace(recommended=part_set is best)
 
 
 def _cautions(
@@ -417,6 +452,7 @@ def _cautions(
     rows: Sequence[PartRow],
     sets: Sequence[PartSet],
 ) -> Iterator[Caution]:
+    """Yield the warnings about the deck, the parts and the sets."""
     if facts.reason:
         yield Caution("no-part-history", facts.reason)
     if model is None:
@@ -432,9 +468,8 @@ def _cautions(
     yield from doubts_of_solver((), model.inventory)
     yield from left_rigid_in(run, model.inventory)
     yield from doubts_of_cost(model)
-    if missing := [
-        row.id for row in rows if row.elements is None and row.id in facts.parts
-    ]:
+    missing = [row.id for row in rows if row.elements is None and row.id in facts.parts]
+    if missing:
         yield Caution(
             "parts-not-in-deck",
             f"{name_units(missing)} of the history {choose_verb(missing)} not in the deck",
@@ -444,10 +479,10 @@ def _cautions(
             "nothing-to-switch",
             "no part may be switched; the reasons are listed in the rows",
         )
-    elif not any(one.recommended for one in sets):
+    elif not any(part_set.recommended for part_set in sets):
         yield Caution(
             "no-set",
             "no set of parts can be recommended; the reasons are listed with the sets",
         )
-    if sets and all(one.angle_error is None for one in sets):
+    if sets and all(part_set.angle_error is None for part_set in sets):
         yield Caution("no-angle", _NO_ANGLE)

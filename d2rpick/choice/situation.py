@@ -1,7 +1,4 @@
-"""What the record tells about a td before any tr is looked at.
-
-That is the flight, the vibration, the level, and whether anything vibrates.
-"""
+"""Describe a td before any tr is considered: the flight, the vibration and the energy level at td."""
 
 from __future__ import annotations
 
@@ -55,34 +52,34 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Of the highest energy a solver errs by so much at any time.
+# Largest error of a solver's energy, as a share of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# Of the largest vibration since the load was over: a hundredth of its amplitude.
+# A fluctuation below this share of the largest vibration energy since the load ended counts as none: 1 % amplitude.
 _FAINT: Final = 1e-4
-# An energy that is rounded to and fro between two numbers: their distance, and half of one to either side.
+# Printed digits: a constant energy may alternate between two printed values, each off by half a digit.
 _QUANTA: Final = 2
-# Share of a flight before the contact that ends it: the margin that td keeps, in which the contact may have begun.
+# Share of a flight before the contact that ends it which is not tested, since the contact may have begun [-].
 _BEFORE_CONTACT: Final = 0.03
 
 
 def nothing_vibrates(
     history: History, flight: tuple[float, float | None], td: float, *, deformed: bool
 ) -> bool:
-    """Whether the energy is round-off all through ``flight`` [time], or swings by no more than can be told from noise.
+    """Return True if the energy in ``flight`` is round-off, or fluctuates by no more than solver noise.
 
-    Free flight excites nothing: what vibrates in any part of it has done so from its start.  So all of it is asked,
-    where its end is known, and not only the time up to td.  Plastic work is no yardstick: however high the level, what
-    counts is how far the energy swings about it.  Where a vibration is known (``deformed``), that is all there is.
+    ``flight`` is (start, end) [time], with end None if it is unknown.  Free flight excites no vibration: whatever
+    vibrates in a part of the flight has vibrated from its start.  So the whole flight is tested if its end is known,
+    not only the time up to td.  Plastic work does not matter: the test is on the fluctuation about the level, however
+    high the level is.  With ``deformed`` (a vibration is known) only the test for round-off is made.
     """
     start, end = flight
     last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
     _, inside = history.between(start, last)
-    if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
+    if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
-    least = round_off(
-        history
-    )  # 0 where no energy is written at all: that tells nothing
-    if least > 0 and float(np.abs(inside).max()) <= least:
+    # 0 if no energy is written at all, which shows nothing
+    rounding = round_off(history)
+    if rounding > 0 and float(np.abs(inside).max()) <= rounding:
         return True
     if deformed or float(inside.min()) < 0 or history.energy_at(td) <= 0:
         return False
@@ -90,35 +87,36 @@ def nothing_vibrates(
 
 
 def _faint(history: History, start: float) -> float:
-    """Swing of the energy that is none [energy]: below what solver and digits resolve, and nothing beside others.
+    """Return the largest fluctuation of the energy that counts as no vibration [energy].
 
-    What falls after the ``start`` of the flight [time] was elastic, at least; plastic work stays.
+    It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
+    ``start`` of the flight [time].  What falls was elastic, at least; plastic work stays.
     """
-    after = history.between(start, float(history.time[-1]))[1]
-    fall = float((np.maximum.accumulate(after) - after).max(initial=0.0))
+    energies = history.between(start, float(history.time[-1]))[1]
+    fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
     highest = history.known.once("highest", lambda: find_largest(history.energy))
-    quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
+    quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
 
 class OfTd:
-    """An answer about one td, by what the record tells about it: its ``situation``."""
+    """Base class of answers about one td; ``situation`` describes that td."""
 
     situation: Situation
 
     @property
     def td(self) -> float:
-        """When the parts are switched back to deformable [time]."""
+        """Time of the switch back to deformable [time]."""
         return self.situation.td
 
     @property
     def flight(self) -> Flight:
-        """Window of free flight around td: ``start``, ``end``, ``source``."""
+        """Free flight around td, with ``start``, ``end`` and ``source``."""
         return self.situation.flight
 
     @property
     def basis(self) -> str:
-        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
+        """Basis of the answer: ``"parts"``, ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
         return self.situation.basis
 
     @property
@@ -128,15 +126,15 @@ class OfTd:
 
     @property
     def kinetic_share(self) -> float | None:
-        """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` and at rest [-]."""
+        """Share of the vibration energy that no tr saves, K [-]; None on basis ``"energy"`` and at rest."""
         return self.situation.kinetic_share
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Situation:
-    """A history seen from one td [time].
+    """A history as seen from one td [time], with the flight and the vibration around td.
 
-    ``evidence`` is what was found of a vibration in it, ``fits`` is what was tried.
+    ``evidence`` describes the vibration that was found, ``fits`` remembers the fits that were tried.
     """
 
     history: History
@@ -148,117 +146,117 @@ class Situation:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """What can be relied on at td."""
+        """Model of the vibration that can be relied on at td."""
         return model_at(self.whole, self.evidence)
 
     @cached_property
     def whole(self) -> Vibration:
-        """What of it the whole energy shows."""
+        """Model of the vibration that the energy of all chosen parts shows."""
         return find_energy_at(self.history, self.td, self.evidence)
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "parts", "oscillator", "modal", "swings" or "energy"."""
+        """Basis of a choice: "parts", "oscillator", "modal", "swings" or "energy"."""
         return self.vibration.basis
 
     @property
     def energy_td(self) -> float:
-        """Energy level at td, from the oscillator where one describes the record [energy]."""
+        """Energy level at td, from the oscillator if one describes the record [energy]."""
         return self.vibration.whole.energy(self.td)
 
     @property
     def kinetic_share(self) -> float | None:
-        """K, or None on basis "energy" and at rest [-]."""
+        """Kinetic fraction K [-]; None on basis "energy" and at rest."""
         share = self.vibration.kinetic_share
-        return (
-            None if share is None or self.at_rest else share
-        )  # where nothing vibrates there is no share
+        if share is None or self.at_rest:
+            return None
+        return share  # without a vibration there is no share
 
     @property
     def earliest_tr(self) -> float | None:
-        """Start of the flight with the margin, or None when unknown [time]."""
+        """Start of the flight plus the margin [time]; None if the start is unknown."""
         start = self.flight.start
-        return (
-            None
-            if start is None
-            else sum_times_as_read(start, self.settings.margin or 0.0)
-        )
+        if start is None:
+            return None
+        return sum_times_as_read(start, self.settings.margin or 0.0)
 
     @property
     def latest_td(self) -> float:
-        """End of the flight with the margin; infinite when no contact was seen [time]."""
+        """End of the flight minus the margin [time]; infinite if no contact was seen."""
         end = self.flight.end
         return float("inf") if end is None else sum_times_as_read(end, -self.margin)
 
     @cached_property
     def margin(self) -> float:
-        """Time kept clear before the next contact [time]: none where td was given, unless it or the landing was."""
+        """Time kept clear before the next contact [time]; 0 for a given td without a given margin or landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
 
     @cached_property
     def together(self) -> Together:
-        """What vibrates together in the flight."""
+        """Parts that vibrate together in the flight."""
         return Together(self.history, self.flight)
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin that a chosen td keeps: the one given, or by how much the next contact may come earlier."""
+        """Margin that a chosen td keeps: the given one, or the time by which the next contact may come earlier."""
         return margin_of(self.history, self.flight, self.settings, self.fits)
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether nothing vibrates in the flight."""
+        """True if nothing vibrates in the flight."""
         start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
-        window, deformed = (start, self.flight.end), self.vibration.unknown is None
+        window = (start, self.flight.end)
+        deformed = self.vibration.unknown is None
         return nothing_vibrates(self.history, window, self.td, deformed=deformed)
 
     @cached_property
     def bodies(self) -> Bodies | None:
-        """How the bodies that the parts to be switched become drift in the flight; None where no parts show it."""
+        """Drift in flight of the rigid bodies that the parts become; None without data of parts."""
         return bodies_of(self.history, self.flight, self.settings, self.fits)
 
     def position_errors(self, times: Samples) -> Samples:
-        """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
-        return (
-            np.broadcast_to(np.nan, times.shape)
-            if self.bodies is None
-            else self.bodies.errors(times, self.td)
-        )
+        """Return the position error at td of a body frozen at each of ``times`` [length]; NaN if unknown."""
+        if self.bodies is None:
+            return np.broadcast_to(np.nan, times.shape)
+        return self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
-        """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
+        """Return the errors that the tolerance limits, in the shape of ``times`` [-]; 0 if nothing vibrates."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr: the tolerance, of many modes what is better than no vibration [-]."""
-        most = self.vibration.most_lock_in
-        return self.settings.tolerance if most is None else most
+        """Largest error of an acceptable tr [-]: the tolerance, for many modes less than removing the vibration."""
+        limit = self.vibration.most_lock_in
+        return self.settings.tolerance if limit is None else limit
 
     @property
     def in_flight(self) -> bool:
-        """Whether td lies in a known flight, with the margin."""
+        """True if td lies in a known flight and keeps the margin."""
         return (
             self.earliest_tr is not None
             and self.earliest_tr < self.td <= self.latest_td
         )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
+        """Return the times in (start, end] of the energy peaks, ascending: of the oscillator, else of the samples."""
         return describe_energy_at(self.history, self.td, self.evidence).peaks(
             start, end
         )
 
-    def sees_as(self, other: Situation) -> bool:
-        """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
-        return self.evidence.is_that_of(other.evidence) and self.flight == other.flight
+    def sees_as(self, situation: Situation) -> bool:
+        """Return True if both situations, of one record, share the flight and the evidence, and differ in td only."""
+        return (
+            self.evidence.is_that_of(situation.evidence)
+            and self.flight == situation.flight
+        )
 
     def at(self, td: float) -> Situation:
-        """Give the same record, flight and evidence seen from another ``td``."""
+        """Return the situation of the same record, flight and evidence at another ``td``."""
         return self if td == self.td else replace(self, td=td)
 
 
@@ -270,80 +268,82 @@ def examine(
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and the oscillator in it.
+    """Find the flight around ``td`` and the vibration in it.
 
-    ``fits`` are those of an earlier look at the same record with the same settings, but for ``after``.  ``quick``, for
-    a choice among many td: an oscillator that describes most of the record, td with it, is not sought again, and of one
-    that is refused the misfit is left out.
+    ``fits`` are those of an earlier call for the same record with the same settings, except ``after``.  Use ``quick``
+    for a choice among many td: an oscillator that describes most of the record, including td, is not searched again,
+    and the misfit of a refused oscillator is not computed.
 
-    RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
+    Raises
+    ------
+    RangeError
+        If td, ``after`` or the fit window lie outside the record, or the record has fewer than 3 states.
     """
     if history.time.size < 3:
-        found = (
-            "1 state was"
-            if history.time.size == 1
-            else f"{history.time.size} states were"
-        )
+        if history.time.size == 1:
+            count = "1 state was"
+        else:
+            count = f"{history.time.size} states were"
         raise RangeError(
-            f"{', '.join(history.source)}: {found} found, choosing needs at least 3"
+            f"{', '.join(history.source)}: {count} found, choosing needs at least 3"
         )
     history.energy_at(td, "td")
     if settings.after is not None:
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen = find_seen_flight(history, td)
-    flying = None if seen.refusal else seen.flight
-    # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
-    at = (
-        (seen.flight.start + seen.flight.end) / 2
-        if seen.refusal and seen.flight
-        else td
-    )
+    seen_evidence = find_seen_flight(history, td)
+    flying = None if seen_evidence.refusal else seen_evidence.flight
+    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
+    if seen_evidence.refusal and seen_evidence.flight:
+        at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
+    else:
+        at = td
     fits = Fits() if fits is None else fits
-    fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
+    fit, span = _oscillator(history, at, settings, seen_evidence, fits, quick=quick)
     described = _settled(history, fit, span) or _described_by_modes(
-        history, td, settings, seen, fits
+        history, td, settings, seen_evidence, fits
     )
-    flight = _flight_at(history, td, settings, seen, described)
-    given = settings.oscillator is not None
+    flight = _flight_at(history, td, settings, seen_evidence, described)
+    is_given = settings.oscillator is not None
     evidence = Evidence(
-        fit, span, given, prescribed=given or settings.fit_window is not None
+        fit, span, is_given, prescribed=is_given or settings.fit_window is not None
     )
     situation = Situation(history, td, settings, flight, evidence, fits)
     if not settings.replay:
         return situation
-    first, last = float(history.time[0]), float(history.time[-1])
-    # without a sign of the next contact nothing is known of what comes after td
+    first = float(history.time[0])
+    last = float(history.time[-1])
+    # without evidence of the next contact nothing is known about the time after td
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
-    within = settled = None
+    fitted = settled = None
     if flight.start is not None:
-        within = Span(flight.start, flight.end or last)
-        settled = (
-            within if flight.settled is None else within._replace(start=flight.settled)
-        )
-    if within is not None and flight.source == "energy":
+        fitted = Span(flight.start, flight.end or last)
+        if flight.settled is None:
+            settled = fitted
+        else:
+            settled = fitted._replace(start=flight.settled)
+    if fitted is not None and flight.source == "energy":
+        # imported here: better evidence does not need it
         from d2rpick.vibration.modal_span import (
             get_inner_window,
-        )  # not above: better evidence does without it
+        )
 
-        inner = get_inner_window(history, within)
-        within = inner if inner.start < td <= inner.end else within
+        inner = get_inner_window(history, fitted)
+        fitted = inner if inner.start < td <= inner.end else fitted
     models = find_models(
         history,
         around,
-        within,
+        fitted,
         settled,
         lambda: is_doubtful(situation.whole),
         fits,
         situation.together,
     )
-    return (
-        replace(situation, evidence=evidence._replace(models=models))
-        if models
-        else situation
-    )
+    if models:
+        return replace(situation, evidence=evidence._replace(models=models))
+    return situation
 
 
 def looking(
@@ -354,9 +354,10 @@ def looking(
     *,
     quick: bool = True,
 ) -> Look:
-    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
+    """Return a function that examines a record at a td, and remembers its answer for each td.
 
-    No flight is taken to begin before ``since`` [time].  ``quick`` as for `examine`.
+    ``fits`` are those of an earlier call with the same settings.  No flight is assumed to begin before ``since``
+    [time].  ``quick`` has the same meaning as in the examination of one td.
     """
     look = partial(
         examine, history, settings=settings, fits=fits or Fits(), quick=quick
@@ -365,7 +366,7 @@ def looking(
 
 
 def _beginning(situation: Situation, since: float) -> Situation:
-    """Give the same with a flight that does not begin before ``since`` [time]."""
+    """Return the situation with a flight that does not begin before ``since`` [time]."""
     flight = situation.flight
     if flight.start is None or flight.start >= since:
         return situation
@@ -376,12 +377,12 @@ def _flight_at(
     history: History,
     td: float,
     settings: Settings,
-    seen: Seen,
+    evidence: Seen,
     described: Described | None,
 ) -> Flight:
-    """Give the flight around td by the evidence, or as the user gives it; what is held does not fly in either case."""
-    flight = find_flight(history, td, seen, described)
-    if seen.held:
+    """Return the flight around td, from the evidence or as the user gives it; supported parts never fly."""
+    flight = find_flight(history, td, evidence, described)
+    if evidence.held:
         return flight
     if settings.after is not None:
         flight = start_flight_at(history, flight, td, settings.after, described)
@@ -391,7 +392,10 @@ def _flight_at(
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Give the same of what was found in any evidence, or given; that of parts by their momentum is so already."""
+    """Limit a flight to the time in which no support acts on the parts.
+
+    A flight found by the momenta of the parts is limited already.
+    """
     if flight.start is None or flight.refusal or flight.by_parts:
         return flight
     start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
@@ -405,20 +409,19 @@ def _oscillator(
     history: History,
     td: float,
     settings: Settings,
-    seen: Seen,
+    evidence: Seen,
     fits: Fits,
     *,
     quick: bool,
 ) -> tuple[Identification | None, Span | None]:
-    """Find the oscillator, given or identified, and the window around td that it describes."""
+    """Return the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    whole = bool(seen.flight or seen.refusal)
-    bounds = (
-        Span(*seen.flight[:2])
-        if seen.flight
-        else Span(float(history.time[0]), float(history.time[-1]))
-    )
+    whole = bool(evidence.flight or evidence.refusal)
+    if evidence.flight:
+        bounds = Span(*evidence.flight[:2])
+    else:
+        bounds = Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.landing is not None:
@@ -429,21 +432,21 @@ def _oscillator(
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
         return _with_hidden_share(history, fit, fits), span
     if settings.oscillator:
-        given = fits.remembered("given", partial(judge_given, settings.oscillator))
+        judge = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = find_described_span(
-            history, td, bounds, given, whole=whole, memory=fits
+            history, td, bounds, judge, whole=whole, memory=fits
         )
         return fit, span
-    every = fits.remembered("one", partial(identify, memory=fits))
-    quickly = partial(every, quick=True)
-    most = fits.once(
+    identify_mode = fits.remembered("one", partial(identify, memory=fits))
+    quickly = partial(identify_mode, quick=True)
+    longest_fit = fits.once(
         ("most", bounds, whole),
         lambda: most_described(history, bounds, quickly, whole=whole, memory=fits),
     )
-    if most is not None and most[0].start <= td <= most[0].end:
-        span, fit = most
+    if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
+        span, fit = longest_fit
     else:
-        fitter = quickly if quick else every
+        fitter = quickly if quick else identify_mode
         span, fit = find_described_span(
             history, td, bounds, fitter, whole=whole, memory=fits
         )
@@ -451,47 +454,51 @@ def _oscillator(
 
 
 def _described_by_modes(
-    history: History, td: float, settings: Settings, seen: Seen, fits: Fits
+    history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
 ) -> Described | None:
-    """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
-    if seen.flight or seen.refusal or not settings.replay:
+    """Return a window that modes describe, if only the energy can show a flight; else None."""
+    if evidence.flight or evidence.refusal or not settings.replay:
         return None
+    # imported here: most records do not need it
     from d2rpick.vibration.modal_span import (
         find_described,
-    )  # not above: most records need none
-
-    quiet, last = find_quiet_time(history, td), float(history.time[-1])
-    guess = (
-        None
-        if quiet is None
-        else Span(quiet.start, last if quiet.end is None else quiet.end)
     )
-    found = find_described(history, td, guess, fits)
-    return Described(*found.span, found.vibration.vibration_energy) if found else None
+
+    quiet = find_quiet_time(history, td)
+    last = float(history.time[-1])
+    if quiet is None:
+        guess = None
+    else:
+        guess = Span(quiet.start, last if quiet.end is None else quiet.end)
+    described = find_described(history, td, guess, fits)
+    if described is None:
+        return None
+    return Described(*described.span, described.vibration.vibration_energy)
 
 
 def _with_hidden_share(
     history: History, fit: Identification, fits: Fits
 ) -> Identification:
-    """Add to an accepted fit, once, what a further mode may hold in what the oscillator leaves over."""
+    """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    window, mode = history.between(fit.start, fit.end), fit.mode
+    window = history.between(fit.start, fit.end)
+    mode = fit.mode
 
-    def widened() -> Identification:
+    def add_share() -> Identification:
         share = estimate_hidden_share(*window, mode)
         return fit._replace(hidden_share=max(fit.hidden_share, share))
 
-    return fits.once(("hidden", fit.start, fit.end, fit.rms), widened)
+    return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)
 
 
 def _settled(
     history: History, fit: Identification | None, span: Span | None
 ) -> Described | None:
-    """Give the window of an oscillator without its first quarter of a period, unless the record begins with it.
+    """Return the window of an oscillator without its first quarter period, unless the record begins with it.
 
-    While the deformation passes through zero its energy hardly shows that a load still moves it, by a tenth of its
-    amplitude and more; where it is largest a hundredth shows.  Each quarter of a period has one of both.
+    While the deformation passes through zero, its energy hardly shows that a load still acts: 10 % of the amplitude and
+    more.  At the largest deformation 1 % shows.  Each quarter period contains one of both.
     """
     if span is None or fit is None or fit.mode is None:
         return None

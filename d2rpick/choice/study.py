@@ -1,4 +1,4 @@
-"""The same question for many runs: tr of each, how far they agree, one tr for all of them, and which stand out."""
+"""Ask one question for many runs: the tr of each, how well they agree, one tr for all, and which runs stand out."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# A run has one of these; the first two were judged.
+# Status of a run; runs with one of the first two were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -54,17 +54,17 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "out-of-range",
     "failed",
 )
-# Tukey's fences: so many times the distance of the quartiles beyond them.
+# Tukey's fences lie at this multiple of the interquartile range beyond the quartiles [-].
 _FENCE: Final = 1.5
-# Runs that a sentence names.
+# Largest number of runs that a sentence names.
 NAMED: Final = 3
-# Share of the rigid time that may be given up for a number of few digits.
+# Share of the rigid time that may be given up for a number with few digits [-].
 _ROUNDED: Final = 0.001
-# Cautions about single runs that a row says otherwise, or that are about what a study does not answer.
+# Codes of warnings of single runs that are not repeated: the row shows them, or the study does not answer them.
 _NOT_REPEATED = ("no-candidate",)
-# A record that ends before this share of the time that most others last to was cut: variants of a model end together.
+# A record that ends before this share of the median end time was cut off [-]: variants of a model end together.
 _WHOLE: Final = 0.99
-# Stretches of a curve that is drawn, each with its lowest and highest energy: twice as many as an eye tells apart.
+# Number of intervals of a drawn curve, each with its lowest and highest energy: twice as many as can be seen.
 _STRETCHES = 200
 
 
@@ -73,9 +73,9 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of every run: ``td``, the window for it, or None for the longest flight.
+    """The question for every run: ``td``, a window for it, or None for the longest flight.
 
-    ``curve`` is whether its energy will be drawn.
+    With ``curve`` an outline of the energy is kept for drawing.
     """
 
     td: float | tuple[float, float] | None
@@ -96,15 +96,14 @@ class Stamp(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StudyRow:
-    """Answer for one run; times in the unit of its history, None for what is not known.
+    """Answer for one run; times in the unit of its history, None for unknown values.
 
-    ``status``: "ok"; "none", nothing can be recommended; "unreadable"; "out-of-range", the record does not reach td or
-    is too short to choose; "failed", its process died; "internal-error", the program failed on it.  ``message`` says
-    why it is not "ok"; ``warnings`` are codes.
-    ``quality`` to ``cure`` are what `suggest` says of its pair.  ``td`` is that of the run; ``acceptable`` are its
-    windows of acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr,
-    ``profile`` the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of
-    the energy, shape (2, k), where one was asked for.
+    ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
+    or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
+    a status other than "ok"; ``warnings`` are codes.  ``quality`` to ``cure`` are those of the suggestion for its pair.
+    ``td`` is that of the run.  ``acceptable`` are the windows of acceptable tr, shape (n, 2), ``alike`` those in which
+    the error is at most 0.05 above that of its tr, ``profile`` the errors, shape (2, m).  ``files`` were read, up to
+    ``record_end``; ``curve`` is an outline of the energy, shape (2, k), if it was requested.
     """
 
     source: str
@@ -132,16 +131,16 @@ class StudyRow:
 
     @property
     def judged(self) -> bool:
-        """Whether the run could be read and judged."""
+        """True if the run could be read and judged."""
         return self.status in (OK, NONE)
 
 
 class Common(NamedTuple):
     """One tr for all judged runs and the window around it that they share [time]; None with the reason.
 
-    ``keeps_tolerance``: whether it lies within the timing tolerance of every run, so that the error of none exceeds
-    that at its own tr by more than 0.05.  ``errors`` are those of the runs at it, in their order: residuals, on the
-    energy alone level errors [-]; None of a run not judged.
+    ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
+    run's own tr by more than 0.05.  ``errors`` are the errors of the runs at this tr, in their order: residuals, or
+    level errors on the energy alone [-]; None for a run that was not judged.
     """
 
     tr: float | None
@@ -152,7 +151,7 @@ class Common(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Smallest, middle and largest tr of the runs that have one [time]."""
+    """Smallest, median and largest tr of the runs that have one [time]."""
 
     min: float
     median: float
@@ -161,9 +160,9 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """Answer of ``study``; ``agree`` whether the intervals of tr intersect, None without a tr.
+    """Answer of ``study``; ``agree``: the intervals of tr intersect, None without any tr.
 
-    ``td`` is None where each run has its own, chosen in ``td_window``, or in its longest flight where that is None too.
+    ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
     """
 
     td: float | None
@@ -176,12 +175,12 @@ class Study:
 
     @property
     def judged(self) -> int:
-        """How many runs could be read and judged."""
+        """Number of runs that could be read and judged."""
         return sum(row.judged for row in self.runs)
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: that of the worst run, by its own pair and by its error at this tr; None without."""
+        """Grade of the common tr: that of the worst run, by its pair and by its error at this tr; None without a tr."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
@@ -192,23 +191,24 @@ class Study:
 
     @property
     def objection(self) -> bool:
-        """Whether a run has no tr, or all have none in common."""
+        """True if a run has no tr, or there is no common tr."""
         return self.common.tr is None or any(row.status != OK for row in self.runs)
 
 
 def ask(question: Question, source: str) -> StudyRow:
-    """Read and judge one run; whatever is wrong with it is said in the row.
+    """Read and judge one run; errors of the run are reported in its row.
 
     Raises
     ------
     D2RPickError
-        If another version of this program asks.
+        If the question comes from another version of this program.
     """
     if question.tool_version != __version__:
         raise D2RPickError(
             f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same version everywhere"
         )
-    files, end = stamps(source), None
+    files = stamps(source)
+    end = None
     try:
         reference = read([source], question.selection, question.input_format)
         end = float(reference.history.time[-1])
@@ -217,38 +217,40 @@ def ask(question: Question, source: str) -> StudyRow:
         )
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
-        text = (
-            f"{source}: {error.strerror}"
-            if isinstance(error, OSError) and error.strerror
-            else str(error)
-        )
+        if isinstance(error, OSError) and error.strerror:
+            text = f"{source}: {error.strerror}"
+        else:
+            text = str(error)
         return StudyRow(source, status, text, files=files, record_end=end)
-    time, energy = reference.history.time, reference.history.energy
+    time = reference.history.time
+    energy = reference.history.energy
     curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
     return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
 
 
 def row_of(source: str, answer: Suggestion) -> StudyRow:
-    """Keep of the answer for one run what a study needs."""
-    best, situation = answer.chosen, answer.situation
+    """Return the row of a study from the answer for one run."""
+    best = answer.chosen
+    situation = answer.situation
     acceptable = clear_of_td(
         situation,
         acceptable_windows(situation, answer.candidates, best.tr if best else None),
     )
-    said = {caution.code: caution.message for caution in answer.cautions}
+    messages = {caution.code: caution.message for caution in answer.cautions}
+    alike = acceptable
+    if best:
+        alike = alike_windows(situation, answer.candidates, best, acceptable)
     row = StudyRow(
         source=source,
         status=NONE,
-        message=said.get("no-candidate"),
+        message=messages.get("no-candidate"),
         energy_td=situation.energy_td,
         basis=situation.basis,
-        warnings=tuple(code for code in said if code not in _NOT_REPEATED),
+        warnings=tuple(code for code in messages if code not in _NOT_REPEATED),
         time_unit=situation.history.time_unit,
         td=situation.td,
         acceptable=acceptable,
-        alike=alike_windows(situation, answer.candidates, best, acceptable)
-        if best
-        else acceptable,
+        alike=alike,
         profile=error_profile(situation, answer.candidates, acceptable),
     )
     if best is None:
@@ -265,7 +267,7 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
 
 
 def _decided(decision: Decision | None) -> dict[str, Any]:
-    """Give what is said of the pair of a run."""
+    """Return the verdict on the pair of a run as fields of its row."""
     if decision is None:
         return {}
     return {
@@ -277,46 +279,54 @@ def _decided(decision: Decision | None) -> dict[str, Any]:
 
 
 def failed(source: str, error: BaseException) -> StudyRow:
-    """StudyRow of a run whose process did not come back with one."""
+    """Return the row of a run whose process returned none."""
     status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
     return StudyRow(source, status, f"{source}: {format_in_one_line(error)}")
 
 
 def stamps(source: str) -> tuple[Stamp, ...]:
-    """Size and time of the files of a run as they are now, under their absolute names; none where there is no run."""
+    """Return the present size and modification time of the files of a run, by absolute name; empty without files."""
     try:
-        found = [
+        states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
         ]
-    except (D2RPickError, OSError):  # told by whoever reads it
+    except (D2RPickError, OSError):  # reported by whoever reads the run
         return ()
-    return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
+    return tuple(
+        Stamp(path, state.st_size, state.st_mtime_ns) for path, state in states
+    )
 
 
 def summarise(
     td: float | tuple[float, float] | None, rows: Sequence[StudyRow]
 ) -> Study:
-    """Hold the rows of a study against each other; ``td`` as it was asked for."""
+    """Compare the rows of a study; ``td`` is the requested td or window for it."""
     times, low, high = _known(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None
     common = common_tr(rows)
-    one, window = (None, td) if isinstance(td, tuple) else (td, None)
+    td_of_all, td_window = (None, td) if isinstance(td, tuple) else (td, None)
     return Study(
-        one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common))
+        td_of_all,
+        td_window,
+        tuple(rows),
+        spread,
+        agree,
+        common,
+        tuple(_cautions(rows, common)),
     )
 
 
 def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Give every tr, and from when to when all of them may be, the end before the start where they do not agree."""
-    found = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
-    low = max((one for _, one, _ in found if one is not None), default=np.inf)
-    high = min((one for _, _, one in found if one is not None), default=-np.inf)
-    return [tr for tr, _, _ in found], low, high
+    """Return the tr of all runs and the bounds of the interval within the accuracy of each (low > high: none)."""
+    chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
+    low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
+    high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
+    return [tr for tr, _, _ in chosen], low, high
 
 
 def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
-    """Give the runs that were cut: their files end within a state, or their record before that of most runs."""
+    """Return the runs that were cut off: their files end within a state, or their record before that of most runs."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
     return [
@@ -327,25 +337,27 @@ def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 
 
 def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
-    """What to be aware of: runs left out, where the others differ in kind, and what was said of single ones."""
+    """Yield warnings about runs left out, runs that differ in kind, and warnings of single runs."""
     judged = [row for row in rows if row.judged]
-    left = [row.source for row in rows if not row.judged]
-    if left and judged:
-        found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
+    left_out = [row.source for row in rows if not row.judged]
+    if left_out and judged:
+        text = f"{len(left_out)} of {runs_of(len(rows))} could not be judged"
         yield Caution(
-            "runs-left-out", f"{found} and are left out: {list_names(left, most=NAMED)}"
+            "runs-left-out",
+            f"{text} and are left out: {list_names(left_out, most=NAMED)}",
         )
-    if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
+    cut = [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]
+    if cut:
         yield Caution(
             "cut-runs",
             f"{len(cut)} of {runs_of(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
-        found = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
+        text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
         yield Caution(
-            "timing-tolerance", f"{found}: the error of a run grows by more than 0.05"
+            "timing-tolerance", f"{text}: the error of a run grows by more than 0.05"
         )
-    for code, what, kinds in (
+    for code, sentence, kinds in (
         (
             "mixed-units",
             "the times of the runs have different units, td has only one",
@@ -359,24 +371,22 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:
-            yield Caution(
-                code,
-                f"{what}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}",
-            )
+            counts = [f"{kind} in {runs_of(n)}" for kind, n in counted.most_common()]
+            yield Caution(code, f"{sentence}: {', '.join(counts)}")
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
-        named = [row.source for row in judged if code in row.warnings]
+        sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
-            f"in {len(named)} of {runs_of(len(judged))}: {list_names(named, most=NAMED)}",
+            f"in {len(sources)} of {runs_of(len(judged))}: {list_names(sources, most=NAMED)}",
         )
 
 
 def common_tr(rows: Sequence[StudyRow]) -> Common:
-    """Choose one tr for all runs that were judged: their own where they agree, else the earliest that suits all.
+    """Choose one tr for all judged runs: their own if they agree, else the earliest that is alike for all.
 
-    That keeps the timing tolerance of every run.  Where none does, the earliest of those acceptable in all runs at
-    which the run that loses most by it loses hardly more than it must.  Unless the runs agree it has few digits, for at
-    most a thousandth of the rigid time.
+    "Alike" keeps the timing tolerance of every run.  If none does, choose the earliest tr acceptable in all runs at
+    which the largest loss of a run is hardly larger than necessary.  Unless the runs agree, the tr has few digits; that
+    costs at most 1/1000 of the rigid time.
     """
     judged = [row for row in rows if row.judged]
     if not judged:
@@ -398,31 +408,27 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
 
 
 def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
-    """Give the tr of runs that agree, the middle one where they differ at all; None where they do not agree."""
-    known, low, high = _known(judged)
-    if len(known) < len(judged) or low > high:
+    """Return the median tr of runs that agree, limited to their accuracy; None if they do not agree."""
+    tr_of_runs, low, high = _known(judged)
+    if len(tr_of_runs) < len(judged) or low > high:
         return None
-    tr = float(np.clip(median(known), low, high))
+    tr = float(np.clip(median(tr_of_runs), low, high))
     return tr if _holds(keeping, tr) else None
 
 
 def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, float]:
-    """Give the first stretch of the shared windows in which no run loses more than 0.02 above what one must lose."""
+    """Return the first stretch of the shared windows in which no run loses more than 0.02 above the smallest loss."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
     )
-    times = times[
-        (
-            np.searchsorted(shared[:, 0], times, "right")
-            - np.searchsorted(shared[:, 1], times)
-        )
-        > 0
-    ]
+    begun = np.searchsorted(shared[:, 0], times, "right")
+    ended = np.searchsorted(shared[:, 1], times)
+    times = times[begun > ended]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
-        own = 0.0 if row.tr is None else error_at(profile, row.tr)
-        worst = np.maximum(worst, np.interp(times, *profile) - own)
+        own_error = 0.0 if row.tr is None else error_at(profile, row.tr)
+        worst = np.maximum(worst, np.interp(times, *profile) - own_error)
     first = int(np.argmax(worst <= worst.min() + EQUALLY_GOOD))
     holder = shared[np.searchsorted(shared[:, 0], times[first], "right") - 1]
     following = times[min(first + 1, times.size - 1)]
@@ -430,7 +436,7 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
 
 
 def fewest_digits(low: float, high: float) -> float:
-    """Give a number of the fewest digits between ``low`` and ``high``: 0, or the nearest to their middle.
+    """Return a number with the fewest digits between ``low`` and ``high``: 0, or the one nearest to their middle.
 
     Examples
     --------
@@ -445,34 +451,35 @@ def fewest_digits(low: float, high: float) -> float:
 
 
 def runs_of(number: int) -> str:
-    """Write a number of runs."""
+    """Return a number of runs in words: "1 run", "2 runs"."""
     return "1 run" if number == 1 else f"{number} runs"
 
 
 def _why_none(judged: Sequence[StudyRow]) -> str:
-    """Say which tr suits most runs, and which runs it does not suit."""
+    """State which tr is acceptable in most runs, and in which runs it is not."""
     stretches, counts = coverage([row.acceptable for row in judged])
     if not counts.size:
-        which = (
-            f"any of {runs_of(len(judged))}"
-            if len(judged) > 1
-            else "the run that was judged"
-        )
+        if len(judged) > 1:
+            which = f"any of {runs_of(len(judged))}"
+        else:
+            which = "the run that was judged"
         return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
-    left = [row.source for row in judged if not _holds(row.acceptable, tr)]
+    unsuited = [row.source for row in judged if not _holds(row.acceptable, tr)]
+    suited = len(judged) - len(unsuited)
     return (
-        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "
-        f"not in {list_names(left, most=NAMED)}"
+        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {suited}, "
+        f"not in {list_names(unsuited, most=NAMED)}"
     )
 
 
 def _holds(windows: Samples, time: float) -> bool:
+    """Return True if a time lies in one of the windows."""
     return bool(np.any((windows[:, 0] <= time) & (time <= windows[:, 1])))
 
 
 def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Give the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
+    """Return the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.
     """
@@ -489,4 +496,10 @@ def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
         for row, tr in chosen
         if not low - reach <= tr <= high + reach
     ]
-    return (*without, *(row for row, _ in sorted(far, key=lambda one: -one[1])))
+    return (
+        *without,
+        *(
+            row
+            for row, _ in sorted(far, key=lambda run_and_distance: -run_and_distance[1])
+        ),
+    )

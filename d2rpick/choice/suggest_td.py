@@ -1,4 +1,4 @@
-"""Choosing both times: td in a window or in the longest flight, and tr for it."""
+"""Choose td, in a window or in the longest flight, together with the tr for it."""
 
 from __future__ import annotations
 
@@ -40,23 +40,26 @@ if TYPE_CHECKING:
 
 
 def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
-    """Upper bounds for the rigid time of the tr that is recommended at each of many td, of their shape (n,) [time].
+    """Return upper bounds for the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
-    Where the level is all that decides, that tr does not lie before the energy first comes near the level at td: by
-    the tolerance, or by what counts as like levels where it passes the level itself and turns twice before td.  Where
-    a model of the vibration decides at some td, or the level is round-off, the start of the flight is the bound.  Zero
-    where that start is not known.
+    If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
+    tolerance, or the margin of like levels if the energy passes the level itself and turns twice before td.  If a model
+    of the vibration decides at some td, or the level is round-off, the bound is the start of the flight.  The result is
+    0 if that start is unknown.
     """
-    start, history = situation.earliest_tr, situation.history
+    start = situation.earliest_tr
+    history = situation.history
     if start is None:
         return np.zeros(times.shape)
     start = max(start, float(history.time[0]))
     if situation.evidence.has_model or start >= history.time[-1]:
         return np.maximum(times - start, 0.0)
     time, energy = history.between(np.nextafter(start, np.inf), np.inf)
-    time, energy = np.append(start, time), np.append(history.energy_at(start), energy)
+    time = np.append(start, time)
+    energy = np.append(history.energy_at(start), energy)
     extremes = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
-    level, tolerance = history.energies_at(times), situation.settings.tolerance
+    level = history.energies_at(times)
+    tolerance = situation.settings.tolerance
     passed = time[
         np.minimum(
             _reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1
@@ -67,9 +70,8 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    entered = time[
-        np.maximum(_reached(*extremes, level, near) - 1, 0)
-    ]  # or since, but after the state before
+    # or later, but after the state before
+    entered = time[np.maximum(_reached(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
     )
@@ -78,42 +80,41 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _reached(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Index of the first state by which the energy has been in the band about each level; their number where none is.
+    """Return the index of the first state by which the energy has been near each level, else the number of states.
 
-    ``lowest`` and ``highest`` are its extremes up to each state.  The band holds the level errors up to ``near``; of a
-    negative one both sides of the level have been met.
+    ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
+    that counts as near; if it is negative, the energy must have been on both sides of the level.
     """
-    low, high = (
-        np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2
-        for sign in (-1, 1)
-    )
+    positive = np.maximum(level, 0.0)
+    low = positive * np.maximum(1 - near, 0.0) ** 2
+    high = positive * np.maximum(1 + near, 0.0) ** 2
     fallen = lowest.size - np.searchsorted(lowest[::-1], high, side="right")
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
 
 
-# Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
-# and the last, since the later td the more is saved.
+# Number of peaks that are tried of each kind: the highest, since a high peak of several modes has little kinetic
+# energy, and the last, since a late td saves most.
 _MOST_PEAKS: Final = 12
-# Of many modes, the least residual is sought among windows of at least this share of the longest one, at so many td.
+# For many modes the smallest residual is searched among windows of at least this share of the longest one [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
-# td in an even grid: on paper and on a screen a curve of so many points is smooth.
+# Number of td in an even grid: a curve of so many points looks smooth on paper and on a screen.
 STEPS: Final = 200
-# Decimals of an error that people read.
+# Decimals of an error that are shown to the user.
 _READ: Final = 3
-# Of the record: a shorter window saves less than a restart costs, as plan has it.
+# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
 _SHORTEST: Final = 0.05
-# Rigid time that is given up for quality is told from this share of the window on.
+# A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
-# An energy that stays on its level may hide the vibration of many modes, which moves the landing by more than what the
-# energy shows: in twenty computed falls by up to 1.9 times as much.
+# The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
+# many modes. In 20 computed falls the factor was up to 1.9.
 _HIDDEN: Final = 2.0
 
 
 class Chosen(NamedTuple):
-    """The ``situation`` of the td that was chosen in a window, and the ``longest`` acceptable pair in it.
+    """The ``situation`` of the td chosen in a window, and the ``longest`` acceptable pair in that window.
 
-    ``window`` is the one that was asked for, ``inside`` what of it keeps the margin [time].
+    ``window`` is the requested window, ``inside`` the part of it that keeps the margin [time].
     """
 
     situation: Situation
@@ -122,14 +123,12 @@ class Chosen(NamedTuple):
     longest: Pair | None
 
     def given_up(self, pair: Pair | None) -> Pair | None:
-        """Give the longest pair where it is rigid for much longer than the one that is recommended."""
-        much = _MUCH * (self.inside[1] - self.inside[0])
-        found = self.longest
-        return (
-            found
-            if found and pair and found.rigid_time - pair.rigid_time > much
-            else None
-        )
+        """Return the longest pair if it is rigid for much longer than the recommended ``pair``, else None."""
+        limit = _MUCH * (self.inside[1] - self.inside[0])
+        longest = self.longest
+        if longest and pair and longest.rigid_time - pair.rigid_time > limit:
+            return longest
+        return None
 
 
 def choose_td(
@@ -140,15 +139,15 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, for None in the longest flight up to the margin, for a tr not before ``since``.
+    """Choose td in ``window``, or in the longest flight if it is None, for a tr not before ``since``.
 
-    Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
-    longest rigid window wins, of those whose tr is known best.  Where deformations are known, a residual within
-    0.02 of the smallest is alike; on the energy alone, a level within the tolerance of the best one, which is twice
-    the mean energy.  td keeps the margin from the contact, unless the whole window lies in it.  Without an acceptable
-    peak the ends of the window are tried.  A td of ``times``, by default an even grid, whose pair beats that in both
-    error and rigid time takes its place.
-    Where nothing vibrates, any td is as good, and the last one saves the most.
+    Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
+    certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
+    smallest is of like quality.  On the energy alone, a level within the tolerance of the best one is, and the best one
+    is twice the mean energy.  The chosen td keeps the margin before the contact, unless the whole window lies in the
+    margin.  Without an acceptable peak the ends of the window are tried.  A td of ``times`` (default: an even grid)
+    replaces the chosen one if its pair is better in both error and rigid time.  If nothing vibrates, all td are equally
+    good and the last one is chosen, since it saves most.
 
     Raises
     ------
@@ -167,11 +166,8 @@ def choose_td(
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
-        times = (
-            offered_times(situation, inside, STEPS)[0].tolist()
-            if times is None
-            else times
-        )
+        if times is None:
+            times = offered_times(situation, inside, STEPS)[0].tolist()
         earliest = float(history.time[0]) if since is None else since
         td = _unbeaten(
             td,
@@ -192,22 +188,25 @@ def choose_td(
 def offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
-    """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
+    """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
+    grid = np.linspace(*window, steps + 1)[1:]  # no pair is rigid before the first time
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
-        place = np.searchsorted(grid, peaks)
-        order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
-        highest = order[np.diff(place[order], prepend=-1) > 0]
-        peaks, grid = peaks[highest], np.delete(grid, place[highest])
+        intervals = np.searchsorted(grid, peaks)
+        order = np.lexsort((-situation.vibration.whole.energies(peaks), intervals))
+        highest = order[np.diff(intervals[order], prepend=-1) > 0]
+        peaks = peaks[highest]
+        grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
-    return times[times < situation.history.time[-1]], set(
-        peaks.tolist()
-    )  # a run that ends at td is no use
+    # a run that ends at td is useless
+    return times[times < situation.history.time[-1]], set(peaks.tolist())
 
 
 def error_of(situation: Situation, best: Pair | None) -> float | None:
-    """What pairs at different td are compared by [-]; None without one, or for a level above all vibration energy."""
+    """Return the error by which pairs at different td are compared [-]; None without a pair or with a level too high.
+
+    A level is too high if it exceeds the largest possible vibration energy.
+    """
     if best is None:
         return None
     if situation.at_rest:
@@ -215,83 +214,108 @@ def error_of(situation: Situation, best: Pair | None) -> float | None:
     if best.residual is not None:
         return best.residual
     mean = mean_in_flight(situation)
-    error = (
-        np.inf
-        if mean is None
-        else float(shortfall(np.array(situation.energy_td), mean))
-    )
+    if mean is None:
+        error = np.inf
+    else:
+        error = float(shortfall(np.array(situation.energy_td), mean))
     return error if error < np.inf else None
 
 
 def as_printed(error: float | None) -> float:
-    """Give an error to the digits that people read; infinite where it is unknown."""
+    """Round an error to the digits that are shown to the user; infinite if it is unknown."""
     return np.inf if error is None else round(error, _READ)
 
 
 def _unbeaten(
     td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
 ) -> float:
-    """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
+    """Return ``td``, or a td of ``times`` whose pair is no worse in error and rigid time and better in one.
 
-    Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
-    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.  None is rigid before
+    Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
+    flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
+    be compared with the pair at td, no oscillator is searched at a td that loses without one.  No pair is rigid before
     ``earliest`` [time].
     """
-    own = next(iter(_acceptable([look(td)])), None)
-    if own is None:
+    choice = next(iter(_acceptable([look(td)])), None)
+    if choice is None:
         return td
-    seen = look if own[0].flight.source == "energy" else own[0].at
-    first = at_level if seen is look and own[0].basis == "energy" else seen
-    error = as_printed(error_of(*own))
-    late = (time for time in times if time - earliest >= own[1].rigid_time)
-    better = _beating(
-        own, [seen(time) for time in late if _may_beat(first(time), own, error)]
+    look_at = look if choice[0].flight.source == "energy" else choice[0].at
+    look_first = (
+        at_level if look_at is look and choice[0].basis == "energy" else look_at
     )
-    for there, _ in sorted(
-        better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))
+    error = as_printed(error_of(*choice))
+    late_enough = (time for time in times if time - earliest >= choice[1].rigid_time)
+    better = _beating(
+        choice,
+        [
+            look_at(time)
+            for time in late_enough
+            if _may_beat(look_first(time), choice, error)
+        ],
+    )
+    for situation, _ in sorted(
+        better,
+        key=lambda candidate: (
+            -candidate[1].rigid_time,
+            as_printed(error_of(*candidate)),
+        ),
     ):
-        longer = look(there.td)
-        if _beating(own, [longer]) and _certainty_of_tr(longer) >= _certainty_of_tr(
-            own[0]
-        ):
-            return there.td
+        longer = look(situation.td)
+        if not _beating(choice, [longer]):
+            continue
+        if _certainty_of_tr(longer) >= _certainty_of_tr(choice[0]):
+            return situation.td
     return td
 
 
-def _may_beat(there: Situation, own: Choice, error: float) -> bool:
-    """Whether a pair there may be no worse than one with that ``error``, of deformations or levels too, nor shorter."""
-    if (there.basis == "energy") != (own[0].basis == "energy"):
+def _may_beat(situation: Situation, choice: Choice, error: float) -> bool:
+    """Return True if a pair at the td of a situation may be as good as a pair with ``error``, and as long.
+
+    Pairs by deformations are not compared with pairs by levels.
+    """
+    if (situation.basis == "energy") != (choice[0].basis == "energy"):
         return False
-    share, mean = there.kinetic_share, mean_in_flight(there)
-    least = 0.0 if mean is None else float(shortfall(np.array(there.energy_td), mean))
-    return bool(
-        as_printed(least if share is None else sqrt(share)) <= error
-        and longest_rigid_times(there, np.array([there.td]))[0] >= own[1].rigid_time
+    share = situation.kinetic_share
+    mean = mean_in_flight(situation)
+    smallest_shortfall = (
+        0.0 if mean is None else float(shortfall(np.array(situation.energy_td), mean))
     )
+    smallest_error = smallest_shortfall if share is None else sqrt(share)
+    if as_printed(smallest_error) > error:
+        return False
+    (longest,) = longest_rigid_times(situation, np.array([situation.td]))
+    return bool(longest >= choice[1].rigid_time)
 
 
-def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
-    """Give the choices there that are better than one in error or rigid time and worse in neither, as they are read."""
-    error, rigid = as_printed(error_of(*own)), own[1].rigid_time
-    found = (
-        (there, best, as_printed(error_of(there, best)))
-        for there, best in _acceptable(situations)
+def _beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
+    """Return the choices that are better than a given one in error or rigid time and worse in neither.
+
+    Errors are compared as printed.
+    """
+    error = as_printed(error_of(*choice))
+    rigid = choice[1].rigid_time
+    rivals = (
+        (situation, best, as_printed(error_of(situation, best)))
+        for situation, best in _acceptable(situations)
     )
     return [
-        (there, best)
-        for there, best, its in found
-        if its <= error
+        (situation, best)
+        for situation, best, rival_error in rivals
+        if rival_error <= error
         and best.rigid_time >= rigid
-        and (its, best.rigid_time) != (error, rigid)
+        and (rival_error, best.rigid_time) != (error, rigid)
     ]
 
 
 def within_flight(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Give the situation that is known best in ``window``, and the part of it that keeps the margin [time].
+    """Return the situation with the best-known flight in ``window``, and the part of it that keeps the margin [time].
 
-    RangeError when the window lies outside the record.
+    Raises
+    ------
+    RangeError
+        If the window lies outside the record.
     """
     history.check(*window, argument="td_window")
     situation = _flying(look, window)
@@ -299,7 +323,10 @@ def within_flight(
 
 
 def _latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Last td in the window that keeps the margin, also as it is read; where none does, the last one in the flight."""
+    """Return the last td in the window that keeps the margin also after rounding to the printed digits.
+
+    If no td of the window keeps it, return the last td in the flight.
+    """
     low, high = window
     margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
@@ -311,39 +338,40 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
-    """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
-    history, flight = situation.history, situation.flight
-    last = min(
-        window[1], round_down_as_read(float(history.time[-2]))
-    )  # a run that ends at td is no use
+    """Return the last td in a window in which nothing vibrates.
+
+    It lies before the last state, and before the contact by the time that the contact may move.
+    """
+    history = situation.history
+    flight = situation.flight
+    # a run that ends at td is useless
+    last = min(window[1], round_down_as_read(float(history.time[-2])))
     spread = situation.expected_margin.spread
-    return (
-        last
-        if flight.end is None or not spread
-        else min(last, round_down_as_read(flight.end - _HIDDEN * spread))
-    )
+    if flight.end is None or not spread:
+        return last
+    return min(last, round_down_as_read(flight.end - _HIDDEN * spread))
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
-    """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
+    """Return the first situation with the best-known flight, at the start, middle or end of the window."""
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
         if _certainty(situations[-1]) == (False, 0):
-            break  # none can be known better
+            break  # no situation can be more certain
     return min(situations, key=_certainty)
 
 
 def _certainty(situation: Situation) -> tuple[bool, int]:
-    """How well it is known that td lies in a flight, the smallest first."""
+    """Return a sort key for how certainly td lies in a flight: the smallest is the most certain."""
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
 def _by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
+    """Return the td with the longest rigid window of like residual, and the one of all acceptable pairs."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -360,18 +388,22 @@ def _by_residual(
 
 
 def _surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Give the pairs whose tr is known best, of those that are long enough to be planned, if there are any."""
+    """Return the pairs with the most certain tr, of those that are long enough to be planned, if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
     shortest = _SHORTEST * float(record[-1] - record[0])
     long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
-    known = [_certainty_of_tr(situation) for situation, _ in long]
-    return [pair for pair, its in zip(long, known, strict=True) if its == max(known)]
+    certainties = [_certainty_of_tr(situation) for situation, _ in long]
+    return [
+        pair
+        for pair, pair_certainty in zip(long, certainties, strict=True)
+        if pair_certainty == max(certainties)
+    ]
 
 
 def _certainty_of_tr(situation: Situation) -> int:
-    """How well the tr is known that is recommended at a td, as `certainty` says; 0 without one."""
+    """Return how certain the tr recommended at a td is, from 0 to 2; 0 without one."""
     best = next(candidates_at([situation], in_flight=True)).chosen
     return 0 if best is None else certainty(best)
 
@@ -379,37 +411,41 @@ def _certainty_of_tr(situation: Situation) -> int:
 def _by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there.
+    """Return the td with the smallest residuals of long windows, for many modes, and the longest acceptable one.
 
-    Where no long window is good, a shorter one that is good takes its place.
+    The energy at td does not matter.  If no long window is good, a shorter good one is used.
     """
-    compared, start = situation.vibration.compared, situation.earliest_tr
+    compared = situation.vibration.compared
+    start = situation.earliest_tr
     if start is None or compared is None:
         return _by_residual(situation, window, look)
-    first, last = max(start, compared.first), min(window[1], compared.last)
-    every: list[list[Choice]] = []
+    first = max(start, compared.first)
+    last = min(window[1], compared.last)
+    choices: list[list[Choice]] = []
     for share in _LEAST_RIGID:
         times = _offered_by_modes(situation, (window[0], first, last), share)
         pairs = _acceptable(look(td) for td in times)
-        least = share * (last - first)
-        every.append([pair for pair in pairs if pair[1].rigid_time >= least] or pairs)
-        if not times or any(best.error <= MOST_GOOD for _, best in every[-1]):
+        least_time = share * (last - first)
+        choices.append(
+            [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
+        )
+        if not times or any(best.error <= MOST_GOOD for _, best in choices[-1]):
             break
-    if not every[0]:
+    if not choices[0]:
         return _by_residual(situation, window, look)
-    is_good = any(best.error <= MOST_GOOD for _, best in every[-1])
-    long = every[-1] if is_good else every[0]
+    is_good = any(best.error <= MOST_GOOD for _, best in choices[-1])
+    long = choices[-1] if is_good else choices[0]
     limit = min(best.error for _, best in long) + like_quality(situation)
     alike = _longest(pair for pair in long if pair[1].error <= limit)
-    return _td(alike), _td(_longest(every[0]))
+    return _td(alike), _td(_longest(choices[0]))
 
 
 def _offered_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Give the td of the least residuals, rigid for a ``share`` of the longest time; none of few times.
+    """Return the td with the smallest residuals, rigid for ``share`` of the longest time; empty for few td.
 
-    ``bounds``: the first td, the first tr and the last td [time].
+    ``bounds`` are the first td, the first tr and the last td [time].
     """
     (earliest, first, last), modes = bounds, situation.vibration.modal
     if modes is None:
@@ -425,35 +461,32 @@ def _offered_by_modes(
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
-    # the least of many is too good to be true: half of what its band adds counts too
+    # The smallest of many estimates is too optimistic: add half of the half width.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
-    inner = (
-        np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:]))
-        + 1
-    )
+    middle = squares[1:-1]
+    is_lowest = (middle <= squares[:-2]) & (middle < squares[2:])
+    inner = np.flatnonzero(is_lowest) + 1
     best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
-    offered = (
-        *vertices(times, squares, best)[0].tolist(),
-        *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
-        float(times[np.argmin(squares)]),
-    )
+    offered: list[float] = vertices(times, squares, best)[0].tolist()
+    offered += vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist()
+    offered.append(float(times[np.argmin(squares)]))
     return [*dict.fromkeys(offered)]
 
 
 def _least_error(profile: Profile, first: float, last: float) -> tuple[float, float]:
-    """Least lock-in error of a tr between two times [-], and that tr [time]; infinite without one."""
+    """Return the smallest lock-in error of a tr between two times [-], and that tr [time]; infinite for none."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
         return np.inf, first
-    least = int(np.argmin(errors))
-    return float(errors[least]), float(profile.time[rows][least])
+    best = int(np.argmin(errors))
+    return float(errors[best]), float(profile.time[rows][best])
 
 
 def _by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Give the same where only the level is known: the closer to all vibration energy, 2 <E>, the better."""
+    """Return the td by the level alone: the closer to the largest vibration energy, 2 <E>, the better."""
     mean = mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
@@ -461,9 +494,8 @@ def _by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    best = next(
-        (td for td in below if _acceptable([situation.at(td)])), None
-    )  # no oscillator is sought again
+    # without a search for an oscillator at each td
+    best = next((td for td in below if _acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
     limit = falls[best] + situation.settings.tolerance
@@ -475,11 +507,12 @@ def _by_level(
 
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
-    """Give acceptable choices, the td that may be longest first, as long as another one may be longer."""
-    tds, longest = np.fromiter(times, np.float64), 0.0
-    most = longest_rigid_times(situation, tds)
-    order = np.lexsort((-tds, -most))
-    for td, possible in zip(tds[order].tolist(), most[order].tolist(), strict=True):
+    """Yield acceptable choices by descending bound of the rigid time, while a longer one is possible."""
+    tds = np.fromiter(times, np.float64)
+    longest = 0.0
+    bounds = longest_rigid_times(situation, tds)
+    order = np.lexsort((-tds, -bounds))
+    for td, possible in zip(tds[order].tolist(), bounds[order].tolist(), strict=True):
         if possible <= 0 or possible < longest:
             return
         for pair in _acceptable([situation.at(td)]):
@@ -488,17 +521,19 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """What is recommended in each situation, where that saves something."""
+    """Return the situations with their recommended pairs, without pairs that save nothing."""
     return [
-        (one.situation, one.saving)
-        for one in candidates_at([*situations], in_flight=True)
-        if one.saving
+        (candidates.situation, candidates.saving)
+        for candidates in candidates_at([*situations], in_flight=True)
+        if candidates.saving
     ]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:
+    """Return the choice with the longest rigid time, of equal ones the last; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 
 def _td(pair: Choice | None) -> float | None:
+    """Return the td of a choice; None without a choice."""
     return pair[0].td if pair else None

@@ -1,4 +1,4 @@
-"""Which parts may be switched: what deck and history say about each, and a verdict with its reasons."""
+"""Judge which parts may be switched, by the data of deck and history, with reasons."""
 
 from __future__ import annotations
 
@@ -29,17 +29,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# A part whose energy in flight scatters by less than this share of its mean has stopped deforming: what it holds is
-# plastic work, and its vibration is a small part of it.
+# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-]: most of the
+# energy is plastic work then, and the vibration a small part of it.
 STOPPED: Final = 0.1
-# After a landing has begun, its first share of so much of the flight before shows which part takes it.
+# The start of a landing, as a share of the duration of the flight before it [-].
 _LANDING: Final = 0.05
 
 
 class InFlight(NamedTuple):
-    """One part in one flight; energies are None where the part has none or they are not written.
+    """One part in one flight; energies are None if the part has none or they are not written.
 
-    ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` its end less its start.
+    ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
+    minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
     """
 
     flies: bool | None = None
@@ -50,14 +51,14 @@ class InFlight(NamedTuple):
 
     @property
     def deforms(self) -> bool | None:
-        """Whether the part still deforms; None where its energy does not tell."""
+        """True if the part still deforms; None if its energy is unknown."""
         return None if self.scatter is None else self.scatter >= STOPPED
 
 
 class PartFacts(NamedTuple):
-    """What the history says about one part; ``has_energy`` None: its energy is not written.
+    """Data of one part from the history; ``has_energy`` is None if its energy is not written.
 
-    ``held`` says what holds it in the longest flight, or at the end of a record without any.
+    ``held`` names the support that acts on it in the longest flight, or at the end of a record without flights.
     """
 
     part: Part
@@ -68,10 +69,10 @@ class PartFacts(NamedTuple):
 
 
 class RunFacts(NamedTuple):
-    """What a history says about all of its parts.
+    """Data of all parts from the history.
 
-    ``flights`` are (start, end) [time], ``longest`` the place of the longest one, None without any.  ``reason`` says
-    why there are no parts or no flights.
+    ``flights`` are (start, end) [time], ``longest`` is the index of the longest one, None without flights.  ``reason``
+    states why there are no parts or no flights.
     """
 
     parts: Mapping[int, PartFacts]
@@ -81,19 +82,19 @@ class RunFacts(NamedTuple):
 
 
 def facts_of(run: Run, settings: Settings) -> RunFacts:
-    """Collect what the files of a run say about its parts.
+    """Collect the data of parts from the files of a run.
 
     Parameters
     ----------
     run : Run
-        Without switching.
+        The reference run.
     settings : Settings
-        How flights are looked for where momenta do not show them.
+        Options for the search for flights if momenta do not show them.
 
     Returns
     -------
     RunFacts
-        Without parts, and with the reason, where the files have none.
+        Without parts, and with the reason, if the files have no data of parts.
     """
     try:
         energies = run.part_energies(run.parts)
@@ -104,7 +105,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     masses = _masses(run)
     try:
         history, members = _history(run)
-    except FormatError as error:  # nothing ever deforms
+    except FormatError as error:  # no part ever deforms
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -116,44 +117,43 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
     )
     moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
-    known = {
-        part.id: PartFacts(
+    facts = {}
+    for part, energy in zip(run.parts, energies.T, strict=True):
+        in_flights = [
+            _in_flight(history.time, energy, span, _flies(part, flight, members))
+            for span, flight in zip(spans, flights, strict=True)
+        ]
+        facts[part.id] = PartFacts(
             part,
             masses.get(part.id),
-            bool(energies[:, at].any()),
-            tuple(
-                _in_flight(
-                    history.time, energies[:, at], span, _flies(part, flight, members)
-                )
-                for span, flight in zip(spans, flights, strict=True)
-            ),
+            bool(energy.any()),
+            tuple(in_flights),
             run.surroundings.held([part], moment),
         )
-        for at, part in enumerate(run.parts)
-    }
     return RunFacts(
-        known, spans, longest, None if flights else "no flight is seen in the history"
+        facts, spans, longest, None if flights else "no flight is seen in the history"
     )
 
 
 def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
-    """Energy of the parts that fly together, or of all that deform where momenta do not tell."""
+    """Return the energy of the parts that fly together, or of all that deform without momenta, and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
 
 
 def _flies(part: Part, flight: Flight, members: Sequence[Part] | None) -> bool | None:
-    """Whether a part flies with the rest; None where no momentum of parts shows it."""
+    """Return True if a part flies with the rest; None if no momenta of parts show it."""
     if members is None:
         return None
     together = flight.parts if flight.source == "momentum" and flight.parts else members
-    return part.id in {one.id for one in together}
+    return part.id in {member.id for member in together}
 
 
 def _in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
+    """Return the mean, change and scatter of a part's energy in a flight, and its energy in the landing."""
     inside = energy[find_window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)
@@ -169,40 +169,39 @@ def _in_flight(
 
 
 def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float | None:
-    """What the part takes up at the beginning of the landing after a flight; None where the record ends in it."""
+    """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
     start, end = span
-    after = energy[find_window(time, end, end + _LANDING * (end - start))]
-    return (
-        float(after[-1] - after[0])
-        if end < float(time[-1]) and after.size > 1
-        else None
-    )
+    energies = energy[find_window(time, end, end + _LANDING * (end - start))]
+    if end < float(time[-1]) and energies.size > 1:
+        return float(energies[-1] - energies[0])
+    return None
 
 
 def _masses(run: Run) -> dict[int, float]:
-    """Masses by part, of those that are known."""
-    if (found := run.masses) is None:
+    """Return the known masses by part id [mass]."""
+    masses = run.masses
+    if masses is None:
         return {}
     return {
         part.id: mass
-        for part, mass in zip(run.parts, found.tolist(), strict=True)
+        for part, mass in zip(run.parts, masses.tolist(), strict=True)
         if np.isfinite(mass)
     }
 
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part drives the landing alone where it takes nearly all of its energy at first, and is so small a part of the cost
-# that to leave it deformable costs next to nothing: a bumper, a skid, not the shell of the body.
+# A part drives the landing alone if it takes up at least this share of the energy at first, and has at most this share
+# of the cost, so that it is cheap to keep it deformable [-]: a bumper or a skid, not the body shell.
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
 
 class PartRow(NamedTuple):
-    """One part with all that is known of it; None stands for what is not.
+    """One part with all its data; None for unknown values.
 
-    ``cost_share`` is that of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable time
-    step [time]; ``mass_source`` and ``step_source`` name where they are from.  ``flights`` has what the part does in
-    each flight, ``flight`` that in the longest.  ``merge_with`` is the part whose rigid body it joins.
+    ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
+    time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
+    each flight, ``flight`` those in the longest.  ``merge_with`` is the part whose rigid body it joins.
     """
 
     id: int
@@ -225,7 +224,7 @@ class PartRow(NamedTuple):
 
     @property
     def movable(self) -> bool:
-        """Whether the part may be switched."""
+        """True if the part may be switched."""
         return self.verdict in (SWITCH, MERGE)
 
 
@@ -234,16 +233,16 @@ def rows_of(
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
-    """Judge every part of a deck or history, ascending by number.
+    """Judge every part of a deck or history, ascending by id.
 
     Parameters
     ----------
     facts : RunFacts
-        What the history says.
+        Data from the history.
     model : CostModel or None
-        The deck with its cost; without it no verdict that depends on materials or shared nodes is given.
+        The deck with its costs; without it no verdict that depends on materials or shared nodes is given.
     printed : mapping of (float, str), optional
-        Smallest steps of those parts that controlled the step, by number, with the name of the source [time].
+        Smallest time steps of the parts that controlled the time step, by id, with the name of the source [time].
     """
     inventory = model.inventory if model else None
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
@@ -264,47 +263,54 @@ def _described(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect what is known of a part, of which the mass and step ``by_deck`` are used where nothing better is."""
-    fact, inventory = facts.parts.get(part), model.inventory if model else None
+    """Collect the data of a part; mass and time step ``by_deck`` are used if no better ones are known."""
+    fact = facts.parts.get(part)
+    inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
-        counts = None  # they may be in a file that was not read
-    step, source = (
-        printed.get(part, (None, None)) if by_deck[1] is None else (by_deck[1], "deck")
-    )
-    mass = fact.mass if fact and fact.mass is not None else by_deck[0]
-    title = data.title if data and data.title else fact.part.title if fact else ""
+        counts = None  # the elements may be in a file that was not read
+    if by_deck[1] is None:
+        step, source = printed.get(part, (None, None))
+    else:
+        step, source = by_deck[1], "deck"
+    mass = by_deck[0]
+    mass_source = None if mass is None else "deck"
+    if fact and fact.mass is not None:
+        mass = fact.mass
+        mass_source = "history"
+    title = fact.part.title if fact else ""
+    if data and data.title:
+        title = data.title
+    formulations = tuple[str, ...]()
+    if inventory and counts:
+        formulations = tuple(inventory.formulation(part, kind).name for kind in counts)
+    flight = None
+    if fact and facts.longest is not None and fact.flights:
+        flight = fact.flights[facts.longest]
+    shares_nodes = None
+    if inventory and data:
+        shares_nodes = tuple(sorted(inventory.neighbours.get(part, ())))
     return PartRow(
         id=part,
         title=title,
         elements=counts,
-        formulations=tuple(inventory.formulation(part, kind).name for kind in counts)
-        if inventory and counts
-        else (),
+        formulations=formulations,
         material=data.material.name if data and data.material else None,
         kind=_kind(data, counts),
         mass=mass,
-        mass_source=None
-        if mass is None
-        else "history"
-        if fact and fact.mass is not None
-        else "deck",
+        mass_source=mass_source,
         flights=fact.flights if fact else (),
-        flight=fact.flights[facts.longest]
-        if fact and facts.longest is not None and fact.flights
-        else None,
+        flight=flight,
         cost_share=model.share_of(part).value if model and counts is not None else None,
         smallest_step=step,
         step_source=source,
-        shares_nodes=tuple(sorted(inventory.neighbours.get(part, ())))
-        if inventory and data
-        else None,
+        shares_nodes=shares_nodes,
     )
 
 
 def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Kind of a part: that of its material, and of its elements where these are springs or particles."""
+    """Return the kind of a part: that of its material, or "spring" or "particles" by its elements."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:
@@ -317,31 +323,34 @@ def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None
 def _judged(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
+    """Return the row of a part with its verdict and reasons; ``alone`` is the part that drives the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
-    kept = tuple(_to_keep(row, fact, data, alone)) or tuple(_in_pieces(row, inventory))
-    if kept:
-        return row._replace(verdict=KEEP, reasons=kept)
-    open_ = tuple(_not_known(row, facts, inventory, data))
-    if open_:
-        return row._replace(verdict=UNKNOWN, reasons=open_)
+    reasons_to_keep = tuple(_to_keep(row, fact, data, alone)) or tuple(
+        _in_pieces(row, inventory)
+    )
+    if reasons_to_keep:
+        return row._replace(verdict=KEEP, reasons=reasons_to_keep)
+    unknowns = tuple(_not_known(row, facts, inventory, data))
+    if unknowns:
+        return row._replace(verdict=UNKNOWN, reasons=unknowns)
     return row._replace(
         verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory))
     )
 
 
 def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
-    """Parts to which welds and ties hold a part, which are off while it is rigid."""
-    others = inventory.joined.get(row.id, {}) if inventory else {}
-    if others:
-        kinds = ", ".join(sorted(frozenset[str]().union(*others.values())))
-        yield f"joined to {name_units(others)} ({kinds})"
+    """Yield the parts that welds and ties connect to a part; they are inactive while it is rigid."""
+    joined = inventory.joined.get(row.id, {}) if inventory else {}
+    if joined:
+        kinds = ", ".join(sorted(frozenset[str]().union(*joined.values())))
+        yield f"joined to {name_units(joined)} ({kinds})"
 
 
 def _to_keep(
     row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None
 ) -> Iterator[str]:
-    """Reasons not to switch a part."""
+    """Yield the reasons not to switch a part."""
     if row.kind == "rigid" and not (fact and fact.has_energy):
         yield "already rigid"
         return
@@ -375,7 +384,7 @@ def _to_keep(
 
 
 def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
-    """Say so where LS-DYNA, which switches parts, would make one rigid body of what nothing joins."""
+    """Yield a reason if LS-DYNA would make one rigid body of the disconnected pieces of a part."""
     if (
         inventory is None
         or inventory.solver != "ls-dyna"
@@ -391,7 +400,7 @@ def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
 def _not_known(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
-    """Say what would have to be known to judge a part that nothing speaks against."""
+    """Yield the data that are missing to judge a part without objections."""
     if inventory is None:
         yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
     elif data is None:
@@ -411,6 +420,7 @@ def _not_known(
 def _to_switch(
     row: PartRow, fact: PartFacts | None, data: PartData | None
 ) -> Iterator[str]:
+    """Yield remarks on a part that may be switched."""
     if row.kind == "rigid":
         yield "rigid in the deck, but it has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
@@ -431,23 +441,24 @@ def _to_switch(
 
 
 def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | None:
-    """How much the step may at least grow while some parts are rigid, from 1 on [-].
+    """Return the smallest factor by which the time step may grow while ``switched`` parts are rigid, at least 1 [-].
 
-    None where the step of a part that stays deformable is not known; infinite where none of them does.
+    The result is None if the time step of a part that stays deformable is unknown, infinite if no part stays
+    deformable.
     """
     computed = [
         row for row in rows if row.elements and row.kind not in ("rigid", "void")
     ]
-    left = [row.smallest_step for row in computed if row.id not in switched]
-    known = [step for step in left if step is not None]
+    remaining = [row.smallest_step for row in computed if row.id not in switched]
+    known_steps = [step for step in remaining if step is not None]
     steps = [row.smallest_step for row in computed if row.smallest_step is not None]
-    if len(known) < len(left) or not steps:
+    if len(known_steps) < len(remaining) or not steps:
         return None
-    return min(known) / min(steps) if known else float("inf")
+    return min(known_steps) / min(steps) if known_steps else float("inf")
 
 
 def landing_alone(rows: Sequence[PartRow]) -> int | None:
-    """Find the part that takes nearly all of the first energy of the landing after the longest flight."""
+    """Find the cheap part that takes up nearly all energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
         for row in rows
@@ -463,7 +474,7 @@ def landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Let parts that share nodes or are joined be one rigid body: the first by number leads, others merge with it."""
+    """Merge parts that share nodes or are joined into one rigid body: the first id leads, the others merge with it."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

@@ -1,8 +1,8 @@
-"""A switched run: when its parts were rigid, by which of them it is judged, and how its landings moved.
+"""Analyse a switched run: when its parts were rigid, which parts can be compared, and how its landings moved.
 
-Some solvers report a sum of densities for solids while these are rigid, and some go on with it.  When a part is
-deformable again its energy is what it was at tr, since a frozen deformation does not change: one that is further off
-than the part's largest energy without switching is reported wrongly, and the part is left out.
+While solids are rigid, some solvers report a sum of energy densities for them, and some continue with it.  A frozen
+deformation does not change, so a part that is deformable again has its energy of tr.  If the energy is off by more than
+the part's largest energy in the reference run, it is reported wrongly, and the part is left out.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 Times = tuple[float, float]
-# Evidence that tells the start of a flight to some states; the energy alone gives time away there.
+# Evidence that shows the start of a flight to within some states; the energy alone is less exact.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Parts that have no more of the momentum of a model than this share are not what moves in it.
+# A model moves although its parts do not, if the parts have less than this share of its momentum [-].
 _HARDLY: Final = 0.1
-# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
+# Number of states without kinetic energy, or with constant internal energy, that a deformable part never has in a row.
 FEWEST: Final = 12
-# An internal energy that changes by less is one value: solvers write single precision.
+# Relative change below which an internal energy is constant: solvers write single precision [-].
 SAME: Final = 1e-6
-# A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
+# A flight that begins within so many output intervals after tr began before tr, as far as the output shows.
 _SAME_STATES: Final = 3
 
 
 class Done(NamedTuple):
-    """A window in which a run was switched: the flight that it lies in, when that landed, and when it should have.
+    """A window in which a run was switched, with the flight around it, its landing and the planned landing.
 
-    ``landing`` and ``planned`` are None where no contact is seen, or no earlier run is at hand; ``step`` is the output
-    interval, below which they are the same [time].
+    ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
+    interval, below which both are equal [time].
     """
 
     tr: float
@@ -65,41 +65,37 @@ class Done(NamedTuple):
 
     @property
     def landed_rigid(self) -> bool:
-        """Whether the contact that ends the flight came while the parts were rigid."""
+        """True if the contact that ends the flight came while the parts were rigid."""
         return self.landing is not None and self.landing < self.td
 
     @property
     def took_off(self) -> float | None:
-        """When a contact ended in which the parts were rigid from tr on; None where the flight had begun [time]."""
+        """End of a contact in which the parts were rigid from tr on [time]; None if the flight had begun before tr."""
         if (
             self.flight is None
             or self.flight.start is None
             or self.flight.source not in _SHARP
         ):
             return None
-        return (
-            self.flight.start
-            if self.flight.start - self.tr > _SAME_STATES * self.step
-            else None
-        )
+        if self.flight.start - self.tr > _SAME_STATES * self.step:
+            return self.flight.start
+        return None
 
     @property
     def rigid_in_contact(self) -> bool:
-        """Whether a contact began or ended while the parts were rigid: nothing after it is what was planned."""
+        """True if a contact began or ended while the parts were rigid: nothing after it is as planned."""
         return self.landed_rigid or self.took_off is not None
 
     @property
     def moved(self) -> float | None:
-        """How much later the run landed than planned [time]."""
-        return (
-            None
-            if self.landing is None or self.planned is None
-            else self.landing - self.planned
-        )
+        """Delay of the landing relative to the plan [time]; None if one of both is unknown."""
+        if self.landing is None or self.planned is None:
+            return None
+        return self.landing - self.planned
 
     @property
     def told(self) -> str:
-        """What became of it, for people."""
+        """Sentence for the user on what became of the window."""
         if self.flight is None:
             return "no flight is seen there"
         if self.took_off is not None:
@@ -108,89 +104,106 @@ class Done(NamedTuple):
             return "no landing was seen after it"
         if self.landed_rigid:
             return f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: rigid in the contact"
-        found = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
+        landed = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
         if self.moved is None:
-            return found
+            return landed
         if abs(self.moved) <= self.step:
-            return f"{found}, as planned"
-        return f"{found}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
+            return f"{landed}, as planned"
+        return f"{landed}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
 
 
 def switched_history(
     reference: Reference, done: Sequence[Times]
 ) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
-    """Take a run for a reference although its parts were rigid for some time.
+    """Prepare the history of a run whose parts were rigid for some time, so that it can serve as a reference run.
 
     Parameters
     ----------
     reference : Reference
     done : sequence of (float, float)
-        Windows (tr, td) in which it was switched, as far as they are known [time].
+        Windows (tr, td) in which the run was switched, as far as they are known [time].
 
     Returns
     -------
     history : History
-        Without the momenta of parts where a rigid body had taken these over.
+        Without the momenta of parts if a rigid body had replaced these.
     windows : tuple of (float, float)
-        Those that are done: ``done``, and others in which the parts asked for were rigid, all of them.
+        Windows that are done: ``done``, and others in which all requested parts were rigid [time].
     cautions : tuple of Caution
-        What was recognised beside ``done``, and parts that were not rigid in it.
+        Windows recognised beyond ``done``, and parts that were not rigid in ``done``.
 
     Raises
     ------
     RangeError
         If a window lies outside the record, or the parts were deformable in it.
     """
-    history, cautions = reference.history, list[Caution]()
+    history = reference.history
+    cautions = list[Caution]()
     for tr, td in done:
         for time in (tr, td):
             history.energy_at(time)
         cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
-    new = [
-        one
-        for one in absent
-        if not any(tr < one.end and one.start < td for tr, td in done)
-    ]
-    cautions += [one.caution for one in new]
-    more = tuple((one.start, one.end) for one in new if one.whole)
+    new = []
+    for absent_window in absent:
+        start, end = absent_window.start, absent_window.end
+        if not any(tr < end and start < td for tr, td in done):
+            new.append(absent_window)
+    cautions += [absent_window.caution for absent_window in new]
+    whole_windows = tuple(
+        (absent_window.start, absent_window.end)
+        for absent_window in new
+        if absent_window.whole
+    )
     return (
         by_the_model(history) if absent else history,
-        tuple(sorted((*done, *more))),
+        tuple(sorted((*done, *whole_windows))),
         tuple(cautions),
     )
 
 
 def by_the_model(history: History) -> History:
-    """Give a history without momenta of parts, of which rigid bodies have taken some.
+    """Return a history without the momenta of parts, some of which were replaced by rigid bodies.
 
-    Energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies.
+    Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
     """
     whole = tuple(
-        replace(one, flying=one.chosen) for one in history.momenta if one.parts is None
+        replace(momenta, flying=momenta.chosen)
+        for momenta in history.momenta
+        if momenta.parts is None
     )
     return replace(history, evidence=Given(whole, history.balance))
 
 
 def rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Give the times in which parts are rigid, as far as their own quantities show it [time].
+    """Return the windows in which parts are rigid, as far as quantities of parts show them [time].
 
-    In a record of a rigid leg alone the parts that have energy have no mass, or none moves although the model does.
+    If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
-    found = tuple((one.start, one.end) for one in _absent_times(reference))
-    history, run = reference.history, reference.run
-    of_parts = next((one for one in history.momenta if one.parts is not None), None)
+    windows = tuple(
+        (momenta.start, momenta.end) for momenta in _absent_times(reference)
+    )
+    history = reference.history
+    run = reference.run
+    of_parts = next(
+        (momenta for momenta in history.momenta if momenta.parts is not None), None
+    )
     whole = next(
-        (one for one in history.momenta if one.parts is None and not one.velocity), None
+        (
+            momenta
+            for momenta in history.momenta
+            if momenta.parts is None and not momenta.velocity
+        ),
+        None,
     )
     if (
-        found
+        windows
         or of_parts is None
         or whole is None
         or of_parts.masses is None
         or find_complete_stretches(of_parts, whole)
     ):
-        return found
+        return windows
     energies = give_if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
     void = energies is not None and bool(
         ((of_parts.masses == 0) & (energies > 0)).any()
@@ -206,30 +219,28 @@ def done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[Done, ...]:
-    """Find when the flights of windows that are done have landed, and when they landed in the run before."""
-    found = []
+    """Find when the flights of done windows landed, and when they were planned to land."""
+    done = []
     for tr, td in windows:
-        flight, before = (
-            _around(history, flights, tr, td),
-            _around(history, planned or (), tr, td),
-        )
-        found.append(
+        flight = _around(history, flights, tr, td)
+        planned_flight = _around(history, planned or (), tr, td)
+        done.append(
             Done(
                 tr,
                 td,
                 flight,
                 flight.end if flight else None,
-                before.end if before else None,
+                planned_flight.end if planned_flight else None,
                 history.step,
             )
         )
-    return tuple(found)
+    return tuple(done)
 
 
 def _around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
-    """Give the flight that shares most time with a window, None where none does."""
+    """Return the flight that shares most time with a window; None if no flight overlaps it."""
 
     def shared(flight: Flight) -> float:
         start = float(history.time[0]) if flight.start is None else flight.start
@@ -240,7 +251,13 @@ def _around(
 
 
 def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Caution]:
-    """Name the parts asked for that deform in a window; RangeError where no part was rigid, as far as parts tell."""
+    """Yield a warning with the requested parts that deform in a window.
+
+    Raises
+    ------
+    RangeError
+        If no part was rigid, as far as the files show.
+    """
     run, history, parts = *reference, _deformable(reference)
     rigid = rigid_parts(run, parts, history.time, tr, td)
     if rigid is None:
@@ -248,13 +265,13 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     if rigid.any():
         names = [
             part.name
-            for part, one in zip(parts, rigid.tolist(), strict=True)
-            if not one
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if not is_rigid
         ]
         if names and history.parts:
-            found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {list_names(names)}"
+            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {list_names(names)}"
             yield Caution(
-                "partly-rigid", f"{found}; the window counts as done for the others"
+                "partly-rigid", f"{deforming}; the window counts as done for the others"
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
@@ -266,7 +283,7 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
 
 
 class _Absent(NamedTuple):
-    """A time in which some of the parts were ``rigid``; ``whole``: none of the others deforms."""
+    """A window in which some of the parts were ``rigid`` [time]; ``whole`` if no other part deforms."""
 
     start: float
     end: float
@@ -275,52 +292,54 @@ class _Absent(NamedTuple):
 
     @property
     def caution(self) -> Caution:
-        """What was recognised."""
+        """Warning about the rigid parts of the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
-            found = f"the parts were rigid {when}, give or take an output interval: taken as done"
-            return Caution("rigid-times", found)
-        found = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
-        return Caution("partly-rigid", found)
+            window_text = f"the parts were rigid {when}, give or take an output interval: taken as done"
+            return Caution("rigid-times", window_text)
+        window_text = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
+        return Caution("partly-rigid", window_text)
 
 
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
-    """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
-    parts, balance = _deformable(reference), reference.history.balance
-    kinetic = (
-        give_if_written(lambda: reference.run.part_kinetic_energies(parts))
-        if parts
-        else None
-    )
+    """Return the windows in which parts have no kinetic energy while the model moves: a rigid body has it."""
+    parts = _deformable(reference)
+    balance = reference.history.balance
+    if parts:
+        kinetic = give_if_written(lambda: reference.run.part_kinetic_energies(parts))
+    else:
+        kinetic = None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
-    time, least = reference.history.time, round_off(reference.history)
-    moves = np.interp(time, balance.time, balance.kinetic) > least
+    time = reference.history.time
+    rounding = round_off(reference.history)
+    moves = np.interp(time, balance.time, balance.kinetic) > rounding
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
-    energies, found = reference.run.part_energies(parts), []
+    energies = reference.run.part_energies(parts)
+    windows = []
     for states in find_stretches(gone, FEWEST):
         start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
         names = [
             part.title or f"part {part.id}"
-            for part, one in zip(parts, rigid.tolist(), strict=True)
-            if one
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if is_rigid
         ]
-        deform = ~rigid & (np.ptp(energies[states], axis=0) > least)
-        found.append(_Absent(start, end, list_names(names), not deform.any()))
-    return tuple(found)
+        deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
+        windows.append(_Absent(start, end, list_names(names), not deform.any()))
+    return tuple(windows)
 
 
 def _deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Give the chosen parts, or all, that have internal energy at the times of the history, also ``among`` others."""
+    """Return the chosen parts, or all, ``among`` others that have internal energy at the times of the history."""
     run, history = reference
-    there = {part.id for part in run.parts if among is None} | {
+    ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
     }
-    parts = [part for part in history.parts or run.parts if part.id in there]
+    parts = [part for part in history.parts or run.parts if part.id in ids]
     if not parts:
         return ()
     energies = run.part_energies(parts)
@@ -334,123 +353,131 @@ def _deformable(
 def rigid_parts(
     run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float
 ) -> NDArray[np.bool_] | None:
-    """Tell which of the parts were rigid from tr to td, shape (parts,); None where their states do not tell.
+    """Return True for each part that was rigid from tr to td, shape (parts,); None if there are too few states.
 
-    ``time`` are the times of the parts' states (n,).
+    ``time`` has the times of the parts' states, shape (n,).
     """
     inside = find_window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    inside = slice(
-        inside.start + 1, max(inside.start + 1, inside.stop - 1)
-    )  # switched at the first step after tr
+    # the switch comes at the first step after tr
+    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))
     if not parts or len(time[inside]) < FEWEST:
         return None
-    energies, kinetic = (
-        run.part_energies(parts)[inside],
-        give_if_written(lambda: run.part_kinetic_energies(parts)),
-    )
+    energies = run.part_energies(parts)[inside]
+    kinetic = give_if_written(lambda: run.part_kinetic_energies(parts))
     still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
-    absent = (
-        (kinetic[inside] == 0).all(axis=0)
-        if kinetic is not None
-        else np.zeros(len(parts), dtype=bool)
-    )
+    if kinetic is not None:
+        absent = (kinetic[inside] == 0).all(axis=0)
+    else:
+        absent = np.zeros(len(parts), dtype=bool)
     return np.asarray(still | absent)
 
 
 class SameParts(NamedTuple):
-    """Energies of the same parts in both runs, and what to say of other parts.
+    """Energies of the same parts in both runs, with objections and notes about other parts.
 
-    ``known`` is False where the energies of all parts are reported wrongly.
+    ``is_reported`` is False if the energies of all parts are reported wrongly.
     """
 
     reference: History
     switched: History
     objections: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    known: bool = True
+    is_reported: bool = True
 
 
 def same_parts(without: Reference, switched: Reference, pair: Times) -> SameParts:
-    """Choose the parts by which a finished switched run is judged.
+    """Choose the parts by which a finished switched run is compared with its reference run.
 
     Parameters
     ----------
     without, switched : Reference
-        Runs without switching, and switched, with what was read of them: of the parts to be switched, or of the whole
-        model.
+        The reference run and the switched run, with the energies of the parts to be switched or of the whole model.
     pair : (float, float)
         tr and td [time].
 
     Returns
     -------
     SameParts
-        Of a model of which only some parts were rigid these; in any case without parts that are reported wrongly.
+        The rigid parts if only some parts of the model were rigid; never parts whose energies are reported wrongly.
     """
     as_read = SameParts(without.history, switched.history)
     try:
         parts = _deformable(without, switched.run.parts)
         return _judged(without, switched, pair, parts) if parts else as_read
-    except FormatError:  # a quantity of the parts is not in every state
+    except FormatError:  # a quantity of the parts is missing in some states
         return as_read
 
 
 def _judged(
     without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
 ) -> SameParts:
+    """Choose the parts to compare among ``parts``, with objections and notes."""
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
-    some = rigid is not None and bool(rigid.any()) and not rigid.all()
-    objections, notes = list[str](), list[str]()
+    only_some_rigid = rigid is not None and bool(rigid.any()) and not rigid.all()
+    objections = list[str]()
+    notes = list[str]()
     chosen = parts
-    if some and rigid is not None:
+    if only_some_rigid and rigid is not None:
         still = tuple(
-            part for part, one in zip(parts, rigid.tolist(), strict=True) if one
+            part
+            for part, is_rigid in zip(parts, rigid.tolist(), strict=True)
+            if is_rigid
         )
         if history.parts is None:
             chosen = still
             notes.append(f"judged by the parts that were rigid: {_names(still)}")
         else:
-            others = (part for part in parts if part not in still)
+            deforming = (part for part in parts if part not in still)
             objections.append(
-                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}"
+                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(deforming)}"
             )
-    wrong = _reported_wrong(without, switched.run, chosen, pair)
-    if not wrong and chosen is parts:
+    misreported = _reported_wrong(without, switched.run, chosen, pair)
+    if not misreported and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
-    left = tuple(part for part in chosen if part not in wrong)
-    if not left:
-        who = f"the energies of {_names(wrong)}"
+    comparable = tuple(part for part in chosen if part not in misreported)
+    if not comparable:
+        energies_text = f"the energies of {_names(misreported)}"
         objections.append(
-            f"{who} are reported wrongly after td: nothing is left to compare but the motion"
+            f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
         )
-    elif wrong:
-        found = f"left out of the comparison: {_names(wrong)}, whose energy is reported wrongly after td"
-        notes.append(f"{found}; some solvers do so with solids that were rigid")
+    elif misreported:
+        left_out = f"left out of the comparison: {_names(misreported)}"
+        notes.append(
+            f"{left_out}, whose energy is reported wrongly after td; some solvers do so with solids that were rigid"
+        )
     selection = Selection(
-        parts=tuple(str(part.id) for part in left or chosen),
+        parts=tuple(str(part.id) for part in comparable or chosen),
         springs=tuple(str(part.id) for part in history.springs),
     )
     energies = without.run.history(selection), switched.run.history(selection)
-    return SameParts(*energies, tuple(objections), tuple(notes), known=bool(left))
+    return SameParts(
+        *energies, tuple(objections), tuple(notes), is_reported=bool(comparable)
+    )
 
 
 def _reported_wrong(
     without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Give the parts whose energy after td is further off that at tr than it can be, beyond round-off."""
-    time, energies = switched.part_time, switched.part_energies(parts)
-    first = (
-        int(np.searchsorted(time, pair[1])) + 1
-    )  # the first state from td on may still be rigid
+    """Return the parts whose energy after td differs from that at tr by more than their largest energy without D2R."""
+    time = switched.part_time
+    energies = switched.part_energies(parts)
+    # the first state from td on may still be rigid
+    first = int(np.searchsorted(time, pair[1])) + 1
     last = int(np.searchsorted(time, pair[0], side="right")) - 1
     if last < 0 or first >= time.size:
         return ()
     largest = np.abs(without.run.part_energies(parts)).max(axis=0)
-    off = np.abs(energies[first] - energies[last]) > np.maximum(
+    is_misreported = np.abs(energies[first] - energies[last]) > np.maximum(
         largest, round_off(without.history)
     )
-    return tuple(part for part, one in zip(parts, off.tolist(), strict=True) if one)
+    return tuple(
+        part
+        for part, misreported in zip(parts, is_misreported.tolist(), strict=True)
+        if misreported
+    )
 
 
 def _names(parts: Iterable[Part]) -> str:
+    """Return a list of part names for a sentence."""
     return list_names([part.name for part in parts])

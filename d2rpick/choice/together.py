@@ -1,4 +1,4 @@
-"""What vibrates together with the chosen parts in a flight."""
+"""Find what vibrates together with the chosen parts in a flight."""
 
 from __future__ import annotations
 
@@ -13,30 +13,32 @@ if TYPE_CHECKING:
 
 
 class Together:
-    """What vibrates together in a flight: whether its energy is all of what was chosen, and its kinetic energy."""
+    """Parts that vibrate together in a flight: whether all of them were chosen, and their kinetic energy."""
 
     def __init__(self, history: History, flight: Flight) -> None:
         self._history, self._flight = history, flight
 
     @cached_property
     def beside(self) -> Beside:
-        """Parts that vibrate with the chosen ones and were not chosen."""
+        """Parts that vibrate with the chosen ones but were not chosen."""
+        # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
             find_vibrating_parts,
-        )  # not above: an oscillator does without it
+        )
 
         return find_vibrating_parts(self._history, self._flight)
 
     @property
     def complete(self) -> bool:
-        """Whether all that vibrates together was chosen."""
+        """True if all parts that vibrate together were chosen."""
         return not self.beside.parts
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
+        """Kinetic energy of the parts that vibrate together, at times in the flight; None if it is not written."""
+        # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
             extract_kinetic_energy,
-        )  # not above: an oscillator does without it
+        )
 
         return extract_kinetic_energy(self._history, self._flight)

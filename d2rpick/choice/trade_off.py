@@ -1,4 +1,4 @@
-"""What each td costs: the best tr over a grid of td and at the peaks of the energy, error against rigid time."""
+"""Show what each td offers: the best tr over a grid of td and at the energy peaks, as error against rigid time."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Offer(OfTd):
-    """What ``suggest`` says of a td, looked up where it is asked for: of most td only what they are compared by.
+    """The answer of ``suggest`` for one td, of which most is computed only when it is looked up.
 
-    ``candidates`` up to the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other offer
-    has less error and saves as much, or saves more with no more error.  ``recommended``: it is that of ``suggest``
-    where td is chosen too.
+    ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
+    offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
+    ``suggest`` if td is chosen too.
     """
 
     situation: Situation
@@ -55,97 +55,106 @@ class Offer(OfTd):
 
     @property
     def pair(self) -> Pair | None:
-        """What offers are compared by; None where no tr is recommended."""
+        """The pair by which offers are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
     def error(self) -> float | None:
-        """What offers are compared by [-].
+        """Error by which offers are compared [-].
 
-        The residual, on basis "energy" how far the level at td stays below all vibration energy,
-        1 - sqrt(E(td)/(2 <E>)).
+        It is the residual; on basis "energy" the shortfall of the level at td from the largest vibration energy, 1 -
+        sqrt(E(td)/(2 <E>)).
         """
         return error_of(self.situation, self.pair)
 
     @property
     def tr(self) -> float | None:
-        """The recommended tr [time]."""
+        """Recommended tr [time]; None without one."""
         return self.pair.tr if self.pair else None
 
     @property
     def rigid_time(self) -> float | None:
-        """How long the parts are rigid [time]."""
+        """Time for which the parts are rigid [time]; None without a pair."""
         return self.pair.rigid_time if self.pair else None
 
     @property
     def best(self) -> Candidate | None:
-        """The recommended tr with its measures."""
+        """The recommended candidate; None without one."""
         return self.candidates.chosen
 
     @property
     def saving(self) -> float | None:
-        """Share of the run time that is saved [-]; None where the cost of the parts is not known."""
+        """Share of the run time that is saved [-]; None if the cost of the parts is unknown."""
         share = self.best.run_time_share if self.best else None
         return None if share is None else 1 - share
 
     @cached_property
     def answer(self) -> Suggestion:
-        """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
-        known = (
-            self.candidates if self.pair else None
-        )  # of a td without a pair all are looked at again
-        if known and self.basis == "energy":
-            known = next(candidates_at([self.situation], in_flight=True))
-        return suggest_at(self.situation, with_better=False, ranked=known)
+        """The complete answer of ``suggest`` for this td.
+
+        Windows need all candidates, and the reason why no tr is recommended needs those before the flight too.
+        """
+        if self.pair:
+            candidates = self.candidates
+        else:
+            candidates = None
+        if candidates and self.basis == "energy":
+            candidates = next(candidates_at([self.situation], in_flight=True))
+        return suggest_at(self.situation, with_better=False, ranked=candidates)
 
     @property
     def decision(self) -> Decision | None:
-        """Whether to use the recommended pair, and why."""
+        """Verdict on the recommended pair, with its reason."""
         return self.answer.decision
 
     @property
     def quality(self) -> Quality | None:
-        """How good the recommended pair is."""
+        """Grade of the recommended pair."""
         return self.answer.quality
 
     @property
     def kept(self) -> Kept | None:
-        """Bounds of the mean energy after td, over that of the reference."""
+        """Bounds of the mean energy after td, over that of the reference run."""
         return self.answer.kept
 
 
 def offers_of(
     situations: Sequence[Situation], peaks: Container[float]
 ) -> Iterator[Offer]:
-    """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""
+    """Yield the offer of each situation; ``peaks`` are the times of the energy peaks [time]."""
     for judged in judged_of(situations, in_flight=True):
-        found = [*ranked(judged)]
-        kept = [
-            one.order[: 0 if one.recommended is None else one.recommended + 1]
-            for one in found
+        candidates_of_each = [*ranked(judged)]
+        orders = [
+            candidates.order[
+                : 0 if candidates.recommended is None else candidates.recommended + 1
+            ]
+            for candidates in candidates_of_each
         ]
-        few, ends = (
-            judged.at(np.concatenate(kept)),
-            accumulate(rows.size for rows in kept),
-        )  # noise makes many
-        for one, rows, end in zip(found, kept, ends, strict=True):
-            best = replace(one, judged=few, order=np.arange(end - rows.size, end))
-            yield Offer(one.situation, best, one.situation.td in peaks)
+        judged_up_to_best = judged.at(np.concatenate(orders))
+        ends = accumulate(rows.size for rows in orders)  # noise makes many candidates
+        for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
+            best = replace(
+                candidates,
+                judged=judged_up_to_best,
+                order=np.arange(end - rows.size, end),
+            )
+            yield Offer(candidates.situation, best, candidates.situation.td in peaks)
 
 
-# Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.
+# Another td is worth naming if its error is at most this share of that of the start, and printed digits show it [-].
 _MUCH_LESS: Final = 0.5
-# A step that gives up more of the rigid time than this leads to a pair that nobody asked for.
+# A pair that gives up more than this share of the rigid time answers another question [-].
 _LEAST_KEPT: Final = 0.5
 
 
 @dataclass(frozen=True)
 class TradeOff:
-    """Answer of ``explore``: offers by ascending td in ``td_window``, which keeps the margin before a contact [time].
+    """Answer of ``explore``: the offers by ascending td in ``td_window`` [time], which keeps the margin.
 
-    ``asked`` is that of the td that was asked for; ``recommended`` that of the pair that ``suggest`` chooses there,
-    ``suggestion`` in full.  ``start``: what a step is measured from, the td asked for or else the one that saves most;
-    ``step``: the nearest unbeaten td with half the error, else the recommended one where it has less.
+    ``asked`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the window;
+    ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the requested
+    td, else the one that saves most.  ``step`` is the nearest unbeaten offer with half the error of ``start``, else the
+    recommended one if its error is smaller.
     """
 
     situation: Situation
@@ -168,28 +177,29 @@ def explore_of(
     steps: int = STEPS,
     since: float | None = None,
 ) -> TradeOff:
-    """Find what each td offers.
+    """Find what each td in a window offers.
 
     Parameters
     ----------
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight; where none is seen but td is asked for, the record.
+        Window for td [time].  Default: the longest flight; if there is none and td is given, the whole record.
     td : float, optional
-        Offered too, and what others are compared with [time].
+        Requested td, which others are compared with [time].
     steps : int
-        So many td on an even grid, and every peak of the energy.  Where there are more peaks than that, the highest in
-        each interval of the grid takes its place.
+        Number of td on an even grid, to which every energy peak is added.  If there are more peaks than that, the
+        highest peak in each interval of the grid replaces the grid point.
     since : float, optional
-        No flight is taken to begin before [time].
+        No flight is assumed to begin before this time [time].
 
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, or no flight is seen and neither is given.
+        If td or the window lies outside the record, or there is no flight and neither of them is given.
     """
-    history, fits = reference.history, Fits()
+    history = reference.history
+    fits = Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(
@@ -205,89 +215,92 @@ def explore_of(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = looking(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
+    # the full search gives the reason why no oscillator is seen
     situations = [
-        one if one.evidence.span else fully(one.td) for one in asked_at
-    ]  # why none is seen is told of each
-    offers = [
-        replace(one, recommended=one.td == chosen)
-        for one in _marked([*offers_of(situations, peaks)])
+        offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
-    asked = next((one for one in offers if one.td == td), None)
+    offers = [
+        replace(offer, recommended=offer.td == chosen)
+        for offer in _marked([*offers_of(situations, peaks)])
+    ]
+    requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
-    told = (
-        suggestion.situation
-    )  # the first td of the flight has too little before it to tell of a vibration
+    # the first td of the flight has too few states before it to show a vibration
+    warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        situation = told = fully(
-            td
-        )  # the energy alone shows another flight to each td: that of suggest is shown
-    start = asked or max(
-        filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None
+        # the energy alone shows a different flight to each td: show that of ``suggest``
+        situation = warned = fully(td)
+    start = requested or max(
+        filter(_found, offers), key=lambda offer: offer.rigid_time or 0.0, default=None
     )
     return TradeOff(
         situation=situation,
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_cautions(told, window, inside, offers)),
-        asked=asked,
-        recommended=next((one for one in offers if one.recommended), None),
+        cautions=tuple(_cautions(warned, window, inside, offers)),
+        asked=requested,
+        recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
         step=_step(start, offers) if start else None,
     )
 
 
 def _found(offer: Offer) -> bool:
-    """Whether there is something to compare: a pair that saves something."""
+    """Return True if an offer can be compared: it has a pair that saves run time, and an error."""
     return offer.candidates.saving is not None and offer.error is not None
 
 
 def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
-    """Mark the offers that nothing beats; errors of deformations and of energies are not compared."""
+    """Mark the unbeaten offers; errors of deformations are not compared with errors of energies."""
     unbeaten = set()
-    for known in (True, False):
+    for is_residual in (True, False):
         group = [
-            one for one in offers if _found(one) and (one.basis != "energy") == known
+            offer
+            for offer in offers
+            if _found(offer) and (offer.basis != "energy") == is_residual
         ]
-        least, longest = np.inf, np.inf
-        read = {
-            one.td: (-round_as_read(one.rigid_time or 0.0), as_printed(one.error))
-            for one in group
+        smallest_error = np.inf
+        longest = np.inf
+        printed = {
+            offer.td: (-round_as_read(offer.rigid_time or 0.0), as_printed(offer.error))
+            for offer in group
         }
-        for one in sorted(group, key=lambda one: read[one.td]):
-            rigid, error = read[one.td]
-            if error < least or (error, rigid) == (
-                least,
+        for offer in sorted(group, key=lambda offer: printed[offer.td]):
+            rigid, error = printed[offer.td]
+            # equal pairs do not beat each other
+            if error < smallest_error or (error, rigid) == (
+                smallest_error,
                 longest,
-            ):  # equal pairs do not beat each other
-                unbeaten.add(one.td)
-                least, longest = error, rigid
-    return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
+            ):
+                unbeaten.add(offer.td)
+                smallest_error, longest = error, rigid
+    return (replace(offer, unbeaten=offer.td in unbeaten) for offer in offers)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Give the nearest unbeaten td with half the error, else the recommended one where it has less, else None."""
+    """Return the nearest unbeaten offer with half the error, else the recommended one if it has less, else None."""
     error = np.inf if start.error is None else start.error
-    kept = _LEAST_KEPT * (start.rigid_time or 0.0)
-    alike = [
-        one
-        for one in offers
-        if start.pair is None or (one.basis == "energy") == (start.basis == "energy")
+    least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
+    comparable = [
+        offer
+        for offer in offers
+        if start.pair is None or (offer.basis == "energy") == (start.basis == "energy")
     ]
-    less = [
-        one
-        for one in alike
-        if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD
+    better = [
+        offer
+        for offer in comparable
+        if _found(offer) and (offer.error or 0.0) < error - EQUALLY_GOOD
     ]
     halved = [
-        one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error
+        offer
+        for offer in better
+        if offer.unbeaten and (offer.error or 0.0) <= _MUCH_LESS * error
     ]
-    near = [one for one in halved if (one.rigid_time or 0.0) >= kept]
-    return min(
-        near,
-        key=lambda one: abs(one.td - start.td),
-        default=next((o for o in less if o.recommended), None),
-    )
+    long_enough = [offer for offer in halved if (offer.rigid_time or 0.0) >= least_time]
+    if long_enough:
+        return min(long_enough, key=lambda offer: abs(offer.td - start.td))
+    return next((offer for offer in better if offer.recommended), None)
 
 
 def _cautions(
@@ -296,14 +309,16 @@ def _cautions(
     inside: tuple[float, float],
     offers: Sequence[Offer],
 ) -> Iterator[Caution]:
-    """What to be aware of in all of the window; of a single td the offer tells."""
+    """Yield the warnings that concern the whole window; each offer has those of its own td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
-    yield from (one for one in cautions_of(situation) if one.code not in of_td)
+    yield from (
+        caution for caution in cautions_of(situation) if caution.code not in of_td
+    )
     if inside[1] < window[1]:
-        kept = window[1] - inside[1]
+        kept_clear = window[1] - inside[1]
         yield Caution(
             "margin-kept",
-            f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}",
+            f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
         )
     if not any(map(_found, offers)):
         yield Caution(
@@ -312,31 +327,31 @@ def _cautions(
         )
 
 
-# td on the grid of a page: some pixels of a screen apart, and finer than anybody drags.
+# Number of td on the grid of a page: some pixels of a screen apart, and finer than a slider is moved.
 _STEPS_OF_PAGE: Final = 120
-# td of a flight in a plan of many: a curve of fewer points tells little.
+# Smallest number of td for a flight in a plan of many: a curve of fewer points shows little.
 _FEWEST_STEPS: Final = 40
 
 
 def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
-    """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
+    """Explore other td for each flight of a plan; the more flights, the coarser the grids."""
     answers = {
         row.number: row.answer for row in plan.flights if row.answer and row.window
     }
     landings = {row.number: row.flight.end for row in plan.flights}
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
-    found = (
+    trade_offs = (
         explored_around(
             reference,
-            one.situation,
-            one.td_window,
+            answer.situation,
+            answer.td_window,
             steps=steps,
             since=landings.get(number - 1),
         )
-        for number, one in answers.items()
+        for number, answer in answers.items()
     )
-    return tuple(one for one in found if one)
+    return tuple(trade_off for trade_off in trade_offs if trade_off)
 
 
 def explored_around(
@@ -347,24 +362,24 @@ def explored_around(
     steps: int = _STEPS_OF_PAGE,
     since: float | None = None,
 ) -> TradeOff | None:
-    """Find what other td cost than that of a situation.
+    """Explore other td around the td of a situation.
 
     Parameters
     ----------
     reference : Reference
     situation : Situation
-        What the record tells about the td that was asked for or chosen.
+        Describes the requested or chosen td.
     window : (float, float), optional
-        Where td was looked for [time].  Default: the flight that td lies in.
+        Window in which td was chosen [time].  Default: the flight that td lies in.
     steps : int, optional
-        So many td on an even grid.  Default: as many as a page needs.
+        Number of td on an even grid.  Default: as many as a page needs.
     since : float, optional
-        No flight is taken to begin before [time].
+        No flight is assumed to begin before this time [time].
 
     Returns
     -------
     TradeOff or None
-        None where no flight is known.
+        None if no flight is known.
     """
     flight = situation.flight
     if window is None and flight.start is None:
@@ -379,5 +394,5 @@ def explored_around(
             steps=steps,
             since=since,
         )
-    except RangeError:  # the window holds no state
+    except RangeError:  # no state lies in the window
         return None

@@ -1,6 +1,6 @@
-"""What to be aware of at a td, what the energy alone lets expect after it, and what speaks against a tr.
+"""Warn about a td, estimate the time after it from the energy alone, and list the objections to a tr.
 
-Warnings have stable codes for scripts, and sentences for people.
+Warnings have stable codes for scripts, and sentences for users.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# States per period of the energy below which modes beyond those that were found may matter.
+# States per period of the energy below which modes faster than those found may matter.
 _FEW_STATES = 4
-# Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
+# Kinetic fraction beyond which more than half of the vibration is lost at td for every tr [-].
 POOR_KINETIC_SHARE = 0.5
-# Of the vibration [-]: a residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
-# the motion after td.
+# Residual beyond which a pair is poor [-]: 0.5 is 25 % of the vibration energy, and the error is visible in the motion
+# after td.
 POOR_RESIDUAL = 0.5
-# An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
+# Plastic energy above this share of the vibration gets a warning [-]: energy alone cannot tell it from a preload.
 _NOTABLE_PLASTIC = 0.05
 
 
 def cautions_of(situation: Situation) -> Iterator[Caution]:
-    """Everything to be aware of in a situation, the input first."""
+    """Yield all warnings about a situation, those about the input first."""
     if not situation.history.complete:
         yield Caution(
             "truncated-input",
@@ -60,20 +60,19 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
-    td, mode, share = (
-        situation.td,
-        situation.vibration.whole.mode,
-        situation.kinetic_share,
-    )
+    """Yield the warnings about the energy at td."""
+    td = situation.td
+    mode = situation.vibration.whole.mode
+    share = situation.kinetic_share
     if situation.at_rest:
-        found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
-        right = "" if situation.flight.unknown_load else "any tr there is right, and "
-        yield Caution("at-rest", f"{found}: {right}the first one saves the most")
+        text = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
+        advice = "" if situation.flight.unknown_load else "any tr there is right, and "
+        yield Caution("at-rest", f"{text}: {advice}the first one saves the most")
         return
     if situation.energy_td <= 0:
-        found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
+        text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution(
-            "no-energy", f"{found}; a level to lock in needs a positive energy"
+            "no-energy", f"{text}; a level to lock in needs a positive energy"
         )
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
@@ -83,23 +82,22 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
         or abs(mode.energy_plastic)
         > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))
     ):
-        found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
+        text = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
         yield Caution(
             "plastic-or-preload",
-            f"{found}; the energy alone cannot tell one from the other",
+            f"{text}; the energy alone cannot tell one from the other",
         )
 
 
 def _of_parts(situation: Situation) -> Iterator[Caution]:
+    """Yield the warnings about the states and the signs of parts."""
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        found = (
-            f"the fastest vibration in the energy has {states:.2g} states per period"
-        )
+        text = f"the fastest vibration in the energy has {states:.2g} states per period"
         yield Caution(
             "coarse-record",
-            f"{found}, and a still faster one is not seen; let the run write more states",
+            f"{text}, and a still faster one is not seen; let the run write more states",
         )
     if vibration.estimated:
         yield Caution(
@@ -111,28 +109,31 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:
-    flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
+    """Yield the warnings about the flight and the place of td in it."""
+    flight = situation.flight
+    td = situation.td
+    earliest = situation.earliest_tr
     if flight.refusal:
         yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(situation)}")
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
     yield from _of_evidence(situation)
     if flight.source == "energy":
-        found = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
+        text = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
         if (
             flight.settled is not None
             and flight.start is not None
             and flight.settled < flight.start
         ):
-            found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
+            text += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
         yield Caution(
-            "flight-from-energy", f"{found}; give it as `after` where it is known"
+            "flight-from-energy", f"{text}; give it as `after` where it is known"
         )
     if earliest is None:
-        found = "nothing in the record shows when the load is over"
-        given = situation.settings.after is not None or flight.refusal
+        text = "nothing in the record shows when the load is over"
+        is_given = situation.settings.after is not None or flight.refusal
         yield Caution(
-            "no-flight", found if given else f"{found}; give that time as `after`"
+            "no-flight", text if is_given else f"{text}; give that time as `after`"
         )
     elif td <= earliest:
         yield Caution(
@@ -147,7 +148,7 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_grazing(situation: Situation) -> Iterator[Caution]:
-    """Say so where the body only grazes what it touches at the end of the flight, and how early it may do so."""
+    """Yield a warning if the body only grazes the contact that ends the flight, with its earliest time."""
     flight = situation.flight
     margin = situation.expected_margin
     if (
@@ -162,43 +163,42 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
         grazed = f"the contact at {flight.end:.6g} takes less than 10 % of the momentum towards it"
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
-    kept = (
-        f"keep td before {round_down_as_read(flight.end - early):.6g}"
-        if early < flight.end - flight.start
-        else "no td is safe"
-    )
-    yield Caution("grazing-contact", f"{grazed}: {moved}; {kept}")
+    if early < flight.end - flight.start:
+        advice = f"keep td before {round_down_as_read(flight.end - early):.6g}"
+    else:
+        advice = "no td is safe"
+    yield Caution("grazing-contact", f"{grazed}: {moved}; {advice}")
 
 
 def _of_evidence(situation: Situation) -> Iterator[Caution]:
-    """Say why a flight that more than the energy of the parts shows is not certain, and what would make it so."""
+    """Yield a warning if a flight shown by more than the energy of the parts is not certain, with a cure."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
     if flight.source == "momentum":
-        found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
+        text = "the momentum changes at a constant rate in the flight, which was taken for gravity"
         yield Caution(
             "gravity-assumed",
-            f"{found}; the mass, or kinetic and internal energy, would show whether it is",
+            f"{text}; the mass, or kinetic and internal energy, would show whether it is",
         )
         return
     if flight.source == "contact-force":
-        found = "contacts whose forces are not written, and other loads, do not show in those that are"
+        text = "contacts whose forces are not written, and other loads, do not show in those that are"
         yield Caution(
             "flight-uncertain",
-            f"{found}; momenta of the parts would make the flight sure",
+            f"{text}; momenta of the parts would make the flight sure",
         )
         return
-    found = "nothing but energies shows the flight, and a fixed wall does no work"
+    text = "nothing but energies shows the flight, and a fixed wall does no work"
     if flight.unknown_load:
-        found = "nothing but energies shows the flight, in which gravity or another load works"
+        text = "nothing but energies shows the flight, in which gravity or another load works"
     yield Caution(
-        "flight-uncertain", f"{found}; momenta of the parts would make it sure"
+        "flight-uncertain", f"{text}; momenta of the parts would make it sure"
     )
 
 
 def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
-    """Say so where a part that is frozen at ``tr`` puts a body off at td too much, and where that is not known."""
+    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or if that is unknown."""
     bodies = situation.bodies
     if bodies is None:
         return
@@ -209,37 +209,32 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
-    drift, which = (
-        worst.drift,
-        f" of {name_units(worst.body.parts)}" if worst.body else "",
-    )
-    share, last = (
-        worst.error / float(drift.path[-1]),
-        float(drift.time[-1] - drift.time[0]),
-    )
-    found = (
+    drift = worst.drift
+    which = f" of {name_units(worst.body.parts)}" if worst.body else ""
+    share = worst.error / float(drift.path[-1])
+    last = float(drift.time[-1] - drift.time[0])
+    frozen = (
         f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
     )
-    least = "at least " * worst.at_least
-    off = f"there the body{which} is off by {least}{worst.error:.3g}, {share:.1%} of its path in the flight"
-    taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
-    taken += (
-        ", which `deck` tells"
-        if worst.assumed and situation.settings.bodies is None
-        else ""
+    bound = "at least " * worst.at_least
+    distance = f"there the body{which} is off by {bound}{worst.error:.3g}, {share:.1%} of its path in the flight"
+    assumption = (
+        "; this holds if the parts become one rigid body" if worst.assumed else ""
     )
+    if worst.assumed and situation.settings.bodies is None:
+        assumption += ", which `deck` tells"
     contact = compute_margin(
         situation.history, situation.flight, place=worst.error
     ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
     yield Caution(
         "out-of-place",
-        f"{found}: {off}{moved if situation.flight.end is not None else ''}{taken}",
+        f"{frozen}: {distance}{moved if situation.flight.end is not None else ''}{assumption}",
     )
 
 
 def _moves_apart(parts: Sequence[Part]) -> str:
-    """Name the parts that nothing holds in a body."""
+    """Describe parts that are not connected to the others and fly away from them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -247,70 +242,68 @@ def _moves_apart(parts: Sequence[Part]) -> str:
     return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
 
 
-def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
-    """Name the first body whose error is not known, and why."""
-    first, more = (
-        unknown[0],
-        f", and of {len(unknown) - 1} more" if len(unknown) > 1 else "",
-    )
+def _not_predicted(bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
+    """Describe the first body whose position error is unknown, and the reason."""
+    first = unknown[0]
+    others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
     why = "" if first.whole else "; its pieces do not hang together"
-    which = f"that of {name_units(first.parts)}{more}"
-    return f"{len(told)} rigid bodies: how far {which} is out of place is not predicted{why}"
+    which = f"that of {name_units(first.parts)}{others_text}"
+    return f"{len(bodies)} rigid bodies: how far {which} is out of place is not predicted{why}"
 
 
 def end_of_load(situation: Situation) -> str:
-    """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
+    """Describe ``earliest_tr``: the start of the flight, and the margin if there is one."""
     return f"the end of the load at {situation.flight.start:.6g}{_margin(situation.settings.margin)}"
 
 
 def end_of_flight(situation: Situation) -> str:
-    """Words for ``latest_td``: the end of the flight, and the margin where one is kept."""
+    """Describe ``latest_td``: the end of the flight, and the margin if there is one."""
     return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation.margin)}"
 
 
-def _margin(kept: float | None) -> str:
-    return f" with the margin {kept:.6g}" if kept else ""
+def _margin(margin: float | None) -> str:
+    """Describe a margin; empty without one."""
+    return f" with the margin {margin:.6g}" if margin else ""
 
 
 def _nearest_flight(situation: Situation) -> str:
-    """Name the flight that is nearest to td, and the last td in it where a margin is kept."""
+    """Describe the flight nearest to td, and the last td in it that keeps the margin."""
     flight = situation.flight
     if flight.start is None or flight.source == "given":
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
     margin = _margin(situation.margin)
-    last = (
-        f",{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
-        if margin
-        else "; td must lie in it"
-    )
+    if margin:
+        last = f",{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
+    else:
+        last = "; td must lie in it"
     return f"; the nearest flight lasts from {format_window(flight.start, flight.end)}{last}"
 
 
-# Many modes never rest all at once, so the energy at rest is less than the lowest in flight.  This share of it gives
-# the means of twelve switched runs of a car within 0.03, those of a shell box from 0.05 too little to 0.16 too much,
-# where the lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
+# Energy at rest as a share of the lowest in flight [-]: many modes are never at rest at once, so it is lower. This
+# share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16. The
+# lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
 _AT_REST = 0.85
-# No switch adds energy.  Where so many times what the reference has would come back after td, the mean of the flight
-# is not what comes after td: a contact lies in the flight.  The estimate itself is right within a fifth.
+# Largest mean energy after td over that of the reference run [-]. Switching adds no energy; a larger ratio means that a
+# contact lies in the flight. The estimate itself is right to within 20 %.
 MOST_KEPT = 1.2
-# Of e: about the largest double.
+# Largest exponent of e, near the largest double.
 _LARGEST_EXPONENT = 700.0
 
 
 class Expectation(NamedTuple):
-    r"""Estimates for a vibration of many modes; fields are the keys of the JSON output.
+    r"""Estimates for a vibration of many modes; the fields are the keys of the JSON output.
 
-    Such a vibration shares its energy equally between internal and kinetic energy, and what is locked in above the
+    Such a vibration shares its energy equally between internal and kinetic energy.  The locked-in energy above the
     energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
 
     .. math:: \frac{E_s + (E(t_r) - E_s)/2}{E_s + (\langle E \rangle - E_s)\,
         e^{-\alpha t_d}/\langle e^{-\alpha t} \rangle}
 
-    Below the line, what the reference keeps until td: its mean over the flight, less what damping takes.  The energy
-    at rest is taken for 0.85 of the lowest in the flight.  For sure only an upper bound of it is known, so a lower
-    bound of the ratio is given too.
+    The denominator is the energy that the reference run keeps until td: its mean over the flight, less the damping.
+    The energy at rest is assumed to be 0.85 of the lowest energy in the flight.  Only an upper bound of it is certain,
+    so a lower bound of the ratio is given too.
 
     Parameters
     ----------
@@ -319,13 +312,13 @@ class Expectation(NamedTuple):
     resting_energy : float
         Lowest E in the flight, an upper bound of E_s: plastic work and residual stress do not vibrate [energy].
     kinetic_share : float
-        1 - E(td)/(2 <E>), of the vibration energy at td [-].
+        Kinetic fraction of the vibration energy at td, 1 - E(td)/(2 <E>) [-].
     ratio : float or None
-        Mean of E after td over that of the reference when E(tr) is locked in; None without a tr [-].
+        Mean of E after td over that of the reference run if E(tr) is locked in; None without a tr [-].
     ratio_low : float or None
-        E(tr)/(2 <E>), what is left if all of it vibrates, undamped [-].
+        Ratio if all of E(tr) vibrates, undamped: E(tr)/(2 <E>) [-].
     ratio_at_level : float
-        As ``ratio``, when E(td) is locked in [-].
+        Same as ``ratio`` if E(td) is locked in [-].
     """
 
     mean_energy: float
@@ -337,10 +330,10 @@ class Expectation(NamedTuple):
 
 
 class Means(NamedTuple):
-    """Energies that decide what comes after td [energy].
+    """Energies that decide the mean energy after td [energy].
 
-    ``mean`` and ``lowest`` of the flight, ``resting``, the part that does not vibrate, and what the reference has
-    ``after`` td.
+    ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``after`` is the mean of the
+    reference run after td.
     """
 
     mean: float
@@ -349,17 +342,17 @@ class Means(NamedTuple):
     after: float
 
     def ratio(self, locked: float) -> float:
-        """Mean energy after td over that of the reference, where ``locked`` is locked in [energy]."""
+        """Return the mean energy after td over that of the reference run [-] if ``locked`` is locked in [energy]."""
         return (self.resting + (locked - self.resting) / 2) / self.after
 
     @property
     def most(self) -> float:
-        """Energy that may be locked in: of more, more comes back than the reference has [energy]."""
+        """Largest energy that may be locked in, so that the energy after td does not exceed the reference [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.after - self.resting)
 
 
 def means_of(situation: Situation) -> Means | None:
-    """Read them off the flight; None on another basis than "energy", without a flight or energy, and at rest."""
+    """Compute the means of the flight; None on another basis than "energy", without a flight or energy, and at rest."""
     if situation.basis != "energy":
         return None
     mean = mean_in_flight(situation)
@@ -368,28 +361,26 @@ def means_of(situation: Situation) -> Means | None:
     time, energy = _flight(situation)
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
-    # what damping leaves of them is nothing where the decay has no double any more
+    # the remaining decay is 0 if its exponential has no floating-point number
     decay = np.exp(
         np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
     )
-    after = resting + (mean - resting) / float(decay.mean())
-    return (
-        Means(mean, lowest, resting, after)
-        if after > round_off(situation.history)
-        else None
-    )
+    energy_after = resting + (mean - resting) / float(decay.mean())
+    if energy_after > round_off(situation.history):
+        return Means(mean, lowest, resting, energy_after)
+    return None
 
 
 def most_energy(situation: Situation) -> float:
-    """Energy that may be locked in at a td [energy]; infinite where the energy does not tell what comes after it."""
+    """Return the largest energy that may be locked in at a td [energy]; infinite if the energy does not limit it."""
     means = means_of(situation)
     return means.most if means else np.inf
 
 
 def expectation(situation: Situation, energy_tr: float | None) -> Expectation | None:
-    """Estimate from the energies of the flight; None on another basis than "energy", without a flight or energy.
+    """Estimate the time after td; None on another basis than "energy", without a flight or energy.
 
-    ``energy_tr`` is what the recommended tr locks in [energy], None where nothing is recommended.
+    ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
     """
     means = means_of(situation)
     if means is None:
@@ -405,24 +396,25 @@ def expectation(situation: Situation, energy_tr: float | None) -> Expectation | 
 
 
 def mean_in_flight(situation: Situation) -> float | None:
-    """Mean energy of the flight, up to td where its end is not known [energy]; None unless it is positive."""
+    """Return the mean energy of the flight, up to td if its end is unknown [energy]; None unless it is positive."""
     energy = _flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
     return mean if mean > round_off(situation.history) else None
 
 
 def _flight(situation: Situation) -> tuple[Samples, Samples]:
-    """Times and energies of the flight, up to td where its end is not known; empty where its start is not."""
-    start, end = situation.flight.start, situation.flight.end
+    """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
+    start = situation.flight.start
+    end = situation.flight.end
     return situation.history.between(
         np.inf if start is None else start, situation.td if end is None else end
     )
 
 
 def shortfall(energy: Samples, mean: float) -> Samples:
-    """How far a locked-in amplitude stays below that of all vibration energy, 1 - sqrt(E/(2 <E>)) [-].
+    """Return the shortfall of a locked-in amplitude from that of the largest vibration energy, 1 - sqrt(E/(2 <E>)) [-].
 
-    Infinite above it: more than there is must not be locked in.
+    It is infinite for larger energies, which must not be locked in.
 
     Examples
     --------
@@ -435,9 +427,10 @@ def shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """What speaks against the candidates that it ``holds`` for, of shape (n,); ``told`` says it of one by its place.
+    """An objection to the candidates for which ``holds`` is True, shape (n,).
 
-    Answers are pickled with it: ``told`` is a function of this module with some of its arguments.
+    ``told`` returns its text for a candidate by index.  Since answers are pickled with it, ``told`` is a function of
+    this module with some of its arguments.
     """
 
     holds: NDArray[np.bool_]
@@ -446,90 +439,113 @@ class Objection(NamedTuple):
 
 def objections(
     situations: Sequence[Situation],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     tr: Samples,
     columns: Columns,
 ) -> Iterator[Objection]:
-    """Give every reason against some of the candidates.
+    """Yield all objections to some of the candidates.
 
     Parameters
     ----------
     situations : sequence
-        Of one record, by one set of rules.
+        Situations of one record, by one set of rules.
     place : array of shape (n,)
-        Of the situation of each candidate.
+        Index of the situation of each candidate.
     tr : array of shape (n,)
-        [time]
+        Times of the candidates [time].
     columns : mapping of arrays of shape (n,)
-        By their names: the measures, ``energy`` and ``level_error``.
+        Measures by name, with ``energy`` and ``level_error``.
     """
-    begun = np.array(
-        [
-            np.nan
-            if one.earliest_tr is None
-            else round_to_first_as_read(one.earliest_tr)
-            for one in situations
-        ]
+    starts = np.array([_first_tr_as_read(situation) for situation in situations])
+    is_early = ~(tr >= starts[situation_of])
+    yield Objection(is_early, partial(_tell_in_load, situations, situation_of))
+    refused = np.array([bool([*against_td(situation)]) for situation in situations])
+    yield Objection(
+        refused[situation_of], partial(_tell_against_td, situations, situation_of)
     )
-    yield Objection(~(tr >= begun[place]), partial(_tell_in_load, situations, place))
-    refused = np.array([any(True for _ in against_td(one)) for one in situations])
-    yield Objection(refused[place], partial(_tell_against_td, situations, place))
-    moves = np.array([not one.at_rest for one in situations])[place]
+    moves = np.array([not situation.at_rest for situation in situations])[situation_of]
     compared = measures.compared(columns)
     described = (
-        compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
+        compared
+        | np.array([bool(situation.vibration.unknown) for situation in situations])[
+            situation_of
+        ]
     )
-    modal = np.array([one.basis == "modal" for one in situations])[place]
+    modal = np.array([situation.basis == "modal" for situation in situations])[
+        situation_of
+    ]
     same_sign = (columns["sign_match"] != 0) | modal
-    yield Objection(moves & ~described, partial(_tell_undescribed, situations, place))
+    yield Objection(
+        moves & ~described, partial(_tell_undescribed, situations, situation_of)
+    )
     yield Objection(
         moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation")
     )
-    error, judged = (
-        np.where(compared, columns["lock_in_error"], columns["level_error"]),
-        moves & described & same_sign,
-    )
+    error = np.where(compared, columns["lock_in_error"], columns["level_error"])
+    judged = moves & described & same_sign
     nothing = "the energy is not positive here, so there is nothing to compare"
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
-    most = np.array([one.most_error for one in situations])[place]
-    too_much = judged & (error > most)
-    yield Objection(too_much & ~modal, partial(_tell_error, error, most))
+    limits = np.array([situation.most_error for situation in situations])[situation_of]
+    too_much = judged & (error > limits)
+    yield Objection(too_much & ~modal, partial(_tell_error, error, limits))
     yield Objection(
         too_much & modal,
-        partial(_tell_keeps_nothing, situations, place, columns["residual"]),
+        partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # beyond its end the flight tells nothing of what comes after td
-    means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
+    # beyond its end the flight shows nothing about the time after td
+    means = [
+        means_of(situation) if situation.td <= situation.latest_td else None
+        for situation in situations
+    ]
     if any(means):
         energy = columns["energy"]
-        more = energy > np.array([one.most if one else np.inf for one in means])[place]
-        yield Objection(more, partial(_tell_above_the_reference, means, place, energy))
+        is_above = (
+            energy
+            > np.array(
+                [situation.most if situation else np.inf for situation in means]
+            )[situation_of]
+        )
+        yield Objection(
+            is_above, partial(_tell_above_the_reference, means, situation_of, energy)
+        )
+
+
+def _first_tr_as_read(situation: Situation) -> float:
+    """Return the earliest tr, rounded to printed digits [time]; NaN if it is unknown."""
+    if situation.earliest_tr is None:
+        return np.nan
+    return round_to_first_as_read(situation.earliest_tr)
 
 
 def _tell_in_load(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
-    return [_in_load(situations[place[candidate]])]
+    """Return the objection that a candidate lies before the flight."""
+    return [_in_load(situations[situation_of[candidate]])]
 
 
 def _tell_against_td(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> Iterator[str]:
-    return against_td(situations[place[candidate]])
+    """Return the objections to the td of a candidate."""
+    return against_td(situations[situation_of[candidate]])
 
 
 def _tell_undescribed(
-    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
-    return [situations[place[candidate]].vibration.undescribed]
+    """Return the objection that the vibration of a candidate is not described."""
+    return [situations[situation_of[candidate]].vibration.undescribed]
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
+    """Return the same objection for each candidate."""
     return [reason]
 
 
-def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
-    limit = most[candidate]
+def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
+    """Return the objection that the error of a candidate exceeds the tolerance."""
+    limit = limits[candidate]
     return [
         f"error {format_above_limit(error[candidate], limit)} above the tolerance {limit:g}"
     ]
@@ -537,23 +553,26 @@ def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
 
 def _tell_keeps_nothing(
     situations: Sequence[Situation],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    return [_keeps_nothing(situations[place[candidate]], residual[candidate])]
+    """Return the objection that a candidate keeps less of the vibration than a release without any."""
+    return [_keeps_nothing(situations[situation_of[candidate]], residual[candidate])]
 
 
 def _tell_above_the_reference(
     means: Sequence[Means | None],
-    place: NDArray[np.int32],
+    situation_of: NDArray[np.int32],
     energy: Samples,
     candidate: int,
 ) -> Iterator[str]:
-    return _above_the_reference(means[place[candidate]], energy[candidate])
+    """Return the objection that a candidate locks in too much energy."""
+    return _above_the_reference(means[situation_of[candidate]], energy[candidate])
 
 
 def _in_load(situation: Situation) -> str:
+    """Describe that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return (
             situation.flight.refusal or "unknown: nothing shows when the load is over"
@@ -562,24 +581,24 @@ def _in_load(situation: Situation) -> str:
 
 
 def _keeps_nothing(situation: Situation, residual: float) -> str:
-    """Say that a switch is worse than a release without any vibration, or than the best one there is."""
-    least = situation.vibration.least_residual or 0.0
+    """Describe that a switch is worse than a release without any vibration, or than the best one at this td."""
+    smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, which a release without any vibration has"
     if situation.vibration.keeps_nothing:
-        better = f"{least:.2g}, which is the least at this td"
+        better = f"{smallest:.2g}, which is the least at this td"
     return f"residual {residual:.2g} above {better}"
 
 
 def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """Say by how much more energy would come back after td than the reference has."""
+    """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_above_limit(means.ratio(energy), MOST_KEPT)
-        found = f"the mean energy after td is expected to be {times} times that of the reference"
-        yield f"{found}, more than {MOST_KEPT:g} times"
+        text = f"the mean energy after td is expected to be {times} times that of the reference"
+        yield f"{text}, more than {MOST_KEPT:g} times"
 
 
 def against_td(situation: Situation) -> Iterator[str]:
-    """Why no tr at all is acceptable at this td."""
+    """Yield the reasons why no tr is acceptable at this td."""
     if situation.td > situation.latest_td:
         yield f"td after {end_of_flight(situation)}"
     if situation.settings.strict and not situation.flight.certain:

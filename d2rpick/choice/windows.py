@@ -1,4 +1,4 @@
-"""Windows of time in which a tr is acceptable, of one run and of many."""
+"""Find the windows of time in which a tr is acceptable, for one run and for many."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Halvings of the sampling interval at an end of a window: to a millionth of it.
+# Number of halvings of the sampling interval at an end of a window: the end is exact to a millionth of it.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
@@ -31,17 +31,17 @@ def acceptable_windows(
 ) -> Samples:
     """Find the windows in which a tr is acceptable.
 
-    Every end and middle was judged by the rule of ``verify``; ends lie inside.  In between the rule cannot change:
-    between neighbouring points of the grid the energy is linear, or the deformation monotone.
+    The rule of ``verify`` is applied to both ends and the middle of each window; the ends lie inside.  Between them the
+    rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them.
+        All candidates.
     recommended : float or None
-        The tr that is recommended [time].  From some time on the error stays within the tolerance up to td: the same
-        swing, where hardly anything is saved.  That window counts only where the recommended tr lies in it.
+        The recommended tr [time].  From some time on the error stays within the tolerance up to td: on the same swing,
+        where hardly anything is saved.  That window is kept only if the recommended tr lies in it.
 
     Returns
     -------
@@ -59,43 +59,43 @@ def acceptable_windows(
         situation,
         np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
     )
-    kept = widest[judged.kept.reshape(-1, 3).all(axis=1)]
+    acceptable = widest[judged.kept.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:
-        return kept
+        return acceptable
     if (
-        kept.size
-        and kept[-1, 1] >= grid[-1]
-        and not (recommended is not None and kept[-1, 0] <= recommended)
+        acceptable.size
+        and acceptable[-1, 1] >= grid[-1]
+        and not (recommended is not None and acceptable[-1, 0] <= recommended)
     ):
-        kept = kept[:-1]
-    return kept
+        acceptable = acceptable[:-1]
+    return acceptable
 
 
 def clear_of_td(situation: Situation, windows: Samples) -> Samples:
-    """Give the windows without what lies within one output interval of td: nothing is saved there."""
+    """Cut the windows one output interval before td: after that nothing is saved."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
-    kept = windows[windows[:, 0] < end]
-    return np.stack([kept[:, 0], np.minimum(kept[:, 1], end)], axis=1)
+    early = windows[windows[:, 0] < end]
+    return np.stack([early[:, 0], np.minimum(early[:, 1], end)], axis=1)
 
 
 def alike_windows(
     situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
 ) -> Samples:
-    """Find where in the acceptable windows a tr keeps the timing tolerance: its error is at most 0.05 above the chosen.
+    """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
 
-    The timing tolerance of a candidate is how far it may be off before its lock-in error grows by 0.05; on the energy
-    alone the level error counts as that does.
+    The timing tolerance of a candidate is the time by which it may be off before its lock-in error grows by 0.05.  On
+    the energy alone the level error replaces the lock-in error.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them.
+        All candidates.
     chosen : Candidate
     acceptable : array of shape (n, 2)
-        As `acceptable_windows` gave them.
+        The result of ``acceptable_windows``.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def alike_windows(
 def coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count in how many runs times lie in a window.
+    """Count the runs that have a time in one of their windows.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def coverage(
     Returns
     -------
     stretches : array of shape (k, 2)
-        Stretches on which the count is the same and above zero, ascending; a single time where windows only touch.
+        Intervals of constant count above 0, ascending; a single time if windows only touch [time].
     counts : array of shape (k,)
 
     Examples
@@ -136,21 +136,20 @@ def coverage(
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    order = np.lexsort(
-        (-steps, times)
-    )  # at one time windows begin before others end: ends are included
+    # at one time let windows start before others end, since the ends are included
+    order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # between two windows that begin, or end, at the same time lies nothing that one would miss
-    lasting = (stretches[:, 0] < stretches[:, 1]) | (
-        (steps[order][:-1] > 0) & (steps[order][1:] < 0)
-    )
-    seen = lasting & (counts > 0)
-    return stretches[seen], counts[seen]
+    # the gap between two windows that start, or end, at the same time is empty
+    ordered = steps[order]
+    touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
+    lasting = (stretches[:, 0] < stretches[:, 1]) | touching
+    is_counted = lasting & (counts > 0)
+    return stretches[is_counted], counts[is_counted]
 
 
 def common_windows(runs: Sequence[Samples]) -> Samples:
-    """Give the windows that all runs share, shape (k, 2) [time].
+    """Return the windows that all runs share, shape (k, 2) [time].
 
     Examples
     --------
@@ -162,80 +161,87 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Times in the flight before td between which the rule changes once at most."""
-    history, td = situation.history, situation.td
+    """Return times in the flight before td between which the rule changes at most once [time]."""
+    history = situation.history
+    td = situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # what may be locked in at most is passed between the samples, and is just kept there in doubles too
-    most = find_crossings(
+    # the largest acceptable energy is passed between samples; stay just below it in floating point
+    highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * most_energy(situation)
     )[0]
     times = np.concatenate(
-        [history.time, candidates.tr, most, situation.vibration.knots(), ends]
+        [
+            history.time,
+            candidates.tr,
+            highest_crossings,
+            situation.vibration.knots(),
+            ends,
+        ]
     )
     return merge_times(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
 def _residual_left(situation: Situation) -> float:
-    """Lock-in error that --max-residual leaves beside the kinetic share, R^2 = L^2 + K [-]."""
-    limit, share = situation.settings.max_residual, situation.kinetic_share
+    """Return the lock-in error that --max-residual allows in addition to the kinetic fraction: R^2 = L^2 + K [-]."""
+    limit = situation.settings.max_residual
+    share = situation.kinetic_share
     if limit is None:
         return np.inf
     if share is None or sqrt(share) > limit:
         return -1.0
-    return sqrt(limit - sqrt(share)) * sqrt(
-        limit + sqrt(share)
-    )  # the square of a large limit is no number
+    # the square of a large limit overflows
+    return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))
 
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
-    """Windows in which the error stays at or below a level, shape (n, 2)."""
-    most = most_energy(situation)
+    """Return the windows in which the error does not exceed ``level``, shape (n, 2) [time]."""
+    highest = most_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
         return (situation.errors(times) <= level) & (
-            situation.vibration.whole.energies(times) <= most
+            situation.vibration.whole.energies(times) <= highest
         )
 
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])
-    within = grid[np.stack([first, last], axis=1)]
-    if not within.size:
-        return within
+    inner = grid[np.stack([first, last], axis=1)]
+    if not inner.size:
+        return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
     return narrow_brackets(
-        lambda t: keeps(t.ravel()).reshape(t.shape), within, beyond, steps=_END_HALVINGS
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_END_HALVINGS
     ).within
 
 
-# What a straight line between two points may be off by [-]: half of the last digit that is shown.
+# Largest error of the polyline [-]: half of the last printed digit.
 _EXACT: Final = 5e-4
-# Halvings of an interval in which the error is no straight line: the root of an energy that falls to zero is one to a
-# four-thousandth then, a parabola much sooner.
+# Number of halvings of an interval in which the error is curved: a square root at zero energy is exact to 1/4000 then,
+# a parabola much sooner.
 _HALVINGS: Final = 20
 
 
 def error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Give the error of a tr in windows as points between which it is a straight line, to within 0.0005.
+    """Return the error of a tr in windows as points of a polyline, exact to 0.0005.
 
     Parameters
     ----------
     situation : Situation
     candidates : Candidates
-        All of them: at a crossing the level error has a kink.
+        All candidates, since the level error has a kink at a crossing.
     windows : array of shape (n, 2)
-        Of acceptable tr, ascending [time].
+        Windows of acceptable tr, ascending [time].
 
     Returns
     -------
     array of shape (2, m)
-        Times, ascending, and errors: the residual R, on the energy alone the level error, as `Candidate.error` [-].
-        Between two windows they say nothing.
+        Times, ascending, and errors: the residual R, or on the energy alone the level error, as `Candidate.error` [-].
+        The polyline means nothing between two windows.
     """
     if not windows.size:
         return np.zeros((2, 0))
@@ -258,32 +264,32 @@ def error_profile(
 
 
 def error_at(profile: Samples, time: float) -> float:
-    """Error at a time in one of the windows of a profile [-]."""
+    """Return the error at a time in one of the windows of a profile [-]."""
     return float(np.interp(time, *profile))
 
 
 def _errors(situation: Situation, times: Samples) -> Samples:
-    """Residuals, or level errors on the energy alone, of the shape of ``times`` [-]."""
+    """Return the residuals, or the level errors on the energy alone, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
 def _inside(times: Samples, windows: Samples) -> Samples:
-    """Whether each time lies in a window."""
+    """Return True for each time that lies in a window."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 
 
 def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Leave out what lies on a line: the ends of the windows stay, then the worst point between any two that stay."""
-    kept = np.flatnonzero(np.isin(times, windows))
+    """Leave out points on a straight line: keep the ends of the windows, then add the worst point of each gap."""
+    points = np.flatnonzero(np.isin(times, windows))
     while True:
-        off = np.abs(errors - np.interp(times, times[kept], errors[kept]))
+        deviations = np.abs(errors - np.interp(times, times[points], errors[points]))
         worst = np.repeat(
-            np.maximum.reduceat(off, kept), np.diff(kept, append=times.size)
+            np.maximum.reduceat(deviations, points), np.diff(points, append=times.size)
         )
-        new = np.flatnonzero((off == worst) & (off > _EXACT / 2))
+        new = np.flatnonzero((deviations == worst) & (deviations > _EXACT / 2))
         if not new.size:
-            return np.stack([times[kept], errors[kept]])
-        kept = np.union1d(kept, new)
+            return np.stack([times[points], errors[points]])
+        points = np.union1d(points, new)

@@ -1,4 +1,4 @@
-"""The library gives what the command line gives, loses nothing in tables, and names a wrong argument."""
+"""The library gives the same answers as the command line, loses nothing in tables, and reports wrong arguments."""
 
 import io
 import json
@@ -27,40 +27,40 @@ from tests.command import (
     MATSUM,
     ROLLOVER,
     ROOT,
-    answer,
     put,
     run,
     run as run_command,
+    run_json,
 )
-from tests.energies import sure
+from tests.energies import require
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 TD = "0.0687534"
 loose: Any = d2  # for what a type checker would not let pass
 
 
-def same(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
-    """Hold two documents against each other, but for the command that asked for them."""
+def assert_same_document(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
+    """Compare two documents, except for the command that asked for them."""
     assert {**mine, "command": None} == {**theirs, "command": None}
 
 
-def holds(
+def assert_frame_holds(
     frame: pd.DataFrame, rows: Sequence[Mapping[str, Any]], *, but: Collection[str] = ()
 ) -> None:
-    """Ask for every value of the rows of a document, bit for bit, NaN where it is null."""
+    """Check that a frame has every value of the rows of a document bit for bit, NaN for null."""
     assert len(frame) == len(rows) > 0
-    for told, expected in zip(frame.to_dict("records"), rows, strict=True):
+    for shown_row, expected in zip(frame.to_dict("records"), rows, strict=True):
         for key in expected.keys() - {*but}:
             assert (
-                pd.isna(told[key])
+                pd.isna(shown_row[key])
                 if expected[key] is None
-                else told[key] == expected[key]
+                else shown_row[key] == expected[key]
             ), key
 
 
 @st.composite
 def records(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
-    """Energies of a damped oscillator after a load, with or without noise: some are described, some are not."""
+    """Draw the energy of a damped oscillator after a load, with or without noise; d2rpick can describe only some."""
     states, periods = draw(st.integers(30, 200)), draw(st.floats(0.5, 12))
     noise, damping = draw(st.sampled_from([0.0, 0.0, 0.01, 0.5])), draw(st.floats(0, 3))
     time = np.linspace(0, 1, states)
@@ -88,19 +88,21 @@ def test_the_library_and_the_command_line_say_the_same(
         file, index=False
     )
     run = d2.read(file)
-    found, verdict = d2.suggest(run, td), d2.verify(run, tr, td, margin=0.01)
-    same(found.to_dict(), answer("suggest", "--td", repr(td), str(file)))
-    if found.candidates:
-        holds(found.to_frame(), found.to_dict()["candidates"])
-    assert found.to_frame().attrs["basis"] == found.basis
+    suggestion, verdict = d2.suggest(run, td), d2.verify(run, tr, td, margin=0.01)
+    assert_same_document(
+        suggestion.to_dict(), run_json("suggest", "--td", repr(td), str(file))
+    )
+    if suggestion.candidates:
+        assert_frame_holds(suggestion.to_frame(), suggestion.to_dict()["candidates"])
+    assert suggestion.to_frame().attrs["basis"] == suggestion.basis
     measures = {"energy_td", "kinetic_share", *MEASURES, "verified", "tr_ok", "td_ok"}
-    holds(
+    assert_frame_holds(
         verdict.to_frame(),
         [{key: value for key, value in verdict.to_dict().items() if key in measures}],
     )
-    same(
+    assert_same_document(
         verdict.to_dict(),
-        answer(
+        run_json(
             "verify", "--tr", repr(tr), "--td", repr(td), "--margin", "0.01", str(file)
         ),
     )
@@ -124,9 +126,10 @@ def test_the_library_and_the_command_line_say_the_same(
 def test_arguments_mean_what_options_mean(
     arguments: dict[str, Any], options: tuple[str, ...]
 ) -> None:
-    found = d2.suggest(d2.read(BOX), td=0.37, replay=False, **arguments)
-    same(
-        found.to_dict(), answer("suggest", "--td", "0.37", "--no-verify", *options, BOX)
+    suggestion = d2.suggest(d2.read(BOX), td=0.37, replay=False, **arguments)
+    assert_same_document(
+        suggestion.to_dict(),
+        run_json("suggest", "--td", "0.37", "--no-verify", *options, BOX),
     )
 
 
@@ -154,17 +157,17 @@ def test_a_deck_means_what_it_means_on_the_command_line(
     run, by_deck = d2.read(BOX), {"deck": SAMPLE_DECK, "replay": False, **arguments}
     cost = ("--no-verify", "--deck", str(SAMPLE_DECK), *options, BOX)
     chosen = d2.suggest(run, td=0.37, **by_deck)
-    same(chosen.to_dict(), answer("suggest", "--td", "0.37", *cost))
-    same(
+    assert_same_document(chosen.to_dict(), run_json("suggest", "--td", "0.37", *cost))
+    assert_same_document(
         d2.verify(run, 0.1, 0.37, **by_deck).to_dict(),
-        answer("verify", "--tr", "0.1", "--td", "0.37", *cost),
+        run_json("verify", "--tr", "0.1", "--td", "0.37", *cost),
     )
     planned = d2.plan(run, **by_deck)
-    same(planned.to_dict(), answer("plan", *cost))
-    for found in (
+    assert_same_document(planned.to_dict(), run_json("plan", *cost))
+    for suggestion in (
         (chosen, planned) if arguments in ({}, {"parts": "recommended"}) else ()
     ):
-        same(found.to_dict(), answer(*found.command))
+        assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
     assert (planned.to_dict()["run_time_share"] is None) == (not arguments)
 
 
@@ -180,75 +183,88 @@ def test_weights_in_memory_count_as_those_of_a_file() -> None:
         )
         for weights in ({"BT": 1.0, "QBAT": 0.1}, {"BT": 1.0, "QBAT": 10.0})
     )
-    found = [one.to_frame()["run_time_share"].min() for one in (cheap, dear)]
-    assert found[0] < found[1]  # the other part keeps what it costs
+    shares = [
+        part_table.to_frame()["run_time_share"].min() for part_table in (cheap, dear)
+    ]
+    assert shares[0] < shares[1]  # the other part keeps what it costs
 
 
 @pytest.mark.slow
 def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_are_saved_in(
     tmp_path: Path,
 ) -> None:
-    found = d2.calibrate("sample_data/flying_box")
-    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
-    assert found.to_frame()["weight"].tolist() == [*found.weights.per_element.values()]
-    file = found.save(tmp_path / "site.toml")
+    calibration = d2.calibrate("sample_data/flying_box")
+    assert calibration.to_dict() == run_json(*calibration.command) | {
+        "command": list(calibration.command)
+    }
+    assert calibration.to_frame()["weight"].tolist() == [
+        *calibration.weights.per_element.values()
+    ]
+    file = calibration.save(tmp_path / "site.toml")
     assert (
         file.read_text("utf-8")
         == run("calibrate", "-f", "toml", "sample_data/flying_box").stdout
     )
-    read = d2.parts(d2.read(BOX), deck=SAMPLE_DECK, weights=file).to_dict()["weights"]
-    assert read["per_element"] == pytest.approx(
-        found.weights.per_element, rel=1e-5
+    part_table = d2.parts(d2.read(BOX), deck=SAMPLE_DECK, weights=file).to_dict()[
+        "weights"
+    ]
+    assert part_table["per_element"] == pytest.approx(
+        calibration.weights.per_element, rel=1e-5
     )  # the file has six digits
-    assert read["element_share"] == pytest.approx(found.weights.element_share, rel=1e-5)
+    assert part_table["element_share"] == pytest.approx(
+        calibration.weights.element_share, rel=1e-5
+    )
 
 
 def test_a_folder_that_begins_with_a_dash_is_calibrated_by_the_command_too(
     here: Path,
 ) -> None:
     shutil.copytree(ROOT / "sample_data/flying_box", here / "-box")
-    found = d2.calibrate("-box")
-    name, *words = found.command
+    calibration = d2.calibrate("-box")
+    name, *words = calibration.command
     repeated = json.loads(run(name, "-f", "json", *words).stdout)
-    assert repeated["per_element"] == found.to_dict()["per_element"]
+    assert repeated["per_element"] == calibration.to_dict()["per_element"]
 
 
 def test_the_command_of_an_answer_asks_the_same() -> None:
     oscillator = d2.Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50)
-    found = d2.suggest(
+    suggestion = d2.suggest(
         d2.read(ENERGY), td_window=(0.06, 0.07), oscillator=oscillator, v0=6.0
     )
-    same(found.to_dict(), answer(*found.command))
-    assert found.to_dict()["command"] == list(found.command)
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
+    assert suggestion.to_dict()["command"] == list(suggestion.command)
 
 
 @pytest.mark.slow
 def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
-    """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
+    """Lists are not cells: the shares of a part in each flight and the details of a td have tables of their own."""
     run = d2.read(BOX)
     plan, parts = (
         d2.plan(run, parts="box", replay=False, min_quality="poor"),
         d2.parts(run, deck=SAMPLE_DECK, replay=False),
     )
-    holds(plan.to_frame(), plan.to_dict()["windows"])
-    holds(parts.to_frame(), parts.to_dict()["parts"], but=["flights"])
-    holds(parts.sets_frame(), parts.to_dict()["sets"])
+    assert_frame_holds(plan.to_frame(), plan.to_dict()["windows"])
+    assert_frame_holds(parts.to_frame(), parts.to_dict()["parts"], but=["flights"])
+    assert_frame_holds(parts.sets_frame(), parts.to_dict()["sets"])
     study = d2.study([BOX, tmp_path / "absent"], td=0.37, replay=False)
-    holds(study.to_frame(), study.to_dict()["runs"])
+    assert_frame_holds(study.to_frame(), study.to_dict()["runs"])
     findings = d2.check(DECK, history=d2.read(GLSTAT))
-    holds(findings.to_frame(), findings.to_dict()["findings"])
+    assert_frame_holds(findings.to_frame(), findings.to_dict()["findings"])
     explored = d2.explore(run, parts="box", steps=4, replay=False)
     lists = ["quality_reasons", "acceptable_windows", "expected"]
-    holds(explored.to_frame(), explored.to_dict()["offers"], but=lists)
+    assert_frame_holds(explored.to_frame(), explored.to_dict()["offers"], but=lists)
 
 
 def test_a_table_of_a_run_holds_its_energies() -> None:
     run = d2.read(BOX)
-    every, box = run.to_frame(parts="all"), run.to_frame(parts="box")
-    assert [*every] == [part.title for part in run.parts]
-    assert every.index.name == "time"
-    assert (every.attrs["titles"][1], every.attrs["ids"]["box"]) == ("box", 1)
-    pd.testing.assert_series_equal(every["box"], box["box"])
+    whole_model, box = run.to_frame(parts="all"), run.to_frame(parts="box")
+    assert [*whole_model] == [part.title for part in run.parts]
+    assert whole_model.index.name == "time"
+    assert (whole_model.attrs["titles"][1], whole_model.attrs["ids"]["box"]) == (
+        "box",
+        1,
+    )
+    pd.testing.assert_series_equal(whole_model["box"], box["box"])
     history = d2.suggest(run, 0.37, parts="box", replay=False).situation.history
     assert history.energy == pytest.approx(box["box"].to_numpy())
 
@@ -278,7 +294,7 @@ def test_a_frame_is_the_file_it_would_be() -> None:
 
 
 @pytest.mark.parametrize(
-    "made",
+    "convert_table",
     [
         lambda table: table["internal_energy"],
         lambda table: table["internal_energy"].rename(None),
@@ -292,12 +308,12 @@ def test_a_frame_is_the_file_it_would_be() -> None:
     ],
 )
 def test_the_time_of_a_frame_is_what_is_named_so_and_timedeltas_are_seconds(
-    made: Callable[[Any], Any],
+    convert_table: Callable[[Any], Any],
 ) -> None:
     table = pd.read_csv(ENERGY, index_col="time").head(300)
-    found = d2.from_frame(made(table)).to_frame()
-    assert found.index.to_numpy() == pytest.approx(table.index.to_numpy(), abs=1e-9)
-    assert found["internal_energy"].tolist() == table["internal_energy"].tolist()
+    frame = d2.from_frame(convert_table(table)).to_frame()
+    assert frame.index.to_numpy() == pytest.approx(table.index.to_numpy(), abs=1e-9)
+    assert frame["internal_energy"].tolist() == table["internal_energy"].tolist()
 
 
 def test_an_index_is_the_time_where_its_name_is_given() -> None:
@@ -312,10 +328,10 @@ def test_numbers_of_rows_are_no_time(name: str | None) -> None:
     table = pd.DataFrame(
         {"internal_energy": [0.0, 4.0, 1.0], "box": [0.0, 4.0, 1.0]}
     ).rename_axis(name)
-    named = "no name" if name is None else f"the name '{name}'"
+    shown_name = "no name" if name is None else f"the name '{name}'"
     with pytest.raises(
         ValueError,
-        match=f"no time: its index has {named}, its columns are 'internal_energy', 'box'",
+        match=f"no time: its index has {shown_name}, its columns are 'internal_energy', 'box'",
     ):
         d2.from_frame(table)
     with pytest.raises(ValueError, match="frame has no time 'tau'"):
@@ -324,31 +340,33 @@ def test_numbers_of_rows_are_no_time(name: str | None) -> None:
 
 def test_the_recommended_pair_is_no_better_pair() -> None:
     chosen, bad = (
-        d2.suggest(d2.read(ENERGY), **asked)
-        for asked in ({"td_window": (0.06, 0.07)}, {"td": 0.064})
+        d2.suggest(d2.read(ENERGY), **arguments)
+        for arguments in ({"td_window": (0.06, 0.07)}, {"td": 0.064})
     )
     assert chosen.better_pair is None
-    assert sure(bad.better_pair).td == pytest.approx(sure(chosen.recommended).td)
+    assert require(bad.better_pair).td == pytest.approx(require(chosen.recommended).td)
     assert "no-better-td" not in [warning.code for warning in chosen.warnings]
 
 
 def test_an_open_file_is_read() -> None:
     with Path(ENERGY).open("rb") as file:
-        same(
+        assert_same_document(
             d2.suggest(d2.read(file), 0.064).to_dict(),
-            answer("suggest", "--td", "0.064", ENERGY),
+            run_json("suggest", "--td", "0.064", ENERGY),
         )
     with pytest.raises(TypeError, match="opened as text"):
         loose.read(io.StringIO("time,energy\n"))
 
 
 def test_pictures_and_pages(tmp_path: Path) -> None:
-    found = d2.suggest(d2.read(ENERGY), float(TD))
-    assert found.plot().axes
-    page = found.report(tmp_path / "choice.html").read_text("utf-8")
+    suggestion = d2.suggest(d2.read(ENERGY), float(TD))
+    assert suggestion.plot().axes
+    page = suggestion.report(tmp_path / "choice.html").read_text("utf-8")
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
-    verdict = d2.verify(d2.read(ENERGY), tr=sure(found.recommended).tr, td=float(TD))
+    verdict = d2.verify(
+        d2.read(ENERGY), tr=require(suggestion.recommended).tr, td=float(TD)
+    )
     assert verdict.plot().axes
     assert '<span class="badge use">use</span>' in verdict.report(
         str(tmp_path / "verdict.html")
@@ -356,10 +374,10 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
 
 
 def test_the_command_of_a_study_runs_whatever_was_asked() -> None:
-    found = loose.study(
+    study_answer = loose.study(
         [ENERGY], td=0.0687534, tolerance=0.1, cost_share=0.8, step_ratio=2.0
     )
-    same(found.to_dict(), answer(*found.command))
+    assert_same_document(study_answer.to_dict(), run_json(*study_answer.command))
 
 
 def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(
@@ -369,11 +387,11 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(
     names = {"momentum_x": "a7", "momentum_z": "a8"}
     table.rename(columns=names).to_csv(tmp_path / "run.csv", index=False)
     channels = {"x_momentum": "a7", "z_momentum": "a8"}
-    found = d2.suggest(d2.read(tmp_path / "run.csv", channels=channels), td=0.37)
-    assert found.flight.source == "momentum"
-    same(found.to_dict(), answer(*found.command))
+    suggestion = d2.suggest(d2.read(tmp_path / "run.csv", channels=channels), td=0.37)
+    assert suggestion.flight.source == "momentum"
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
     assert (
-        found.to_frame()["tr"].tolist()
+        suggestion.to_frame()["tr"].tolist()
         == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
     )
 
@@ -393,43 +411,52 @@ def test_the_format_that_was_named_is_in_the_command_that_repeats_it(
         d2.explore(run, steps=2),
         d2.plan(run),
     ]
-    for found in (
+    for library_answer in (
         *answers,
         d2.study([file], td, **reading),
         d2.check(DECK, history=run),
     ):
-        same(found.to_dict(), answer(*found.command))
+        assert_same_document(
+            library_answer.to_dict(), run_json(*library_answer.command)
+        )
     assert "--input-format" not in d2.suggest(d2.read(ENERGY), td).command
 
 
-@pytest.mark.parametrize("asked", [d2.suggest, d2.explore, d2.plan])
-def test_answers_can_be_copied(asked: Callable[..., Any]) -> None:
-    found = asked(d2.read(ENERGY))
-    same(deepcopy(found).to_dict(), found.to_dict())
+@pytest.mark.parametrize("ask", [d2.suggest, d2.explore, d2.plan])
+def test_answers_can_be_copied(ask: Callable[..., Any]) -> None:
+    library_answer = ask(d2.read(ENERGY))
+    assert_same_document(deepcopy(library_answer).to_dict(), library_answer.to_dict())
 
 
 def test_a_verdict_goes_to_another_process() -> None:
-    found = d2.verify(d2.read(ENERGY), tr=0.0135867, td=0.0687534)
-    same(pickle.loads(pickle.dumps(found)).to_dict(), found.to_dict())
+    verdict = d2.verify(d2.read(ENERGY), tr=0.0135867, td=0.0687534)
+    assert_same_document(
+        pickle.loads(pickle.dumps(verdict)).to_dict(), verdict.to_dict()
+    )
 
 
 def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:
-    found = d2.suggest(
+    suggestion = d2.suggest(
         d2.read(ENERGY), np.float64(TD), margin=np.float64(0.001), tolerance=1
     )
-    same(found.to_dict(), answer(*found.command))
+    assert_same_document(suggestion.to_dict(), run_json(*suggestion.command))
 
 
 @pytest.mark.parametrize(
-    "asked", [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}]
+    "arguments",
+    [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}],
 )
-def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> None:
-    found = d2.check(DECK, history=d2.read(ENERGY, energy="internal_energy"), **asked)
-    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
-    kept = [
-        rule for rule in ("D2R202", "D2R203") if rule not in asked.get("ignore", ())
+def test_a_check_names_the_command_that_repeats_it(arguments: dict[str, Any]) -> None:
+    check_report = d2.check(
+        DECK, history=d2.read(ENERGY, energy="internal_energy"), **arguments
+    )
+    assert check_report.to_dict() == run_json(*check_report.command) | {
+        "command": list(check_report.command)
+    }
+    kept_rules = [
+        rule for rule in ("D2R202", "D2R203") if rule not in arguments.get("ignore", ())
     ]
-    assert found.to_frame()["rule"].tolist() == kept
+    assert check_report.to_frame()["rule"].tolist() == kept_rules
 
 
 def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
@@ -458,18 +485,18 @@ def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
     )
     study = d2.study([ENERGY] * 20 + ["<b>absent.csv"], 0.064)
     answers: list[Any] = [chosen, plan, parts, explored, verdict, study]
-    for one in (run, *answers):
-        shown = one._repr_html_()
+    for library_answer in (run, *answers):
+        shown_html = library_answer._repr_html_()
         ET.fromstring(
-            shown.replace("&nbsp;", " ")
+            shown_html.replace("&nbsp;", " ")
         )  # whole, with nothing of a file unescaped
-        assert "<svg" in shown
-        assert 0 < shown.count("<tr>") <= 13
-        assert len(repr(one)) < 250
-        assert "\n" not in repr(one)
+        assert "<svg" in shown_html
+        assert 0 < shown_html.count("<tr>") <= 13
+        assert len(repr(library_answer)) < 250
+        assert "\n" not in repr(library_answer)
     assert repr(plan) == f"Plan({plan_sentence(plan)})"
     assert plan_sentence(plan) in plan._repr_html_()
-    assert f"tr = {sure(chosen.recommended).tr:.6g}" in repr(chosen)
+    assert f"tr = {require(chosen.recommended).tr:.6g}" in repr(chosen)
     assert "... and 9 more" in study._repr_html_()
     assert verdict.reasons[0] in verdict._repr_html_().replace("&gt;", ">")
 
@@ -478,9 +505,9 @@ def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(
     tmp_path: Path,
 ) -> None:
     file = put(tmp_path / "run.csv", "time,a,b\n0,0,1\n1,0,1\n")
-    shown = loose.read(file)._repr_html_()
-    assert "a, b" in shown
-    assert "<svg" not in shown
+    shown_html = loose.read(file)._repr_html_()
+    assert "a, b" in shown_html
+    assert "<svg" not in shown_html
     assert "<svg" not in d2.parts(loose.read(file))._repr_html_()
 
 
@@ -504,10 +531,10 @@ def test_cards_are_those_of_the_command_line() -> None:
         "card",
         MATSUM,
     )
-    for one in (chosen, plan):
-        found, (name, *words) = one.card(**ids), one.command
-        assert str(found) == run_command(name, *words[:-1], *options).stdout
-        assert sure(found).verified
+    for library_answer in (chosen, plan):
+        card, (name, *words) = library_answer.card(**ids), library_answer.command
+        assert str(card) == run_command(name, *words[:-1], *options).stdout
+        assert require(card).verified
     times = ["--tr", "0.1", "--td", "0.37", "--part", "box"]
     alone = d2.card([(0.1, 0.37)], run=run, parts="box", margin=0.001)
     assert (
@@ -535,9 +562,9 @@ def test_cards_are_those_of_the_command_line() -> None:
 
 
 def test_no_pair_is_no_card() -> None:
-    found = d2.suggest(d2.read(MATSUM), 0.41, parts=1, replay=False)
-    assert found.recommended is None
-    assert found.card() is None
+    suggestion = d2.suggest(d2.read(MATSUM), 0.41, parts=1, replay=False)
+    assert suggestion.recommended is None
+    assert suggestion.card() is None
 
 
 @pytest.mark.parametrize(

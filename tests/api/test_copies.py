@@ -1,4 +1,4 @@
-"""Runs and answers can be copied, compared and sent to other processes; values of numpy and None go everywhere."""
+"""Runs and answers can be copied, compared and sent to other processes; numpy values and None work everywhere."""
 
 import copy
 import pickle
@@ -46,7 +46,7 @@ def test_a_copy_is_equal(name: str) -> None:
         copy.deepcopy(answer),
         copy.copy(answer),
     )
-    assert [one == answer for one in copies] == [True] * 3
+    assert [copied == answer for copied in copies] == [True] * 3
     assert len({answer, *copies}) == 1
     assert answer != ANSWERS["run" if name != "run" else "check"]()
 
@@ -71,7 +71,7 @@ def test_runs_and_answers_go_to_other_processes() -> None:
         assert list(pool.map(ask, runs)) == [ask(run) for run in runs]
 
 
-def big(tmp_path: Path) -> Path:
+def write_big_table(tmp_path: Path) -> Path:
     rows = "".join(f"{i / 1000:.6f},{i % 7}\n" for i in range(1_500_000))
     return Path(put(tmp_path / "big.csv", f"time,internal_energy\n{rows}"))
 
@@ -80,7 +80,7 @@ def big(tmp_path: Path) -> Path:
 def test_a_copy_of_a_big_file_opens_it_again_unless_it_was_changed(
     tmp_path: Path,
 ) -> None:
-    file = big(tmp_path)
+    file = write_big_table(tmp_path)
     run = d2.read(file)
     assert isinstance(run.files.files[0].data, OnDisk)
     pickled = pickle.dumps(run)
@@ -210,13 +210,13 @@ def test_none_is_the_default_everywhere() -> None:
 
 @pytest.mark.slow
 def test_a_study_needs_no_td() -> None:
-    found = d2.study([ENERGY], replay=False)
+    study_answer = d2.study([ENERGY], replay=False)
     alone = d2.suggest(d2.read(ENERGY), replay=False)
     assert alone.recommended is not None
-    assert (found.td, found.td_window) == (None, None)
-    assert (found.runs[0].tr, found.runs[0].td) == (
+    assert (study_answer.td, study_answer.td_window) == (None, None)
+    assert (study_answer.runs[0].tr, study_answer.runs[0].td) == (
         alone.recommended.tr,
         alone.recommended.td,
     )
-    assert found.command == ("study", "--no-verify", ENERGY)
-    assert "longest flight" in repr(found) + str(found._repr_html_())
+    assert study_answer.command == ("study", "--no-verify", ENERGY)
+    assert "longest flight" in repr(study_answer) + str(study_answer._repr_html_())

@@ -1,4 +1,4 @@
-"""What a ledger gives back is what was put in, unless files, options or version have changed; cut lines are no harm."""
+"""A ledger returns the rows that were stored, unless files, options or version have changed; cut lines are skipped."""
 
 import json
 import os
@@ -20,17 +20,21 @@ from tests.command import put
 QUESTION = Question(variants.TD, Settings())
 
 
-def values(row: StudyRow | None) -> dict[str, object]:
-    """All of a row as plain values."""
+def list_values(row: StudyRow | None) -> dict[str, object]:
+    """Return all fields of a row as plain values."""
     assert row is not None
-    found = {name: getattr(row, name) for name in row.__dataclass_fields__}
+    field_values = {name: getattr(row, name) for name in row.__dataclass_fields__}
     for name in ("acceptable", "alike", "profile", "curve"):
-        found[name] = None if found[name] is None else found[name].tolist()
-    return found
+        field_values[name] = (
+            None if field_values[name] is None else field_values[name].tolist()
+        )
+    return field_values
 
 
-def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, StudyRow]:
-    """A run, the ledger that holds it, and its row."""
+def keep_run_in_ledger(
+    folder: Path, question: Question = QUESTION
+) -> tuple[str, str, StudyRow]:
+    """Return a run, the ledger that contains it, and its row."""
     name, ledger = variants.write(folder / "run.csv"), str(folder / "ledger.ndjson")
     row = ask(question, name)
     Ledger(ledger, question).add(row)
@@ -40,16 +44,16 @@ def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, StudyRo
 @pytest.mark.parametrize("curve", [False, True])
 def test_a_row_comes_back_to_the_last_digit(tmp_path: Path, curve: bool) -> None:
     question = replace(QUESTION, curve=curve)
-    name, ledger, row = kept(tmp_path, question)
+    name, ledger, row = keep_run_in_ledger(tmp_path, question)
     again = Ledger(ledger, question)
-    assert values(again.find(name)) == values(row)
+    assert list_values(again.find(name)) == list_values(row)
     assert again.told(1) == f"1 of 1 runs reused from {ledger}"
 
 
 def test_a_row_is_found_under_another_name_of_its_file(here: Path) -> None:
-    _, ledger, row = kept(here)
-    assert values(Ledger(ledger, QUESTION).find("./run.csv")) == {
-        **values(row),
+    _, ledger, row = keep_run_in_ledger(here)
+    assert list_values(Ledger(ledger, QUESTION).find("./run.csv")) == {
+        **list_values(row),
         "source": "./run.csv",
     }
 
@@ -68,7 +72,7 @@ def test_a_row_is_found_under_another_name_of_its_file(here: Path) -> None:
 def test_a_row_of_another_question_is_not_taken(
     tmp_path: Path, question: Question
 ) -> None:
-    name, ledger, _ = kept(tmp_path)
+    name, ledger, _ = keep_run_in_ledger(tmp_path)
     again = Ledger(ledger, question)
     assert again.find(name) is None
     assert again.told(1).endswith(
@@ -79,8 +83,8 @@ def test_a_row_of_another_question_is_not_taken(
 def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> None:
     question = replace(QUESTION, curve=True)
     assert fingerprint(question) == fingerprint(QUESTION)
-    name, ledger, _ = kept(tmp_path, question)
-    assert values(Ledger(ledger, QUESTION).find(name))["curve"] is None
+    name, ledger, _ = keep_run_in_ledger(tmp_path, question)
+    assert list_values(Ledger(ledger, QUESTION).find(name))["curve"] is None
 
 
 @pytest.mark.parametrize("change", ["touched", "longer", "gone", "more files"])
@@ -118,22 +122,25 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     assert not Path(ledger.name).exists()  # the first row makes it
     short = variants.write(tmp_path / "short.csv", end=0.05)
     ledger.add(ask(QUESTION, short))
-    assert values(Ledger(ledger.name, QUESTION).find(short))["status"] == "out-of-range"
+    assert (
+        list_values(Ledger(ledger.name, QUESTION).find(short))["status"]
+        == "out-of-range"
+    )
 
 
 def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(
     tmp_path: Path,
 ) -> None:
-    name, ledger, row = kept(tmp_path)
+    name, ledger, row = keep_run_in_ledger(tmp_path)
     whole = Path(ledger).read_bytes()
-    other = variants.write(tmp_path / "other.csv", variants.variant(1.01))
-    next_row = ask(QUESTION, other)
+    other_file = variants.write(tmp_path / "other.csv", variants.make_variant(1.01))
+    next_row = ask(QUESTION, other_file)
     for cut in range(0, len(whole) - 1, 97):
         Path(ledger).write_bytes(whole + whole[:cut])
         Ledger(ledger, QUESTION).add(next_row)
         again = Ledger(ledger, QUESTION)
-        assert values(again.find(name)) == values(row)
-        assert values(again.find(other)) == values(next_row)
+        assert list_values(again.find(name)) == list_values(row)
+        assert list_values(again.find(other_file)) == list_values(next_row)
 
 
 @pytest.mark.parametrize(
@@ -159,6 +166,6 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
 
 def test_a_line_is_json_with_the_windows_of_the_row(tmp_path: Path) -> None:
     row = ask(QUESTION, variants.write(tmp_path / "run.csv"))
-    found = json.loads(line(row, "asked"))
-    assert found["acceptable"] == [row.acceptable.tolist(), row.alike.tolist()]
-    assert np.array(found["acceptable"][0]).size
+    row_document = json.loads(line(row, "asked"))
+    assert row_document["acceptable"] == [row.acceptable.tolist(), row.alike.tolist()]
+    assert np.array(row_document["acceptable"][0]).size

@@ -1,4 +1,4 @@
-"""``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
+"""``import d2rpick`` is fast, offers every public name, and its types are correct for users."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.api.arguments import Choosing
 from tests.command import ENERGY, ROOT
-from tests.examples import PAGES, text_of
+from tests.examples import PAGES, read_page
 
 
 @pytest.mark.parametrize("name", d2.__all__)
@@ -34,20 +34,25 @@ def test_the_public_names_are_all_that_is_shown() -> None:
 
 
 def test_what_the_docs_call_public_is_there_and_every_function_is_in_the_docs() -> None:
-    named = {
+    documented_names = {
         name
         for page in PAGES
-        for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", text_of(page))
+        for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", read_page(page))
     }
-    assert named <= {*d2.__all__}
-    assert {name for name in d2.__all__ if isfunction(getattr(d2, name))} <= named
+    assert documented_names <= {*d2.__all__}
+    assert {
+        name for name in d2.__all__ if isfunction(getattr(d2, name))
+    } <= documented_names
 
 
 def test_what_a_function_takes_can_be_made_by_public_names() -> None:
-    """Every class of this package that an argument may be; the others are of python or stand for several."""
+    """Every class of this package that is an argument type must be public; other names are Python's or aliases."""
     hints = [*Choosing.__annotations__.values()]
     for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
-        hints += [one.annotation for one in signature(function).parameters.values()]
+        hints += [
+            parameter.annotation
+            for parameter in signature(function).parameters.values()
+        ]
     words = {
         word
         for hint in hints
@@ -55,7 +60,7 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
             r"(?<!\.)\b[A-Z]\w+", getattr(hint, "__forward_arg__", hint)
         )
     }
-    others = {
+    private_types = {
         "IO",
         "Choosing",
         "Judging",
@@ -66,19 +71,19 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
         "Path",
         "Unpack",
     }
-    assert words - others <= {*d2.__all__}
+    assert words - private_types <= {*d2.__all__}
     assert {"Weights", "Oscillator", "Run"} <= words
 
 
 def test_the_stub_gives_editors_every_public_name_and_no_other() -> None:
-    """Static tools follow no names that are imported when they are first used."""
+    """Static tools cannot follow names that are imported on first use."""
     tree = ast.parse((ROOT / "d2rpick/__init__.pyi").read_text("utf-8"))
     imported = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
-    assert {one.asname for node in imported for one in node.names} == {*d2.__all__}
+    assert {name.asname for node in imported for name in node.names} == {*d2.__all__}
     for node in imported:
         module = import_module(node.module or "")
-        for one in node.names:
-            assert getattr(module, one.name) is getattr(d2, one.name)
+        for name in node.names:
+            assert getattr(module, name.name) is getattr(d2, name.name)
 
 
 def test_other_names_are_not() -> None:
@@ -87,7 +92,7 @@ def test_other_names_are_not() -> None:
 
 
 def test_types_hold_for_a_stranger() -> None:
-    """What mypy is asked here it is asked without knowing more than a user does."""
+    """mypy checks the types here with the knowledge of a user only."""
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
     assert_type(answer, d2.Suggestion)
     assert_type(answer.to_frame(), pd.DataFrame)

@@ -1,4 +1,4 @@
-"""One table of what can be asked: it contradicts nothing, and is written as it is typed."""
+"""One table of all arguments: it contradicts nothing, and is printed as a user types it."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
 
 
 @pytest.mark.parametrize(
-    ("asked", "typed"),
+    ("arguments", "typed"),
     [
         (
             {"tolerance": 0.1, "part": ("3", "roof")},
@@ -34,12 +34,14 @@ ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
         ({"history": ("a.csv",)}, []),
     ],
 )
-def test_what_is_asked_is_typed_again(asked: dict[str, Any], typed: list[str]) -> None:
-    assert [*Request(**asked).asking()] == typed
+def test_what_is_asked_is_typed_again(
+    arguments: dict[str, Any], typed: list[str]
+) -> None:
+    assert [*Request(**arguments).asking()] == typed
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("arguments", "message"),
     [
         (ONE | {"v0": None}, "`stiffness` needs `v0`"),
         (ONE | {"beta": None}, "either `frame_mass` or `beta`"),
@@ -49,9 +51,11 @@ def test_what_is_asked_is_typed_again(asked: dict[str, Any], typed: list[str]) -
         ({"step_ratio": 2.0}, "`step_ratio` needs `cost_share` or `deck`"),
     ],
 )
-def test_what_contradicts_itself_is_refused(asked: dict[str, Any], told: str) -> None:
-    with pytest.raises(ArgumentError, match=told):
-        Request(**asked)
+def test_what_contradicts_itself_is_refused(
+    arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        Request(**arguments)
 
 
 def test_every_keyword_of_python_is_an_option() -> None:

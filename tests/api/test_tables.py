@@ -1,4 +1,4 @@
-"""Tables of other libraries: as they are where these are installed, and by what they offer where they are not."""
+"""Tables of other libraries: real ones if the libraries are installed, otherwise stand-ins with the same interface."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,22 +17,22 @@ FRAME = pd.DataFrame(
 loose: Any = d2
 
 
-def polars(frame: pd.DataFrame) -> Any:
+def convert_to_polars(frame: pd.DataFrame) -> Any:
     library: Any = pytest.importorskip("polars")
     return library.DataFrame({name: frame[name].to_numpy() for name in frame})
 
 
-def arrow(frame: pd.DataFrame) -> Any:
+def convert_to_arrow(frame: pd.DataFrame) -> Any:
     library: Any = pytest.importorskip("pyarrow")
     return library.table({name: frame[name].to_numpy() for name in frame})
 
 
-def dataset(frame: pd.DataFrame) -> Any:
+def convert_to_dataset(frame: pd.DataFrame) -> Any:
     library: Any = pytest.importorskip("xarray")
     return library.Dataset.from_dataframe(frame.set_index("time"))
 
 
-def data_array(frame: pd.DataFrame) -> Any:
+def convert_to_data_array(frame: pd.DataFrame) -> Any:
     library: Any = pytest.importorskip("xarray")
     return library.DataArray(
         frame["internal_energy"].to_numpy(), coords={"time": TIME}, dims="time"
@@ -40,7 +40,7 @@ def data_array(frame: pd.DataFrame) -> Any:
 
 
 class Polars:
-    """What a frame of polars offers."""
+    """Stand-in with the interface of a polars frame."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame, self.columns = frame, list(frame)
@@ -50,7 +50,7 @@ class Polars:
 
 
 class Lazy:
-    """What a lazy frame of polars offers; its columns are not known for nothing."""
+    """Stand-in with the interface of a polars lazy frame, whose columns are expensive to find."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -64,7 +64,7 @@ class Lazy:
 
 
 class Arrow:
-    """What a table of pyarrow offers."""
+    """Stand-in with the interface of a pyarrow table."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -74,7 +74,7 @@ class Arrow:
 
 
 class Dataset:
-    """What a dataset of xarray offers."""
+    """Stand-in with the interface of an xarray dataset."""
 
     def __init__(self, frame: pd.DataFrame) -> None:
         self._frame = frame
@@ -84,7 +84,7 @@ class Dataset:
 
 
 class DataArray:
-    """What an array of xarray offers."""
+    """Stand-in with the interface of an xarray array."""
 
     name = None
 
@@ -104,7 +104,13 @@ MADE: dict[str, Callable[[pd.DataFrame], Any]] = {
     "records of numpy": lambda frame: frame.to_records(index=False),
     "rows and columns": lambda frame: frame[["time", "internal_energy"]].to_numpy(),
     **{
-        function.__name__: function for function in (polars, arrow, dataset, data_array)
+        function.__name__: function
+        for function in (
+            convert_to_polars,
+            convert_to_arrow,
+            convert_to_dataset,
+            convert_to_data_array,
+        )
     },
     **{kind.__name__: kind for kind in (Polars, Lazy, Arrow, Dataset, DataArray)},
 }
@@ -113,9 +119,9 @@ MADE: dict[str, Callable[[pd.DataFrame], Any]] = {
 @pytest.mark.parametrize("name", MADE)
 def test_a_table_of_any_library_is_taken_and_read_says_what_to_call(name: str) -> None:
     table = MADE[name](FRAME)
-    found = d2.from_frame(table).to_frame()
-    np.testing.assert_array_equal(found.index, TIME)
-    np.testing.assert_array_equal(found["internal_energy"], ENERGY)
+    frame = d2.from_frame(table).to_frame()
+    np.testing.assert_array_equal(frame.index, TIME)
+    np.testing.assert_array_equal(frame["internal_energy"], ENERGY)
     if not isinstance(table, Lazy):
         with pytest.raises(
             TypeError,
@@ -125,9 +131,9 @@ def test_a_table_of_any_library_is_taken_and_read_says_what_to_call(name: str) -
 
 
 def test_columns_without_names_are_named_by_number() -> None:
-    found = d2.from_frame(FRAME.to_numpy(), energy=2, channels={"kinetic_energy": 3})
-    np.testing.assert_array_equal(found.to_frame()["internal_energy"], ENERGY)
-    assert found.files.databases[0].quantities == {"kinetic_energy": "column 3"}
+    frame = d2.from_frame(FRAME.to_numpy(), energy=2, channels={"kinetic_energy": 3})
+    np.testing.assert_array_equal(frame.to_frame()["internal_energy"], ENERGY)
+    assert frame.files.databases[0].quantities == {"kinetic_energy": "column 3"}
     with pytest.raises(
         d2.FormatError, match="choose with `energy`: 2 'column 2', 3 'column 3'"
     ):

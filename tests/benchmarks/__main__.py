@@ -1,8 +1,8 @@
-"""Ratios that the project promises, measured on this machine: ``python -m tests.benchmarks``.
+"""Measure the ratios that the project promises on this machine: ``python -m tests.benchmarks``.
 
-``python -m tests.benchmarks noise window`` measures only the rows whose names hold one of the words.
-What is compared takes turns, and medians are divided; results are checked before they are timed.  Rows without
-a goal say how much a condition of the measurement matters.  Exit code 1 when a goal is missed.
+``python -m tests.benchmarks noise window`` measures only rows whose names contain one of the words.  Compared calls
+take turns, and medians are divided; results are checked before they are timed.  Rows without a goal show how much a
+condition of the measurement matters.  The exit code is 1 if a goal is missed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from importlib import import_module
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from tests.benchmarks.timing import ROOT, processor_seconds, ratio
+from tests.benchmarks.timing import ROOT, measure_processor_seconds, measure_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,12 +35,12 @@ _ROUNDS = 5
 def process_ratio(
     libraries: str, *args: str, env: Mapping[str, str] | None = None
 ) -> float:
-    """Processor time of a command over that of a process that only imports what it cannot do without."""
-    own = (THREADS, "PYTHONDONTWRITEBYTECODE")
+    """Return the processor time of a command over that of a process that only imports the required libraries."""
+    own_settings = (THREADS, "PYTHONDONTWRITEBYTECODE")
     clean = {
         name: value
         for name, value in os.environ.items()
-        if name not in own and not name.startswith("D2RPICK_")
+        if name not in own_settings and not name.startswith("D2RPICK_")
     }
 
     def process(*command: str) -> Callable[[], object]:
@@ -52,17 +52,22 @@ def process_ratio(
             env={**clean, **(env or {})},
         )
 
-    ours, least = process("-m", "d2rpick", *args), process("-c", f"import {libraries}")
+    ours, lower_bound = (
+        process("-m", "d2rpick", *args),
+        process("-c", f"import {libraries}"),
+    )
     with TemporaryDirectory() as compiled:
         clean["PYTHONPYCACHEPREFIX"] = (
             compiled  # an installed package is compiled; a working copy may not be
         )
-        ours(), least()
-        return ratio(ours, least, _PROCESSES, cost=processor_seconds)
+        ours(), lower_bound()
+        return measure_ratio(
+            ours, lower_bound, _PROCESSES, cost=measure_processor_seconds
+        )
 
 
 def integration_ratio(repeats: int) -> float:
-    """DOP853 at a relative tolerance of 1e-10 over the closed form: full states at a million points to 0.15 s."""
+    """Return the time of DOP853 (relative tolerance 1e-10) over that of the closed form, for 1e6 states to 0.15 s."""
     import numpy as np
     from scipy.integrate import solve_ivp
 
@@ -102,19 +107,19 @@ def integration_ratio(repeats: int) -> float:
         np.testing.assert_allclose(
             ours, theirs, rtol=0, atol=1e-9 * np.max(np.abs(theirs))
         )
-    return ratio(integrated, closed_form, _ROUNDS, repeats)
+    return measure_ratio(integrated, closed_form, _ROUNDS, repeats)
 
 
 def measured(
     module: str, name: str, *args: int | str | None
 ) -> Callable[[], float | None]:
-    """Give a measure of a module here, which is imported, and makes its files, when it is asked."""
+    """Return a measure of a benchmark module, which is imported and makes its files on the first call."""
 
     def measure() -> float | None:
-        found: float | None = getattr(
+        figure: float | None = getattr(
             import_module(f"tests.benchmarks.{module}"), name
         )(*args)
-        return found
+        return figure
 
     return measure
 
@@ -126,7 +131,7 @@ reading, choosing, deck, identification, study = (
 
 
 class Row(NamedTuple):
-    """A ratio to measure, and the most or the least it may be; the measure gives None where a library is missing."""
+    """Ratio to measure, with an upper or a lower limit; the measure returns None if a library is missing."""
 
     what: str
     measure: Callable[[], float | None]
@@ -524,25 +529,25 @@ ROWS = (
 
 
 def main() -> int:
-    """Print all ratios beside their goals, or those whose names hold a word that is given; tell which are missed."""
+    """Print all ratios and their goals, or those whose names contain a given word; return 1 if a goal is missed."""
     os.environ.setdefault(THREADS, "1")
     words = sys.argv[1:] or [""]
     print(f"{'ratio':<54}  measured  goal")
     missed = []
     for row in (row for row in ROWS if any(word in row.what for word in words)):
-        found = row.measure()
-        if found is None:
+        figure = row.measure()
+        if figure is None:
             print(f"{row.what:<54}  not installed")
             continue
         goal = (
             f"<= {row.most:g}" if row.most else f">= {row.least:g}" if row.least else ""
         )
-        met = (row.most is None or found <= row.most) and (
-            row.least is None or found >= row.least
+        met = (row.most is None or figure <= row.most) and (
+            row.least is None or figure >= row.least
         )
         missed += [row.what.strip()] * (not met)
         print(
-            f"{row.what:<54}  {found:8.2f}  {goal}{'' if met else '  missed'}".rstrip(),
+            f"{row.what:<54}  {figure:8.2f}  {goal}{'' if met else '  missed'}".rstrip(),
             flush=True,
         )
     print("goals missed: " + ("; ".join(missed) or "none"))

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class Chains(NamedTuple):
-    """n chains: masses (n, 3), springs and dampers between them (n, 2), and the force at which springs yield (n, 2).
+    """n chains: masses (n, 3), springs and dampers between them (n, 2), and the yield forces of the springs (n, 2).
 
-    They yield up to a time (n,) only: that of the end of the load, or later.
-    ``places`` and ``velocities`` (n, 3, 2) are those at the start.
+    Springs yield only up to a time (n,): the end of the load, or later.  ``places`` and ``velocities`` (n, 3, 2) are
+    the initial ones.
     """
 
     masses: Samples
@@ -34,33 +34,33 @@ class Chains(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One chain as files have it, and the impulse (states, 2) of all forces on it but gravity."""
+    """One chain as files store it, and the impulse (states, 2) of all forces on it except gravity."""
 
     written: Written
     impulse: Samples
 
 
-def integrated(
+def integrate_chains(
     chains: Chains, force: Force, weight: Force, end: float, states: int, steps: int
 ) -> Iterator[Run]:
-    """Integrate chains up to ``end`` under a force and their weight, with so many ``steps`` from state to state."""
+    """Integrate chains up to ``end`` under a force and their weight, with this number of ``steps`` between states."""
     mass, dt = chains.masses[..., np.newaxis], end / (states * steps)
     stiffness, damping = (
         chains.stiffness[..., np.newaxis],
         chains.damping[..., np.newaxis],
     )
     strength, count = chains.strength[..., np.newaxis], len(chains.masses)
-    places, velocities = chains.places.copy(), chains.velocities.copy()
-    yielded = np.diff(places, axis=1) * 0
+    positions, velocities = chains.places.copy(), chains.velocities.copy()
+    yielded = np.diff(positions, axis=1) * 0
     impulse, work = np.zeros((count, 2)), np.zeros(count)
     damped, hardened = np.zeros(count), np.zeros((count, 2))
     rows = []
     for step in range(states * steps + 1):
         outer, heavy = (
-            force(step * dt, places, velocities),
-            weight(step * dt, places, velocities),
+            force(step * dt, positions, velocities),
+            weight(step * dt, positions, velocities),
         )
-        stretch = np.diff(places, axis=1) - yielded
+        stretch = np.diff(positions, axis=1) - yielded
         pull = stiffness * stretch
         size = np.linalg.norm(pull, axis=2, keepdims=True)
         yields = (step * dt < chains.yields_until)[:, np.newaxis, np.newaxis]
@@ -96,10 +96,12 @@ def integrated(
         inner = np.diff(
             np.pad(pull + damping * rates, ((0, 0), (1, 1), (0, 0))), axis=1
         )
-        before = velocities
+        earlier_velocities = velocities
         velocities = velocities + dt * (inner + outer + heavy) / mass
-        work += dt * ((outer + heavy) * (before + velocities) / 2).sum(axis=(1, 2))
-        places = places + dt * velocities
+        work += dt * ((outer + heavy) * (earlier_velocities + velocities) / 2).sum(
+            axis=(1, 2)
+        )
+        positions = positions + dt * velocities
         impulse += dt * outer.sum(axis=1)
     columns = [np.stack(column, axis=1) for column in zip(*rows, strict=True)]
     time = np.linspace(0, end, states + 1)
@@ -114,18 +116,18 @@ def integrated(
         )
 
 
-def directions(random: np.random.Generator, count: int) -> Samples:
-    """Random directions (count, 2), every other one along x: there those of one chain have one line in common."""
+def draw_directions(random: np.random.Generator, count: int) -> Samples:
+    """Draw directions (count, 2); every other one is along x, so that its chain moves on one line."""
     angle = random.uniform(0, 2 * np.pi, count)
     angle[::2] = 0
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def half_sine(time: float, start: Samples, length: Samples) -> Samples:
-    """Half-sine from ``start`` (n,) on, so long; zero elsewhere."""
+def apply_half_sine(time: float, start: Samples, length: Samples) -> Samples:
+    """Return a half-sine pulse of this length from ``start`` (n,) on, zero elsewhere."""
     return np.asarray(np.sin(np.pi * np.clip((time - start) / length, 0, 1)))
 
 
-def on_first(forces: Samples) -> Samples:
-    """Forces (n, 2) at the first of three masses."""
+def apply_to_first(forces: Samples) -> Samples:
+    """Apply forces (n, 2) to the first of three masses."""
     return np.stack([forces, np.zeros_like(forces), np.zeros_like(forces)], axis=1)

@@ -1,7 +1,7 @@
-"""How long choosing takes on the records that engineers have: a structure that rings in many modes, with noise.
+"""Cost of choosing times for records of engineers: structures with many modes and noise.
 
-All records are made up, seeded and lie in a temporary folder.  What is compared takes turns; processor seconds of
-whole processes count, since other work on the machine stretches the wall clock.
+All records are synthetic, seeded, and in a temporary folder.  Compared calls take turns.  Times are processor times of
+whole processes, because other work on the machine changes the elapsed time.
 """
 
 from __future__ import annotations
@@ -18,9 +18,14 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table
 from tests.benchmarks.study import LOOP, write_runs
-from tests.benchmarks.timing import output, processor_seconds, ratio, seconds
+from tests.benchmarks.timing import (
+    measure_processor_seconds,
+    measure_ratio,
+    measure_seconds,
+    read_output,
+)
 from tests.records import MODE
-from tests.text_files import matsum_text
+from tests.text_files import make_matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -61,70 +66,78 @@ MATSUM = (
 
 
 def noisy_to_pandas() -> float:
-    """`suggest --td` of 1e5 noisy states over pandas, which reads that csv and does nothing else."""
-    file = str(_noisy(100_000))
-    found = json.loads(
-        output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file)
+    """Return the cost of `suggest --td` for 1e5 noisy states over that of pandas, which only reads the csv."""
+    file = str(_make_noisy_energy(100_000))
+    document = json.loads(
+        read_output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file)
     )
-    assert 10_000 < len(found["candidates"]) < 20_000, len(found["candidates"])
-    return _ratio(_suggest(file), ("-c", PANDAS, file))
+    assert 10_000 < len(document["candidates"]) < 20_000, len(document["candidates"])
+    return _compare_processes(_suggest(file), ("-c", PANDAS, file))
 
 
 def noisy_growth() -> float:
-    """`suggest --td` of 1e6 noisy states over the same of 1e5."""
-    return _ratio(
-        _suggest(str(_noisy(1_000_000))), _suggest(str(_noisy(100_000))), rounds=1
+    """Return the cost of `suggest --td` for 1e6 noisy states over that for 1e5."""
+    return _compare_processes(
+        _suggest(str(_make_noisy_energy(1_000_000))),
+        _suggest(str(_make_noisy_energy(100_000))),
+        rounds=1,
     )
 
 
 def drowned_growth() -> float:
-    """`suggest --td` of 2e5 states of a vibration that decays into its noise over the same of 1e5."""
+    """Return the cost of `suggest --td` for 2e5 states over that for 1e5; the vibration decays into its noise."""
 
     def build(states: int) -> tuple[str, ...]:
         time = np.linspace(0.0, 1.0, states)
         energy = MODE.energy(0.15 * time)
         energy += 0.1 * energy.max() * np.random.default_rng(3).standard_normal(states)
-        file = str(_written(f"drowned{states}.csv", time, energy))
+        file = str(_write_record(f"drowned{states}.csv", time, energy))
         return "-m", "d2rpick", "suggest", "--td", str(_TD), "--exit-zero", file
 
-    return _ratio(build(200_000), build(100_000), rounds=1)
+    return _compare_processes(build(200_000), build(100_000), rounds=1)
 
 
 def window_to_td(kind: str, width: str, *options: str) -> float:
-    """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy", "clean" or "parts"."""
-    file = str({"noisy": _noisy, "clean": _clean, "parts": _two_parts}[kind](100_000))
+    """Return the cost of `--td-window` over that of `--td` for 1e5 states; ``kind`` is "noisy", "clean" or "parts"."""
+    file = str(
+        {"noisy": _make_noisy_energy, "clean": _clean, "parts": _make_two_parts}[kind](
+            100_000
+        )
+    )
     if kind == "parts":
         options = (*options, "--energy", "IE_left", "--energy", "IE_right")
-        found = json.loads(output(*_suggest(file, *options, "-f", "json")))
-        assert found["basis"] == "parts"
-    return _ratio(
+        document = json.loads(read_output(*_suggest(file, *options, "-f", "json")))
+        assert document["basis"] == "parts"
+    return _compare_processes(
         _suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options)
     )
 
 
 def open_window_to_td() -> float:
-    """The same where the end of the load is left to be found."""
-    file = str(_noisy(100_000))
+    """Return the cost of `--td-window` over that of `--td` if the end of the load must be found."""
+    file = str(_make_noisy_energy(100_000))
     suggest = ("-m", "d2rpick", "suggest", "--exit-zero", file)
-    return _ratio(
+    return _compare_processes(
         (*suggest, "--td-window", *map(str, _WINDOWS["narrow"])),
         (*suggest, "--td", str(_TD)),
     )
 
 
 def explore_to_td(file: str, td: str, *options: str) -> float:
-    """`explore` of 200 td over `suggest --td`: processes; a file of the samples, or "noisy" for 1e5 noisy states."""
-    name = str(_noisy(100_000)) if file == "noisy" else f"sample_data/{file}"
-    rest = ("--exit-zero", "-q", "-f", "json", *options, name)
-    return _ratio(
-        ("-m", "d2rpick", "explore", *rest),
-        ("-m", "d2rpick", "suggest", "--td", td, *rest),
+    """Return the cost of `explore` of 200 td over that of `suggest --td`; a sample, or "noisy" for 1e5 noisy states."""
+    name = (
+        str(_make_noisy_energy(100_000)) if file == "noisy" else f"sample_data/{file}"
+    )
+    arguments = ("--exit-zero", "-q", "-f", "json", *options, name)
+    return _compare_processes(
+        ("-m", "d2rpick", "explore", *arguments),
+        ("-m", "d2rpick", "suggest", "--td", td, *arguments),
         rounds=1,
     )
 
 
 def clean_growth(command: str) -> float:
-    """A command on a clean oscillator of 1e6 states over the same of 1e5."""
+    """Return the cost of a command for a clean oscillator of 1e6 states over that for 1e5."""
 
     def build(file: str) -> tuple[str, ...]:
         if command == "verify":
@@ -143,48 +156,58 @@ def clean_growth(command: str) -> float:
             file, window=_WINDOWS["wide"] if command == "--td-window" else None
         )
 
-    return _ratio(build(str(_clean(1_000_000))), build(str(_clean(100_000))))
+    return _compare_processes(
+        build(str(_clean(1_000_000))), build(str(_clean(100_000)))
+    )
 
 
 def plan_to_pandas(trouble: str) -> float:
-    """`plan` of 1e5 states of some `_trouble` over pandas, which reads that csv and does nothing else."""
-    file = str(_trouble(trouble, 100_000))
-    return _ratio(
+    """Return the cost of `plan` for 1e5 states of a troubled record over that of pandas, which only reads the csv."""
+    file = str(_make_troubled_record(trouble, 100_000))
+    return _compare_processes(
         ("-m", "d2rpick", "plan", "--exit-zero", file), ("-c", PANDAS, file), rounds=1
     )
 
 
 def search_to_td(trouble: str, states: int, *command: str) -> float:
-    """A command that looks for td over `suggest --td` where nobody says when the load ends."""
-    rest = ("--exit-zero", "-q", str(_trouble(trouble, states)))
-    return _ratio(
-        ("-m", "d2rpick", *command, *rest),
-        ("-m", "d2rpick", "suggest", "--td", str(_TD), *rest),
+    """Return the cost of a command that searches td over that of `suggest --td`; the end of the load is unknown."""
+    arguments = ("--exit-zero", "-q", str(_make_troubled_record(trouble, states)))
+    return _compare_processes(
+        ("-m", "d2rpick", *command, *arguments),
+        ("-m", "d2rpick", "suggest", "--td", str(_TD), *arguments),
         rounds=1,
     )
 
 
 def wait(trouble: str, states: int, *command: str) -> float:
-    """Processor time of a command on a record of some `_trouble` [s]."""
-    return _cost(*command, "--exit-zero", "-q", str(_trouble(trouble, states)))
+    """Return the processor time of a command for a troubled record [s]."""
+    return _measure_cost(
+        *command, "--exit-zero", "-q", str(_make_troubled_record(trouble, states))
+    )
 
 
 def wait_for_info(trouble: str, states: int) -> float:
-    """Processor time of `info` of that record [s]."""
-    return _cost("info", "-q", str(_trouble(trouble, states)))
+    """Return the processor time of `info` for a troubled record [s]."""
+    return _measure_cost("info", "-q", str(_make_troubled_record(trouble, states)))
 
 
 def wait_for_parts(parts: int) -> float:
-    """Processor time of `explore` of so many parts and 2000 states [s]."""
-    names = ("--part", f"2001-{2000 + parts}", "--exit-zero", "-q", str(_matsum(parts)))
-    return _cost("explore", *names)
+    """Return the processor time of `explore` for this number of parts and 2000 states [s]."""
+    names = (
+        "--part",
+        f"2001-{2000 + parts}",
+        "--exit-zero",
+        "-q",
+        str(_write_matsum(parts)),
+    )
+    return _measure_cost("explore", *names)
 
 
 def explore_memory() -> float:
-    """Peak memory of `explore` of three impacts, 1e5 states [MB]."""
-    file = str(_trouble("several flights", 100_000))
+    """Return the peak memory of `explore` for three impacts, 1e5 states [MB]."""
+    file = str(_make_troubled_record("several flights", 100_000))
     return float(
-        output(
+        read_output(
             "-c",
             PEAK,
             sys.executable,
@@ -199,18 +222,18 @@ def explore_memory() -> float:
 
 
 def study_of_small_runs() -> float:
-    """Processor time of `study` of 1000 csv of 1501 states in one process, for each run [ms]."""
+    """Return the processor time per run of `study` for 1000 csv of 1501 states in one process [ms]."""
     folder = Path(_folder.name) / "small runs"
     if not folder.exists():
         folder.mkdir()
         write_runs(folder, _RUNS, 1501)
     names = sorted(map(str, folder.iterdir()))
-    return _cost(*_study(names, "1")) / _RUNS * 1e3
+    return _measure_cost(*_study_runs(names, "1")) / _RUNS * 1e3
 
 
 def parts_to_matsum(parts: int) -> float:
-    """`suggest --part` of so many parts and 2000 states over reading that matsum: processes."""
-    file = str(_matsum(parts))
+    """Return the cost of `suggest --part` for this number of parts and 2000 states over that of reading the matsum."""
+    file = str(_write_matsum(parts))
     choosing = (
         "-m",
         "d2rpick",
@@ -222,25 +245,25 @@ def parts_to_matsum(parts: int) -> float:
         "--exit-zero",
         file,
     )
-    return _ratio(choosing, ("-c", MATSUM, file))
+    return _compare_processes(choosing, ("-c", MATSUM, file))
 
 
 def study_to_loop() -> float:
-    """`study` of runs of 1e4 states, one process, over `suggest` of the library on each: per run, start-up in both."""
-    names = _runs()
-    return _ratio(
-        ("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names), rounds=1
+    """Return the cost per run of `study` over that of a loop over the library's `suggest`; 1e4 states each."""
+    names = _write_runs()
+    return _compare_processes(
+        ("-m", "d2rpick", *_study_runs(names, "1")), ("-c", LOOP, *names), rounds=1
     )
 
 
 def study_speed_up() -> float | None:
-    """Wall time of a `study` in one process over that in two; None on one core."""
-    return _speed_up(lambda jobs: _study(_runs(), jobs), rounds=2)
+    """Return the elapsed time of a `study` in one process over that in two; None on one core."""
+    return _measure_speed_up(lambda jobs: _study_runs(_write_runs(), jobs), rounds=2)
 
 
 def scan_speed_up() -> float | None:
-    """Wall time of `rollover --scan` in one process over that in two; None on one core."""
-    return _speed_up(
+    """Return the elapsed time of `rollover --scan` in one process over that in two; None on one core."""
+    return _measure_speed_up(
         lambda jobs: (
             "rollover",
             "--scan",
@@ -256,7 +279,7 @@ def scan_speed_up() -> float | None:
 
 
 def report_to_matplotlib() -> float:
-    """`suggest --report` of a sample over importing matplotlib and drawing one Figure to svg."""
+    """Return the cost of `suggest --report` for a sample over that of importing matplotlib and drawing one svg."""
     page = str(Path(_folder.name) / "report.html")
     ours = (
         "-m",
@@ -269,7 +292,7 @@ def report_to_matplotlib() -> float:
         "--overwrite",
         "sample_data/energy.csv",
     )
-    return _ratio(ours, ("-c", FIGURE), rounds=9)
+    return _compare_processes(ours, ("-c", FIGURE), rounds=9)
 
 
 def _suggest(
@@ -289,7 +312,7 @@ def _suggest(
     )
 
 
-def _study(names: Sequence[str], jobs: str) -> tuple[str, ...]:
+def _study_runs(names: Sequence[str], jobs: str) -> tuple[str, ...]:
     return (
         "study",
         "-q",
@@ -304,17 +327,17 @@ def _study(names: Sequence[str], jobs: str) -> tuple[str, ...]:
     )
 
 
-def _noisy(states: int) -> Path:
-    """Energy of five modes of one damping, with white noise."""
-    return _ringing(f"noisy{states}.csv", states, _MODES, _NOISE)
+def _make_noisy_energy(states: int) -> Path:
+    """Write the energy of five equally damped modes with white noise."""
+    return _make_ringing_energy(f"noisy{states}.csv", states, _MODES, _NOISE)
 
 
-def _trouble(name: str, states: int) -> Path:
-    """A record of a kind that is hard to choose in: many modes, noise, impacts, energies that rise or are negative."""
+def _make_troubled_record(name: str, states: int) -> Path:
+    """Write a record that is hard to choose in: many modes, noise, impacts, rising or negative energies."""
     rng = np.random.default_rng(14)
     if name == "random walk":
         steps = rng.standard_normal(states)
-        return _written(
+        return _write_record(
             f"{name}{states}.csv",
             np.linspace(0.0, 1.0, states),
             100.0 + np.cumsum(steps),
@@ -322,8 +345,8 @@ def _trouble(name: str, states: int) -> Path:
     if name == "a vibration on heat":
         time = np.linspace(0.02, 1.2, states)
         energy = 10 * time + 0.8 * (np.exp(-1.5 * time) * np.cos(60 * time)) ** 2
-        return _written(f"{name}{states}.csv", time, energy)
-    many = zip(
+        return _write_record(f"{name}{states}.csv", time, energy)
+    trouble_modes = zip(
         rng.uniform(8, 40, 200),
         rng.uniform(0.3, 1, 200),
         rng.uniform(0, np.pi, 200),
@@ -333,16 +356,16 @@ def _trouble(name: str, states: int) -> Path:
     level = {"noise alone": 4.0, "below zero": -4.0}.get(name, 0.0)
     impacts = {
         "several flights": [(0.05, 6.0), (0.35, 4.0), (0.7, 3.0)],
-        "chaotic contact": _chaotic(40),
+        "chaotic contact": _draw_chaotic_impacts(40),
     }
     modes = {
-        "200 modes": tuple(many),
+        "200 modes": tuple(trouble_modes),
         "chaotic contact": _MODES,
         "a rise": (),
         "noise alone": (),
     }.get(name, _THREE)
     noise = {"noise 1 %": 0.01, "noise 10 %": 0.1, "noise alone": 0.01}.get(name, 0.0)
-    return _ringing(
+    return _make_ringing_energy(
         f"{name}{states}.csv",
         states,
         modes,
@@ -352,18 +375,18 @@ def _trouble(name: str, states: int) -> Path:
     )
 
 
-def _chaotic(count: int) -> list[tuple[float, float]]:
-    """Times and heights of impacts in the first half of a record, by the logistic map."""
+def _draw_chaotic_impacts(count: int) -> list[tuple[float, float]]:
+    """Return times and heights of impacts in the first half of a record, by the logistic map."""
     heights = [0.3]
     while len(heights) < count:
         heights.append(3.9 * heights[-1] * (1 - heights[-1]))
     return [
-        (0.45 * (place + height) / count, 3 * height)
-        for place, height in enumerate(heights)
+        (0.45 * (mode_number + height) / count, 3 * height)
+        for mode_number, height in enumerate(heights)
     ]
 
 
-def _ringing(
+def _make_ringing_energy(
     name: str,
     states: int,
     modes: Sequence[tuple[float, float, float]],
@@ -371,7 +394,7 @@ def _ringing(
     impacts: Sequence[tuple[float, float]] = (),
     line: tuple[float, float] = (0.0, 0.0),
 ) -> Path:
-    """Energy of modes of one damping over a line, with white noise [of its largest] and impacts at (time, height)."""
+    """Write the energy of equally damped modes above a line, with white noise (share of the maximum) and impacts."""
     time = np.linspace(0.0, 1.0, states)
     swings = (
         share * np.sin(2 * np.pi * cycles * time + phase) ** 2
@@ -381,21 +404,24 @@ def _ringing(
         sum(swings, np.zeros(states)) * np.exp(-0.8 * time) + line[0] + line[1] * time
     )
     energy += sum(
-        (height * np.exp(-(((time - at) / 0.004) ** 2)) for at, height in impacts),
+        (
+            height * np.exp(-(((time - start) / 0.004) ** 2))
+            for start, height in impacts
+        ),
         np.zeros(states),
     )
     white = np.random.default_rng(14).standard_normal(states)
-    return _written(name, time, energy + noise * energy.max() * white)
+    return _write_record(name, time, energy + noise * energy.max() * white)
 
 
 def _clean(states: int) -> Path:
-    """Energy of the oscillator of the paper."""
+    """Write the energy of the paper's oscillator."""
     time = np.linspace(0.0, 1.0, states)
-    return _written(f"clean{states}.csv", time, MODE.energy(0.15 * time))
+    return _write_record(f"clean{states}.csv", time, MODE.energy(0.15 * time))
 
 
-def _two_parts(states: int) -> Path:
-    """Energies of two parts, each of which vibrates in a mode of its own: in several, noise hides the signs."""
+def _make_two_parts(states: int) -> Path:
+    """Write the energies of two parts with one mode each; several modes and noise would hide the signs."""
     time = np.linspace(0.0, 1.0, states)
     swing = [
         size * np.sin(2 * np.pi * cycles * time)
@@ -407,12 +433,12 @@ def _two_parts(states: int) -> Path:
         * energies.max()
         * np.random.default_rng(14).standard_normal(energies.shape)
     )
-    return _written(
+    return _write_record(
         f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right")
     )
 
 
-def _written(
+def _write_record(
     name: str,
     time: Samples,
     *energies: Samples,
@@ -428,8 +454,8 @@ def _written(
     return file
 
 
-def _matsum(parts: int) -> Path:
-    """Parts that vibrate in the modes of a chain, noise beside."""
+def _write_matsum(parts: int) -> Path:
+    """Write parts that vibrate in the modes of a chain, with noise."""
     file = Path(_folder.name) / f"matsum{parts}"
     if not file.exists():
         rng = np.random.default_rng(14)
@@ -439,37 +465,47 @@ def _matsum(parts: int) -> Path:
         swing = np.sin(2 * np.pi * 5 * cycles * time[:, np.newaxis] + phases) ** 2
         energies = sizes * np.exp(-5 * time)[:, np.newaxis] * swing
         energies += 1e-3 * sizes * np.abs(rng.standard_normal(energies.shape))
-        file.write_bytes(matsum_text(time, range(2001, 2001 + parts), energies))
+        file.write_bytes(make_matsum_text(time, range(2001, 2001 + parts), energies))
     return file
 
 
 @cache
-def _runs() -> list[str]:
+def _write_runs() -> list[str]:
     folder = Path(_folder.name) / "runs"
     folder.mkdir()
     return write_runs(folder, _RUNS, _RUN_STATES, noise=1e-3)
 
 
-def _cost(*command: str) -> float:
-    """Processor time of a command, the less of two [s]."""
+def _measure_cost(*command: str) -> float:
+    """Return the processor time of a command, the smaller of two [s]."""
     return min(
-        processor_seconds(lambda: output("-m", "d2rpick", *command)) for _ in range(2)
+        measure_processor_seconds(lambda: read_output("-m", "d2rpick", *command))
+        for _ in range(2)
     )
 
 
-def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:
-    """Processor time of the first process over that of the second, in turns."""
-    return ratio(
-        lambda: output(*one), lambda: output(*other), rounds, cost=processor_seconds
+def _compare_processes(
+    ours: Sequence[str], reference: Sequence[str], rounds: int = _ROUNDS
+) -> float:
+    """Return the processor time of one process over that of another, in turns."""
+    return measure_ratio(
+        lambda: read_output(*ours),
+        lambda: read_output(*reference),
+        rounds,
+        cost=measure_processor_seconds,
     )
 
 
-def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | None:
-    """Wall time of the quickest of some runs with one process over that with two; None on one core."""
+def _measure_speed_up(
+    command: Callable[[str], Sequence[str]], rounds: int
+) -> float | None:
+    """Return the shortest elapsed time with one process over that with two; None on one core."""
     if len(os.sched_getaffinity(0)) < 2:
         return None
     times: dict[str, list[float]] = {"1": [], "2": []}
     for _ in range(rounds):
-        for jobs, found in times.items():
-            found.append(seconds(partial(output, "-m", "d2rpick", *command(jobs))))
+        for jobs, wall_seconds in times.items():
+            wall_seconds.append(
+                measure_seconds(partial(read_output, "-m", "d2rpick", *command(jobs)))
+            )
     return min(times["1"]) / min(times["2"])

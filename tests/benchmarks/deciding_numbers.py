@@ -1,9 +1,9 @@
-"""Which constants decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
+"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
 
-Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled, in a process of its own, and the
-questions that run through the code that names it are asked again: the frozen questions of the tests, and random
-records of each class of `promise`.  The table says in how many of them the answer changed.  A constant that changes
-none of them is not needed, or needs a question of its own.
+Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
+that run through code with this constant are asked again: the frozen questions of the tests, and random records of each
+class of `promise`.  The table shows how many answers changed.  A constant that changes no answer is not needed, or
+needs a question of its own.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Place = tuple[str, int]
 
 
 class Constant(NamedTuple):
-    """A numeric constant: where it stands, its value, and the comment above it or beside it."""
+    """Numeric constant: its module, its value, and its comment."""
 
     module: str
     name: str
@@ -51,7 +51,7 @@ class Constant(NamedTuple):
 
 
 class Baseline(NamedTuple):
-    """The unchanged answer to a question, the seconds that it took, and the functions that it ran through."""
+    """Unchanged answer to a question, its duration [s], and the functions it runs through."""
 
     answer: str
     seconds: float
@@ -59,7 +59,7 @@ class Baseline(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Of the questions asked with one constant scaled by a factor, the number, and how many answers changed."""
+    """Number of questions asked with one scaled constant, and how many answers changed."""
 
     asked: int
     changed: int
@@ -127,23 +127,23 @@ def _find_comment(lines: Sequence[str], statement: ast.stmt) -> str:
         above.insert(0, lines[row].lstrip("# "))
         row -= 1
     assert statement.end_lineno is not None
-    beside = lines[statement.end_lineno - 1].partition("  # ")[2]
-    return " ".join(above) or beside
+    comment_on_line = lines[statement.end_lineno - 1].partition("  # ")[2]
+    return " ".join(above) or comment_on_line
 
 
 def make_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
     """Make the frozen questions, and so many records of each class of `promise` in files of the folder."""
     questions: dict[str, Question] = {}
-    for name, td, settings, _ in test_same_answers.OLD:
+    for name, td, settings, _ in test_same_answers.FROZEN:
         questions[f"{name}, td {td}, {settings}"] = _make_frozen_question(
             name, td, settings
         )
     for name, make in CLASSES.items():
         for number in range(records):
             record = make(np.random.default_rng([seed, number]))
-            own = folder / f"{len(questions)}"
-            own.mkdir()
-            path = write_record(record, own)
+            question_folder = folder / f"{len(questions)}"
+            question_folder.mkdir()
+            path = write_record(record, question_folder)
             questions[f"{name}, record {number}"] = _make_record_question(
                 str(path), record.read, record.suggest
             )
@@ -154,7 +154,8 @@ def _make_frozen_question(
     name: str, td: float | tuple[float, float], settings: Mapping[str, float | bool]
 ) -> Question:
     def ask() -> str:
-        return test_same_answers.digest(test_same_answers.answer(name, td, **settings))
+        suggestion = test_same_answers.suggest_for(name, td, **settings)
+        return str(test_same_answers.summarize(suggestion))
 
     return ask
 
@@ -192,21 +193,24 @@ def measure_baselines(questions: Mapping[str, Question]) -> dict[str, Baseline]:
         start = time.perf_counter()
         answer = ask_safely(question)
         seconds = time.perf_counter() - start
-        places: set[Place] = set()
+        places_asked: set[Place] = set()
 
         def note_place(
-            frame: FrameType, event: str, _: object, places: set[Place] = places
+            frame: FrameType,
+            event: str,
+            _: object,
+            places_asked: set[Place] = places_asked,
         ) -> None:
             if event == "call":
                 code = frame.f_code
-                places.add((code.co_filename, code.co_firstlineno))
+                places_asked.add((code.co_filename, code.co_firstlineno))
 
         sys.setprofile(note_place)
         try:
             ask_safely(question)
         finally:
             sys.setprofile(None)
-        baselines[name] = Baseline(answer, seconds, frozenset(places))
+        baselines[name] = Baseline(answer, seconds, frozenset(places_asked))
     return baselines
 
 
@@ -271,17 +275,19 @@ def patch_constant(
     """Scale a constant in this process wherever a module or a default argument holds it."""
     bindings = _find_bindings(modules, constant)
     home = sys.modules[constant.module]
-    before = {name: getattr(home, name) for name in bindings[home]}
+    original_values = {name: getattr(home, name) for name in bindings[home]}
     setattr(home, constant.name, scale(constant.value, factor))
     for computed, statement in _find_assignments(home):
         if constant.name not in computed and {*computed} & bindings[home]:
             # computed from the constant: computed again
             exec(compile(ast.Module([statement], []), "again", "exec"), vars(home))
-    after = {name: getattr(home, name) for name in before}
-    replaced = {id(before[name]): after[name] for name in before}
+    patched_values = {name: getattr(home, name) for name in original_values}
+    replaced = {
+        id(original_values[name]): patched_values[name] for name in original_values
+    }
     for module, names in bindings.items():
         for name in names:
-            setattr(module, name, after[name])
+            setattr(module, name, patched_values[name])
     for module in modules:
         for function in _list_functions(module):
             defaults = function.__defaults__ or ()
@@ -314,14 +320,14 @@ def try_factor(
     touched = [name for name in questions if users & baselines[name].places]
     touched.sort(key=lambda name: baselines[name].seconds)
     patch_constant(modules, constant, factor)
-    asked = changed = 0
+    asked_count = changed = 0
     start = time.process_time()
     for name in touched:
-        if asked and time.process_time() - start > seconds:
+        if asked_count and time.process_time() - start > seconds:
             break
-        asked += 1
+        asked_count += 1
         changed += ask_safely(questions[name]) != baselines[name].answer
-    return Outcome(asked, changed)
+    return Outcome(asked_count, changed)
 
 
 def call_in_child(function: Callable[[], Any]) -> Any:

@@ -1,4 +1,4 @@
-"""Finding the cards in a 50 MB deck against a plain line loop, and the memory it takes; checking many small decks."""
+"""Cost and memory of finding the cards in a 50 MB deck, compared with a loop over lines; checks of many small decks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
 from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE
-from tests.benchmarks.timing import own_seconds, ratio
+from tests.benchmarks.timing import measure_own_seconds, measure_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,8 +27,8 @@ _ROUNDS = 5
 
 
 @contextmanager
-def large_deck() -> Iterator[Path]:
-    """50 MB of mesh with the switching cards behind it."""
+def write_large_deck() -> Iterator[Path]:
+    """Write 50 MB of mesh followed by the D2R cards; yield the path."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "large.k"
         with path.open("w", encoding="ascii") as deck:
@@ -47,7 +47,7 @@ def large_deck() -> Iterator[Path]:
         yield path
 
 
-def line_loop(path: Path) -> None:
+def count_by_line_loop(path: Path) -> None:
     """Count keywords as a plain loop does."""
     with path.open("rb") as deck:
         assert sum(line.startswith(b"*") for line in deck) == 10
@@ -56,8 +56,8 @@ def line_loop(path: Path) -> None:
 def find_cards(path: Path) -> None:
     """Find the cards and derive the windows."""
     deck = read_deck(str(path))
-    found = find_windows(read_switching(deck), read_parts(deck)).windows
-    assert [(window.part, window.tr, window.td) for window in found] == [
+    windows = find_windows(read_switching(deck), read_parts(deck)).windows
+    assert [(window.part, window.tr, window.td) for window in windows] == [
         (1, 0.02, 0.09)
     ]
 
@@ -68,14 +68,14 @@ def number_cards(path: Path) -> None:
 
 
 def inventory(path: Path) -> None:
-    """Count the elements of every part, with masses, steps and shared nodes."""
+    """Count the elements of every part, with masses, time steps and shared nodes."""
     from d2rpick.deck import read_inventory
     from d2rpick.deck.geometry import compute_masses_and_steps
 
-    found = read_inventory(str(path))
-    assert sum(counts.total() for counts in found.counts.values()) == ELEMENTS
-    assert found.neighbours[1] == {2}
-    assert set(compute_masses_and_steps(found)) == {1, 2}
+    inventory_found = read_inventory(str(path))
+    assert sum(counts.total() for counts in inventory_found.counts.values()) == ELEMENTS
+    assert inventory_found.neighbours[1] == {2}
+    assert set(compute_masses_and_steps(inventory_found)) == {1, 2}
 
 
 def check(path: Path) -> None:
@@ -84,32 +84,34 @@ def check(path: Path) -> None:
 
 
 def dynars_parser() -> Callable[[Path], None] | None:
-    """Give the parser of dynars, which finds the keywords and the first rows of their cards; None without it."""
+    """Return the parser of dynars, which finds keywords and the first rows of their cards; None if not installed."""
     try:
         parse_deck = import_module("dynars").parse_deck
     except ImportError:
         return None
 
     def parse(path: Path) -> None:
-        found = parse_deck(str(path)).keywords("DEFORMABLE_TO_RIGID_AUTOMATIC")
-        assert [card.field("time1") for card in found] == [0.02, 0.09]
+        keywords = parse_deck(str(path)).keywords("DEFORMABLE_TO_RIGID_AUTOMATIC")
+        assert [card.field("time1") for card in keywords] == [0.02, 0.09]
 
     return parse
 
 
-def to_loop(what: str) -> float:
-    """Finding cards, the numbers of their lines, or parts and elements of the deck over a loop over all lines."""
+def to_loop(task: str) -> float:
+    """Return the cost of finding cards, line numbers, or parts and elements over that of a loop over all lines."""
     ours = {
         "cards": find_cards,
         "lines of cards": number_cards,
         "inventory": inventory,
-    }[what]
-    with large_deck() as path:
-        return ratio(lambda: ours(path), lambda: line_loop(path), _ROUNDS)
+    }[task]
+    with write_large_deck() as path:
+        return measure_ratio(
+            lambda: ours(path), lambda: count_by_line_loop(path), _ROUNDS
+        )
 
 
 def troubled_to_loop(trouble: str) -> float:
-    """Checking a deck of 20,000 of something over a loop over its lines: CPU of this process."""
+    """Return the processor time of checking a deck with 20,000 faults over that of a loop over its lines."""
     numbers = range(10, 20_010)
     deck = {
         "parts on one card": "*PART\n"
@@ -123,45 +125,45 @@ def troubled_to_loop(trouble: str) -> float:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "main.k"
         path.write_text(HEAD + PARTS + THERE + deck + BACK + END, "ascii")
-        return ratio(
+        return measure_ratio(
             lambda: check(path),
             lambda: sum(1 for _ in path.open("rb")),
             _ROUNDS,
-            cost=own_seconds,
+            cost=measure_own_seconds,
         )
 
 
 def check_to_dynars() -> float | None:
-    """Checking the deck over parsing it with dynars; None where that is not installed."""
+    """Return the cost of checking the deck over that of parsing it with dynars; None if it is not installed."""
     parse = dynars_parser()
     if parse is None:
         return None
-    with large_deck() as path:
-        return ratio(
+    with write_large_deck() as path:
+        return measure_ratio(
             lambda: check(path), lambda: parse(path), 5 * _ROUNDS
         )  # of milliseconds only
 
 
 def many_to_parse() -> float:
-    """Checking 1000 small decks, as a user asks for it, over finding their cards: CPU of this process."""
+    """Return the processor time of checking 1000 small decks by command over that of finding their cards."""
     with TemporaryDirectory() as folder:
         names = [str(Path(folder) / f"{number}.k") for number in range(1000)]
         for name in names:
             Path(name).write_text(GOOD, "ascii")
             os.utime(name, (1e9, 1e9))
-        return ratio(
+        return measure_ratio(
             lambda: checked(names),
             lambda: [*map(read_deck, names)],
             _ROUNDS,
-            cost=own_seconds,
+            cost=measure_own_seconds,
         )
 
 
 def memory() -> float:
-    """Most memory that finding the cards takes [MB]."""
-    with large_deck() as path:
+    """Return the peak memory of finding the cards [MB]."""
+    with write_large_deck() as path:
         tracemalloc.start()
         find_cards(path)
-        most = tracemalloc.get_traced_memory()[1]
+        peak_memory = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-    return most / MEGABYTE
+    return peak_memory / MEGABYTE

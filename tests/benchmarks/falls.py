@@ -1,9 +1,9 @@
-"""Flights found of bodies that fall while their vibration is damped, in all formats, with and without kinetic energy.
+"""Flights found for falling bodies with damped vibration, in all formats, with and without kinetic energy.
 
-``python -m tests.benchmarks.falls [RUNS [SEED]]``: chains are pushed while they are carried, fall freely under gravity
-while dampers and yielding springs take their vibration, and land.  Half of the chains yield in the flight, too.  Each
-is read as a table, a glstat, a binout and a T01, with and without kinetic energy.  A flight is right that begins within
-two states of the true one.
+``python -m tests.benchmarks.falls [RUNS [SEED]]``: supported chains are pushed, then fall freely under gravity while
+dampers and yielding springs dissipate their vibration, and land.  Half of the chains also yield in flight.  Each run is
+written as a table, a glstat, a binout and a T01, with and without kinetic energy.  A flight is correct if it begins
+within two states of the true one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.question import Settings, read
 from d2rpick.choice.situation import examine
-from tests.benchmarks.chains import Chains, integrated, on_first
+from tests.benchmarks.chains import Chains, apply_to_first, integrate_chains
 from tests.written_runs import FALL_WRITERS, Written
 
 if TYPE_CHECKING:
@@ -28,20 +28,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 STEPS, GRAVITY = 24, 9.81
-# A flight is right that begins no more than so many states from the true one.
+# A flight is correct if it begins within this number of states of the true one.
 WITHIN: Final = 2
 
 
 class Fall(NamedTuple):
-    """A run that is carried up to ``start`` and lands at ``end`` [time]."""
+    """Run that is supported until ``start`` and lands at ``end`` [time]."""
 
     run: Written
     start: float
     end: float
 
 
-def fallen(random: np.random.Generator, count: int, states: int) -> Iterator[Fall]:
-    """Integrate ``count`` falls over so many states, in one record length."""
+def integrate_falls(
+    random: np.random.Generator, count: int, states: int
+) -> Iterator[Fall]:
+    """Integrate ``count`` falls of this number of states, all of the same record length."""
     length = 10 ** random.uniform(-0.8, 0.2)
     masses = random.uniform(5, 50, (count, 3))
     periods = 10 ** random.uniform(-1.6, -0.9, (count, 2)) * length
@@ -64,22 +66,22 @@ def fallen(random: np.random.Generator, count: int, states: int) -> Iterator[Fal
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY])
     ground = whole * (2 * np.pi / (0.2 * length)) ** 2
 
-    def force(time: float, places: Samples, _: Samples) -> Samples:
+    def force(time: float, positions: Samples, _: Samples) -> Samples:
         push = np.stack([np.where(time < starts, pushed, 0.0), np.zeros(count)], axis=1)
         fallen_since = GRAVITY / 2 * ((time - starts) ** 2 - (ends - starts) ** 2)
         pressed = np.where(time > ends, ground * np.maximum(fallen_since, 0) / 10, 0.0)
         landing = np.stack([np.zeros(count), pressed], axis=1)
         carried = np.where((time < starts)[:, np.newaxis, np.newaxis], -heavy, 0.0)
-        return on_first(push + landing) + carried + 0 * places
+        return apply_to_first(push + landing) + carried + 0 * positions
 
     chains = Chains(masses, stiffness, damping, strength, yields_until, still, still)
-    runs = integrated(chains, force, lambda *_: heavy, length, states, STEPS)
-    for one, start, end in zip(runs, starts.tolist(), ends.tolist(), strict=True):
-        yield Fall(one.written, start, end)
+    runs = integrate_chains(chains, force, lambda *_: heavy, length, states, STEPS)
+    for run, start, end in zip(runs, starts.tolist(), ends.tolist(), strict=True):
+        yield Fall(run.written, start, end)
 
 
-def found_start(path: str, td: float) -> float | None:
-    """Start of the flight around td that a file shows; None without one."""
+def find_flight_start(path: str, td: float) -> float | None:
+    """Return the start of the flight around td found in a file; None if there is no flight."""
     try:
         flight = examine(read([path]).history, td, Settings(replay=False)).flight
     except D2RPickError:
@@ -88,8 +90,8 @@ def found_start(path: str, td: float) -> float | None:
 
 
 def main(count: int = 100, seed: int = 48) -> None:
-    """Print the counts of each format."""
-    right: Counter[str] = Counter()
+    """Print the counts for each format."""
+    right_counts: Counter[str] = Counter()
     shorter: Counter[str] = Counter()
     total: Counter[str] = Counter()
     random = np.random.default_rng(seed)
@@ -97,11 +99,13 @@ def main(count: int = 100, seed: int = 48) -> None:
         batch = 20
         for number in range(count // batch):
             states = int(random.choice([120, 300, 600]))
-            for at, fall in enumerate(fallen(random, batch, states)):
+            for fall_number, fall in enumerate(integrate_falls(random, batch, states)):
                 td, state = (fall.start + fall.end) / 2, float(fall.run.time[1])
                 for form, write in FALL_WRITERS.items():
                     starts = [
-                        found_start(write(fall.run, Path(folder), kinetic=has), td)
+                        find_flight_start(
+                            write(fall.run, Path(folder), kinetic=has), td
+                        )
                         for has in (True, False)
                     ]
                     for has, start in zip(("with", "without"), starts, strict=True):
@@ -110,10 +114,10 @@ def main(count: int = 100, seed: int = 48) -> None:
                             and abs(start - fall.start) <= (WITHIN + 0.01) * state
                         )
                         total[f"{form} {has}"] += 1
-                        right[f"{form} {has}"] += good
+                        right_counts[f"{form} {has}"] += good
                         if not good:
                             print(
-                                f"{form} {has} kinetic: {number}/{at} {start} for {fall.start}",
+                                f"{form} {has} kinetic: {number}/{fall_number} {start} for {fall.start}",
                                 flush=True,
                             )
                     with_, without = starts
@@ -121,12 +125,12 @@ def main(count: int = 100, seed: int = 48) -> None:
                         with_ is None or with_ > without + 0.01 * state
                     ):
                         print(
-                            f"{form} is shorter with kinetic energy: {number}/{at} {with_} for {without}",
+                            f"{form} is shorter with kinetic energy: {number}/{fall_number} {with_} for {without}",
                             flush=True,
                         )
                         shorter[form] += 1
     for name, size in total.items():
-        print(f"{name:20s}{size:6d} falls{right[name]:6d} right")
+        print(f"{name:20s}{size:6d} falls{right_counts[name]:6d} right")
     for form in FALL_WRITERS:
         print(f"{form:20s}{shorter[form]:6d} shorter with kinetic energy")
 

@@ -17,7 +17,7 @@ from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
-from tests.records import printed
+from tests.records import round_as_printed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -49,10 +49,10 @@ class Flown(NamedTuple):
 TIME: Final = np.linspace(0, 1, STATES + 1)
 
 
-def computed(
+def compute_runs(
     random: np.random.Generator, count: int, force: Force, *, falling: bool
 ) -> Iterator[Flown]:
-    """Integrate ``count`` chains in time at once."""
+    """Integrate ``count`` chains at the same time."""
     masses, stiffness = (
         random.uniform(5, 50, (count, 3, 1)),
         random.uniform(5e4, 2e5, (count, 2, 1)),
@@ -98,7 +98,7 @@ def computed(
 
 
 def fading(random: np.random.Generator, count: int) -> Force:
-    """A push that fades exponentially, by a power of time, or as a half-sine."""
+    """Draw a push that fades exponentially, by a power of time, or as a half-sine."""
     kind, lasts = random.integers(0, 3, count), random.uniform(0.02, 0.3, count)
     power, vectors = random.uniform(1.5, 6, count), pushes(random, count)
 
@@ -114,7 +114,7 @@ def fading(random: np.random.Generator, count: int) -> Force:
 
 
 def repeated(random: np.random.Generator, count: int) -> Force:
-    """Two to five half-sine pushes."""
+    """Draw two to five half-sine pushes."""
     starts, lengths = (
         random.uniform(0, 0.9, (5, count)),
         random.uniform(0.01, 0.08, (5, count)),
@@ -135,29 +135,29 @@ def repeated(random: np.random.Generator, count: int) -> Force:
 
 
 def wall(random: np.random.Generator, count: int) -> Force:
-    """A fixed elastic wall: it throws back what hits it, and what it stores for a moment is written nowhere."""
-    at, stiffness = (
+    """Draw a fixed elastic wall; its stored energy is not written."""
+    wall_position, stiffness = (
         random.uniform(0.02, 1.0, count),
         10 ** random.uniform(4, 6.5, count),
     )
 
     def force(_: float, moved: Samples, __: Samples) -> Samples:
-        size = -stiffness * np.maximum(moved[:, 0] - at, 0) + stiffness * np.maximum(
-            -moved[:, 0] - at, 0
-        )
+        size = -stiffness * np.maximum(
+            moved[:, 0] - wall_position, 0
+        ) + stiffness * np.maximum(-moved[:, 0] - wall_position, 0)
         return np.column_stack([size, np.zeros(count)])
 
     return force
 
 
 def friction(random: np.random.Generator, count: int) -> Force:
-    """Friction of the ground, which carries the chain, until it stands."""
+    """Draw friction of the ground that carries the chain, until it stands still."""
     pull = random.uniform(10, 3000, (count, 1))
     return lambda _, __, velocity: np.asarray(-pull * np.tanh(velocity / 0.01))
 
 
 def pushes(random: np.random.Generator, count: int) -> Samples:
-    """Random forces, (n, 2)."""
+    """Draw random forces, (n, 2)."""
     return np.asarray(
         random.normal(size=(count, 2)) * 10 ** random.uniform(3, 5, (count, 1))
     )
@@ -171,20 +171,25 @@ CLASSES: Final = {
 }
 
 
-def history_of(run: Flown, form: str) -> History:
+def make_history(run: Flown, form: str) -> History:
     """Write a run in one of the `FORMS`."""
     precision = Precision(DIGITS)
-    kinetic, internal = printed(run.kinetic, DIGITS), printed(run.internal, DIGITS)
+    kinetic, internal = (
+        round_as_printed(run.kinetic, DIGITS),
+        round_as_printed(run.internal, DIGITS),
+    )
     momenta: tuple[Momenta, ...] = ()
     if form != "totals":
         values = (
             run.momentum if form == "parts" else run.momentum.sum(axis=1, keepdims=True)
         )
         values = np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)
-        values = printed(values.ravel(), DIGITS).reshape(values.shape)
+        values = round_as_printed(values.ravel(), DIGITS).reshape(values.shape)
         masses = run.masses if form == "parts" else run.masses.sum(keepdims=True)
-        known, chosen = (PARTS, (0, 1, 2)) if form == "parts" else (None, (0,))
-        momenta = (Momenta(TIME, values, known, precision, chosen, masses=masses),)
+        history_parts, chosen = (PARTS, (0, 1, 2)) if form == "parts" else (None, (0,))
+        momenta = (
+            Momenta(TIME, values, history_parts, precision, chosen, masses=masses),
+        )
     velocity = momenta[0].values[:, 0] if form == "momenta" else None
     balance = Balance(TIME, internal, kinetic, velocity=velocity, precision=precision)
     return History(
@@ -198,13 +203,15 @@ def history_of(run: Flown, form: str) -> History:
     )
 
 
-def counted(run: Flown, form: str) -> Counter[str]:
-    """Count flights claimed that are not graded poor, those that are wrong, true flights, and those that are missed."""
-    found = flights_of(history_of(run, form), Settings(replay=False))
-    claims = [(f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in found]
+def count_flights(run: Flown, form: str) -> Counter[str]:
+    """Count claimed flights not graded poor, wrong ones among them, true flights, and missed ones."""
+    claimed_flights = flights_of(make_history(run, form), Settings(replay=False))
+    claims = [
+        (f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in claimed_flights
+    ]
     believed = [
         claim
-        for claim, flight in zip(claims, found, strict=True)
+        for claim, flight in zip(claims, claimed_flights, strict=True)
         if not flight.unknown_load
     ]
     impulse = np.concatenate(
@@ -215,9 +222,12 @@ def counted(run: Flown, form: str) -> Counter[str]:
     )
     largest = np.linalg.norm(run.momentum.sum(axis=1), axis=1).max()
     inside = [impulse[(start <= TIME) & (end >= TIME)] for start, end in believed]
-    wrong = sum(
-        bool(np.linalg.norm(one - one[0], axis=1).max() > LITTLE * largest)
-        for one in inside
+    wrong_count = sum(
+        bool(
+            np.linalg.norm(flight_momentum - flight_momentum[0], axis=1).max()
+            > LITTLE * largest
+        )
+        for flight_momentum in inside
     )
     size = np.linalg.norm(run.force, axis=1)
     edges = np.flatnonzero(
@@ -229,36 +239,41 @@ def counted(run: Flown, form: str) -> Counter[str]:
         if b - a > LONG * STATES
     ]
     flights = [
-        one for one in flights if _steady_for(impulse, one, LITTLE * largest) > LONG
+        flight_momentum
+        for flight_momentum in flights
+        if _measure_steady_time(impulse, flight_momentum, LITTLE * largest) > LONG
     ]
     missed = sum(
         not any(start < b and a < end for start, end in claims) for a, b in flights
     )
     return Counter(
-        claimed=len(believed), wrong=wrong, flights=len(flights), missed=missed
+        claimed=len(believed), wrong=wrong_count, flights=len(flights), missed=missed
     )
 
 
-def _steady_for(impulse: Samples, flight: tuple[float, float], most: float) -> float:
-    """How long the end of a flight lasts in which the force changes the momentum by at most ``most``."""
-    first, last = (round(one * STATES) for one in flight)
-    left = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
-    return float(np.count_nonzero(left <= most)) / STATES
+def _measure_steady_time(
+    impulse: Samples, flight: tuple[float, float], limit: float
+) -> float:
+    """Return how long the force changes the momentum by at most ``limit`` at the end of a flight."""
+    first, last = (round(impulse_in_flight * STATES) for impulse_in_flight in flight)
+    momentum_change = np.linalg.norm(impulse[first : last + 1] - impulse[last], axis=1)
+    return float(np.count_nonzero(momentum_change <= limit)) / STATES
 
 
 def main(count: int = 300, seed: int = 27) -> None:
-    """Print the counts of each load and form."""
+    """Print the counts for each load and form."""
     names = ("claimed", "wrong", "flights", "missed")
     print(f"{'load':10s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
     for number, (name, load) in enumerate(CLASSES.items()):
         random = np.random.default_rng((seed, number))
         runs = list(
-            computed(random, count, load(random, count), falling=name != "friction")
+            compute_runs(random, count, load(random, count), falling=name != "friction")
         )
         for form in FORMS:
-            total = sum((counted(run, form) for run in runs), Counter[str]())
+            total = sum((count_flights(run, form) for run in runs), Counter[str]())
             print(
-                f"{name:10s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names)
+                f"{name:10s}{form:10s}"
+                + "".join(f"{total[form_name]:9d}" for form_name in names)
             )
 
 

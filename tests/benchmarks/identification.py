@@ -1,7 +1,7 @@
-"""Identification against one least_squares fit of scipy that is started at the right answer, and how well it tells.
+"""Cost of an identification over one scipy least_squares fit started at the truth, and the accuracy of residuals.
 
-The records of the second are random: 3 to 12 periods of a mode, 15 to 200 states each, noise to 3 %, and beside it
-no other, one that holds 0.3 to 3 % of the energy, or one with 3 to 30 %.
+The accuracy is measured on random records: 3 to 12 periods of a mode, 15 to 200 states per period, noise up to 3 %, and
+no other mode, one with 0.3 to 3 % of the energy, or one with 3 to 30 %.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode
-from tests.benchmarks.timing import ratio
+from tests.benchmarks.timing import measure_ratio
 from tests.records import (
     ENERGY,
     MODE,
     TIME,
-    energy_of,
-    level_crossings,
-    printed,
-    replayed_residual,
-    vibration,
+    compute_replayed_residual,
+    find_level_crossings,
+    make_mode,
+    round_as_printed,
+    sum_energies,
 )
 
 if TYPE_CHECKING:
@@ -42,11 +42,11 @@ _NEAR = 1 / 8
 
 
 def to_scipy() -> float:
-    """Time of one identification over time of one such fit: medians of interleaved runs, 6 digits."""
-    energy = printed(ENERGY)
+    """Return the time of one identification over that of one such fit: medians of interleaved runs, 6 digits."""
+    energy = round_as_printed(ENERGY)
 
     def residuals(parameters: Samples) -> Samples:
-        return vibration(parameters).energy(TIME) - energy
+        return make_mode(parameters).energy(TIME) - energy
 
     def scipy_fit() -> float:
         return float(least_squares(residuals, _TRUTH).x[0])
@@ -57,18 +57,18 @@ def to_scipy() -> float:
         return mode.omega
 
     assert abs(ours() / scipy_fit() - 1) < 1e-7
-    return ratio(ours, scipy_fit, _ROUNDS)
+    return measure_ratio(ours, scipy_fit, _ROUNDS)
 
 
 def residual_error(kind: str, count: int) -> float:
-    """How far the stated residual is off at most in 95 % of so many random records [-]."""
-    return within(small_second_modes(kind, range(count)))[0]
+    """Return the error of the stated residual that 95 % of this number of random records do not exceed [-]."""
+    return summarize_records(small_second_modes(kind, range(count)))[0]
 
 
 class Stated(NamedTuple):
-    """Residual of a recommended pair as it is stated, the highest it may be, and the true one [-].
+    """Stated residual of a recommended pair, its upper limit, and the true residual [-].
 
-    ``held``: whether tr_low..tr_high holds the true crossing; None where the record itself hardly shows one.
+    ``held`` is True if tr_low..tr_high contains the true crossing; None if the record hardly shows a crossing.
     """
 
     stated: float
@@ -78,29 +78,36 @@ class Stated(NamedTuple):
 
 
 def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
-    """What is stated of random records, seeded, of one of the kinds; those without a recommended pair left out."""
+    """Return the results for seeded random records of one kind that have a recommended pair."""
     return [
-        found
+        stated_records
         for seed in seeds
-        if (found := _stated(np.random.default_rng(seed), _SHARES[kind]))
+        if (
+            stated_records := _state_residual(
+                np.random.default_rng(seed), _SHARES[kind]
+            )
+        )
     ]
 
 
-def within(found: list[Stated]) -> tuple[float, float, float]:
-    """95th percentile of how far residuals are off, and off their range; share of the intervals that hold tr."""
-    off = [abs(one.stated - one.true) for one in found]
-    beyond = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
-    held = [one.held for one in found if one.held is not None]
+def summarize_records(records: list[Stated]) -> tuple[float, float, float]:
+    """Return 95th percentiles of the errors of residuals and of their ranges, and the share of right intervals."""
+    deviations = [abs(record.stated - record.true) for record in records]
+    beyond = [
+        max(record.stated - record.true, record.true - record.highest, 0.0)
+        for record in records
+    ]
+    held = [record.held for record in records if record.held is not None]
     return (
-        float(np.percentile(off, 95)),
+        float(np.percentile(deviations, 95)),
         float(np.percentile(beyond, 95)),
         float(np.mean(held)),
     )
 
 
-def _stated(rng: np.random.Generator, least: float) -> Stated | None:
-    truth, time, noise = _random_modes(rng, least * 10 ** rng.uniform())
-    energy = energy_of(truth, time)
+def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | None:
+    truth, time, noise = _draw_modes(rng, least_share * 10 ** rng.uniform())
+    energy = sum_energies(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
     answer = suggest(
@@ -108,27 +115,31 @@ def _stated(rng: np.random.Generator, least: float) -> Stated | None:
         td,
         Settings(after=0.0),
     )
-    best = next((one for one in answer.candidates if one.recommended), None)
+    best = next(
+        (candidate for candidate in answer.candidates if candidate.recommended), None
+    )
     if best is None or best.residual is None:
         return None
     assert best.residual_high is not None
     assert best.tr_low is not None
     assert best.tr_high is not None
-    crossings = level_crossings(truth, td, -0.2)
-    seen = best.kind == "crossing" and bool(np.any(np.abs(crossings - best.tr) < _NEAR))
+    crossings = find_level_crossings(truth, td, -0.2)
+    is_crossing_seen = best.kind == "crossing" and bool(
+        np.any(np.abs(crossings - best.tr) < _NEAR)
+    )
     held = (
         bool(np.any((best.tr_low <= crossings) & (crossings <= best.tr_high)))
-        if seen
+        if is_crossing_seen
         else None
     )
-    true = float(replayed_residual(truth, np.array([best.tr]), td)[0])
+    true = float(compute_replayed_residual(truth, np.array([best.tr]), td)[0])
     return Stated(best.residual, best.residual_high, true, held)
 
 
-def _random_modes(
+def _draw_modes(
     rng: np.random.Generator, share: float
 ) -> tuple[list[Mode], Samples, float]:
-    """Modes of one damping, the first with period 1, the other with that share of the energy; times, and noise."""
+    """Draw two equally damped modes, the first with period 1, the second with ``share`` of its energy; and noise."""
     alpha, periods = rng.uniform(0, 0.5), rng.uniform(3, 12)
     rates = (
         2
@@ -148,7 +159,7 @@ def _random_modes(
 if __name__ == "__main__":
     for name, count in (("one", 600), ("small", 200), ("large", 200)):
         records = small_second_modes(name, range(count))
-        residual, beyond, crossing = within(records)
+        residual, beyond, crossing = summarize_records(records)
         print(
             f"{name}: {len(records)} of {count}, 95 % within {residual:.3g}, {beyond:.3g}; tr held {crossing:.3f}"
         )

@@ -1,8 +1,8 @@
-"""Pairs called good or fair under loads that last, against the momentum that these loads truly change.
+"""Pairs graded good or fair under loads that last, compared with the momentum that the loads really change.
 
 ``python -m tests.benchmarks.loads [RECORDS [SEED]]``: chains of three masses and two springs move in a plane and
-vibrate, while a load of one kind acts.  Each run is written as four files: totals in a table, momenta of the model
-in a table, a glstat and a matsum, with the digits of these formats.
+vibrate under a load of one kind.  Each run is written as four files with the digits of their formats: totals in a
+table, momenta of the model in a table, a glstat and a matsum.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from d2rpick.choice.question import Settings, read
 from tests.benchmarks.chains import (
     Chains,
     Run,
-    directions,
-    half_sine,
-    integrated,
-    on_first,
+    apply_half_sine,
+    apply_to_first,
+    draw_directions,
+    integrate_chains,
 )
 from tests.written_runs import WRITERS
 
@@ -52,9 +52,9 @@ OTHER_GRAVITIES: Final = (1.62, 3.71, 8.87, 24.8, 49.05)
 
 
 class Load(NamedTuple):
-    """Forces on ``count`` chains: ``force`` of time, masses (n, 3), places and velocities (n, 3, 2) is (n, 3, 2).
+    """Forces on ``count`` chains: ``force`` (n, 3, 2) of time, masses (n, 3), positions and velocities (n, 3, 2).
 
-    ``falling``: half of the chains fall on earth.
+    If ``falling``, half of the chains fall on earth.
     """
 
     force: Motion
@@ -62,7 +62,7 @@ class Load(NamedTuple):
 
 
 def friction(random: np.random.Generator, count: int) -> Load:
-    """Friction of the ground, as constant a deceleration as a dry one is, of all masses or of the first."""
+    """Draw dry friction of the ground, a constant deceleration of all masses or of the first."""
     size = 10 ** random.uniform(-1, 1.3, (count, 1, 1))
     only_first = random.random((count, 1)) < 1 / 3
 
@@ -78,7 +78,7 @@ def friction(random: np.random.Generator, count: int) -> Load:
 
 
 def drag(random: np.random.Generator, count: int) -> Load:
-    """Drag by the square of the speed, on the first mass or on two of them."""
+    """Draw drag by the square of the speed, on one or two masses."""
     size, on_first = (
         10 ** random.uniform(-2.5, 0, (count, 1, 1)),
         random.uniform(0.5, 2.0, (count, 1, 1)).clip(max=1),
@@ -94,57 +94,61 @@ def drag(random: np.random.Generator, count: int) -> Load:
 
 
 def late_contact(random: np.random.Generator, count: int) -> Load:
-    """A light contact late in the record, at the first mass."""
+    """Draw a light contact of the first mass late in the record."""
     start, length = (
         random.uniform(0.4, 0.85, count),
         10 ** random.uniform(-2, -0.7, count),
     )
-    size, along = 10 ** random.uniform(-1.5, 1, count), directions(random, count)
+    size, along = 10 ** random.uniform(-1.5, 1, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+        pushed = (size * masses.sum(axis=1) * apply_half_sine(time, start, length))[
             :, np.newaxis
         ] * along
-        return on_first(pushed)
+        return apply_to_first(pushed)
 
     return Load(force)
 
 
 def airbag(random: np.random.Generator, count: int) -> Load:
-    """A pressure that rises at once and leaks away."""
+    """Draw a pressure that rises at once and leaks away."""
     start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
-    size, along = 10 ** random.uniform(-0.5, 1.5, count), directions(random, count)
+    size, along = 10 ** random.uniform(-0.5, 1.5, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
         since = np.maximum(time - start, 0) / lasts
         pressure = np.where(time > start, since * np.exp(1 - 4 * since), 0.0)
-        return on_first((size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along)
+        return apply_to_first(
+            (size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along
+        )
 
     return Load(force)
 
 
 def rope(random: np.random.Generator, count: int) -> Load:
-    """A rope to the ground that is slack up to its length."""
+    """Draw a rope to the ground that is slack up to its length."""
     length, pull = (
         random.uniform(0.3, 3, (count, 1)),
         10 ** random.uniform(1, 4, (count, 1)),
     )
 
-    def force(_: float, __: Samples, places: Samples, ___: Samples) -> Samples:
-        distance = np.linalg.norm(places[:, 0], axis=1, keepdims=True)
+    def force(_: float, __: Samples, positions: Samples, ___: Samples) -> Samples:
+        distance = np.linalg.norm(positions[:, 0], axis=1, keepdims=True)
         stretched = np.maximum(distance - length, 0)
-        return on_first(-pull * stretched * places[:, 0] / np.maximum(distance, 1e-9))
+        return apply_to_first(
+            -pull * stretched * positions[:, 0] / np.maximum(distance, 1e-9)
+        )
 
     return Load(force)
 
 
 def couple(random: np.random.Generator, count: int) -> Load:
-    """Two opposite forces on two masses: they change no momentum."""
+    """Draw two opposite forces on two masses, which change no momentum."""
     start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
-    size, along = 10 ** random.uniform(-1, 1, count), directions(random, count)
+    size, along = 10 ** random.uniform(-1, 1, count), draw_directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+        pushed = (size * masses.sum(axis=1) * apply_half_sine(time, start, length))[
             :, np.newaxis
         ] * along
         return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
@@ -153,15 +157,15 @@ def couple(random: np.random.Generator, count: int) -> Load:
 
 
 def other_gravity(random: np.random.Generator, count: int) -> Load:
-    """Gravity of another planet, which without a deck no file tells from a load."""
+    """Draw the gravity of another planet, which no file distinguishes from a load without a deck."""
     size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
 
-    def force(_: float, masses: Samples, places: Samples, __: Samples) -> Samples:
+    def force(_: float, masses: Samples, positions: Samples, __: Samples) -> Samples:
         return np.asarray(
             masses[..., np.newaxis]
             * size
             * np.array([0.0, -1.0])
-            * np.ones_like(places)
+            * np.ones_like(positions)
         )
 
     return Load(force, falling=False)
@@ -173,10 +177,10 @@ CLASSES: Final = {
 }
 
 
-def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
-    """Integrate ``count`` chains that are pushed, and then fly but for their load.
+def compute_runs(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
+    """Integrate ``count`` chains that are pushed and then fly, except for their load.
 
-    Every other one has a single spring and moves along x: one oscillator describes its energy.
+    Every other chain has a single spring and moves along x: one oscillator describes its energy.
     """
     masses = random.uniform(5, 50, (count, 3))
     stiffness = (
@@ -186,36 +190,38 @@ def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Ru
     damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1))
     falls = (random.integers(0, 2, count) * load.falling)[:, np.newaxis, np.newaxis]
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
-    speed = directions(random, count) * random.uniform(1, 12, (count, 1))
-    places = random.normal(size=(count, 3, 2)) * random.uniform(
+    speed = draw_directions(random, count) * random.uniform(1, 12, (count, 1))
+    positions = random.normal(size=(count, 3, 2)) * random.uniform(
         1e-3, 2e-2, (count, 1, 1)
     )
-    places[::2, :, 1] = 0
+    positions[::2, :, 1] = 0
     velocities, never = np.repeat(speed[:, np.newaxis], 3, axis=1), np.zeros(count)
     chains = Chains(
-        masses, stiffness, damping, 0 * stiffness, never, places, velocities
+        masses, stiffness, damping, 0 * stiffness, never, positions, velocities
     )
     whole, lasts = masses.sum(axis=1), random.uniform(0.02, 0.1, count)
     pushed = (
-        directions(random, count)
+        draw_directions(random, count)
         * (whole * random.uniform(5, 50, count))[:, np.newaxis]
     )
 
     def force(time: float, moved: Samples, velocity: Samples) -> Samples:
-        push = on_first(pushed * half_sine(time, 0 * lasts, lasts)[:, np.newaxis])
+        push = apply_to_first(
+            pushed * apply_half_sine(time, 0 * lasts, lasts)[:, np.newaxis]
+        )
         return load.force(time, masses, moved, velocity) + push
 
-    yield from integrated(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
+    yield from integrate_chains(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
 
 
-def changes(impulse: Samples, time: Samples, start: float, end: float) -> float:
-    """Largest change of an impulse (n, 2) from ``start`` to ``end``."""
+def measure_change(impulse: Samples, time: Samples, start: float, end: float) -> float:
+    """Return the largest change of an impulse (n, 2) from ``start`` to ``end``."""
     inside = impulse[(time >= start) & (time <= end)]
     return float(np.linalg.norm(inside - inside[:1], axis=1).max(initial=0.0))
 
 
-def counted(reference: Reference, run: Run) -> Counter[str]:
-    """Count the pairs that are not called poor, those that are wrong, true flights, and those that no source shows."""
+def count_pairs(reference: Reference, run: Run) -> Counter[str]:
+    """Count pairs not graded poor, wrong ones among them, true flights, and flights that no source shows."""
     counts: Counter[str] = Counter()
     time, impulse = run.written.time, run.impulse
     largest = float(np.linalg.norm(run.written.momentum.sum(axis=1), axis=1).max())
@@ -228,26 +234,28 @@ def counted(reference: Reference, run: Run) -> Counter[str]:
         if pair is None or answer.quality is None or answer.quality.grade == "poor":
             continue
         counts["pairs"] += 1
-        counts["wrong"] += changes(impulse, time, pair.tr, pair.td) > WRONG * largest
-    true = list(_true_flights(impulse, time, STEADY * largest))
+        counts["wrong"] += (
+            measure_change(impulse, time, pair.tr, pair.td) > WRONG * largest
+        )
+    true = list(_find_true_flights(impulse, time, STEADY * largest))
     try:
-        shown = [
-            one.within(time)
-            for one in flights_of(reference.history, Settings(replay=False))
+        shown_flights = [
+            flight_found.within(time)
+            for flight_found in flights_of(reference.history, Settings(replay=False))
         ]
     except D2RPickError:
-        shown = []
+        shown_flights = []
     counts["flights"] += len(true)
     counts["missed"] += sum(
-        not any(start < b and a < end for start, end in shown) for a, b in true
+        not any(start < b and a < end for start, end in shown_flights) for a, b in true
     )
     return counts
 
 
-def _true_flights(
+def _find_true_flights(
     impulse: Samples, time: Samples, room: float
 ) -> Iterator[tuple[float, float]]:
-    """Give the longest stretches in which an impulse changes by at most ``room``, one after the other."""
+    """Yield the longest stretches in which an impulse changes by at most ``room``, one after the other."""
     first = 0
     while first < time.size - 1:
         last = first
@@ -267,20 +275,20 @@ def _true_flights(
 
 
 def main(count: int = 60, seed: int = 48) -> None:
-    """Print the counts of each load and form."""
+    """Print the counts for each load and form."""
     names = ("pairs", "wrong", "flights", "missed")
     print(f"{'load':15s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
     with TemporaryDirectory() as folder:
         for number, (name, load) in enumerate(CLASSES.items()):
             random = np.random.default_rng((seed, number))
-            runs = list(computed(random, count, load(random, count)))
+            runs = list(compute_runs(random, count, load(random, count)))
             for form, write in WRITERS.items():
                 total: Counter[str] = Counter()
                 for run in runs:
-                    total += counted(read([write(run.written, Path(folder))]), run)
+                    total += count_pairs(read([write(run.written, Path(folder))]), run)
                 print(
                     f"{name:15s}{form:10s}"
-                    + "".join(f"{total[one]:9d}" for one in names),
+                    + "".join(f"{total[load_name]:9d}" for load_name in names),
                     flush=True,
                 )
 

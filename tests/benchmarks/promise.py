@@ -1,9 +1,9 @@
 """What a recommended pair, its stated residual and its grade are worth: ``python -m tests.benchmarks.promise --help``.
 
-A structure is loaded and then flies.  The record goes through a file, and ``suggest`` recommends a pair.  Its true
-residual R comes from the motion: in closed form for linear structures, else from integrating two runs from td on.  An
-oracle that knows the motion gives the least R that the same flight allows.  Goals in each class: no pair called good
-has R above 0.3, none that states less than 1 has R above 1, and 95 % of the true R lie in the stated band.
+A structure is loaded and then flies.  Its record is written to a file, and ``suggest`` recommends a pair.  The true
+residual R comes from the motion: in closed form for linear structures, otherwise from integrating two runs from td on.
+An oracle that knows the motion gives the least R in the same flight.  Goals in each class: no pair graded good has R
+above 0.3, no pair with a stated residual below 1 has R above 1, and 95 % of the true R are in the stated band.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _ROUNDING: Final = 1e-3
 
 
 class Pair(NamedTuple):
-    """A recommended pair: its true residual, what was stated of it, if anything, its grade and basis."""
+    """Recommended pair: true residual, stated residual and band (if any), grade and basis."""
 
     tr: float
     td: float
@@ -54,14 +54,14 @@ class Pair(NamedTuple):
 
     @property
     def kept(self) -> bool | None:
-        """Whether the residual is what was stated; None if nothing was."""
+        """True if the residual is as stated; None if none was stated."""
         if self.low is None or self.high is None:
             return None
         return self.low - WITHIN <= self.true <= self.high + WITHIN
 
 
 class Trial(NamedTuple):
-    """What became of a record: the pair, None if none was recommended, or the first words of the error.
+    """Result for a record: the pair, None if none was recommended, or the first words of the error.
 
     ``td_asked``: the time that was asked for, None if it was free; ``oracle``: the least true residual, and the start
     and end of the flight, if known.
@@ -165,7 +165,7 @@ def try_record(record: Record, folder: Path) -> Trial:
 
 
 def count_group(rows: pd.DataFrame) -> dict[str, object]:
-    """Count what became of some records, rows of `tabulate`, in the columns of the table."""
+    """Count the results of some records (rows of `tabulate`), in the columns of the table."""
     pairs = rows[rows["true"].notna()]
     stated, unstated = pairs[pairs["residual"].notna()], pairs[pairs["residual"].isna()]
     said_useful = stated[stated["residual"] < KEEPS_NOTHING]
@@ -174,7 +174,7 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
     good = pairs[pairs["grade"] == "good"]
     banded = pairs[pairs["high"].notna()]
     above = banded["true"] - banded["high"]
-    off = above.combine(banded["low"] - banded["true"], max)
+    outside_band = above.combine(banded["low"] - banded["true"], max)
     early = pairs["flight_start"] - pairs["tr"]
     flight_time = pairs["flight_end"] - pairs["flight_start"]
     return {
@@ -190,8 +190,8 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
         "R>0.3, said <0.25": _count(said_sure["true"] > BAD),
         "good of oracle<0.2": _count(possible["grade"] == "good"),
         "good, R>0.3": _count(good["true"] > BAD),
-        "in band": _share(off <= _ROUNDING),
-        "+-0.05": _share(off <= WITHIN),
+        "in band": _compute_share(outside_band <= _ROUNDING),
+        "+-0.05": _compute_share(outside_band <= WITHIN),
         "worst above": f"{above.max():.2f}" if len(above) else "-",
         "by basis": ", ".join(
             f"{basis} {count}" for basis, count in pairs["basis"].value_counts().items()
@@ -203,7 +203,7 @@ def _count(hits: pd.Series[bool]) -> str:
     return f"{int(hits.sum())}/{len(hits)}"
 
 
-def _share(hits: pd.Series[bool]) -> str:
+def _compute_share(hits: pd.Series[bool]) -> str:
     return f"{hits.mean():.3f} of {len(hits)}" if len(hits) else "-"
 
 
@@ -233,7 +233,7 @@ TryClass = Callable[[str, int, int], list[Trial]]
 
 
 def try_class(name: str, count: int, seed: int) -> list[Trial]:
-    """Try so many records of a class."""
+    """Try this number of records of a class."""
     with TemporaryDirectory() as folder:
         numbers = range(count)
         return [
@@ -247,7 +247,7 @@ def try_class(name: str, count: int, seed: int) -> list[Trial]:
 def run_benchmark(
     classes: Mapping[str, Any], try_records: TryClass, description: str
 ) -> None:
-    """Try the classes that the command line names, and print what became of them."""
+    """Try the classes named on the command line, and print the counts."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument(
         "records",

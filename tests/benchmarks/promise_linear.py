@@ -114,9 +114,9 @@ def make_linear(
     suggest = ask_for_times(random, flight_start, flight_end)
     if random.random() < 1 / 4:
         suggest["after"] = flight_start
-    read = {"energy": names} if part_count > 1 else {}
+    reading = {"energy": names} if part_count > 1 else {}
     return Record(
-        columns, Truth(modes, (flight_start, flight_end)), read=read, suggest=suggest
+        columns, Truth(modes, (flight_start, flight_end)), read=reading, suggest=suggest
     )
 
 
@@ -178,8 +178,8 @@ def _draw_times(
 ) -> Samples:
     """Draw the times of states, some in each period of the fastest line of the energy."""
     density = draw_log(random, 2.2, 8.0) if coarse else draw_log(random, 10.0, 50.0)
-    most = max(_MOST_STATES * fastest_period / end, _FEWEST_PER_PERIOD)
-    step = fastest_period / min(density, most)
+    most_shared = max(_MOST_STATES * fastest_period / end, _FEWEST_PER_PERIOD)
+    step = fastest_period / min(density, most_shared)
     if not irregular:
         return np.arange(0.0, end, step)
     steps = step * random.uniform(0.4, 1.6, int(3 * end / step) + 2)
@@ -219,10 +219,10 @@ def damp_each(random: np.random.Generator, ratios: Samples) -> Samples:
 
 
 def draw_modes(
-    random: np.random.Generator, fewest: int, most: int, highest: float
+    random: np.random.Generator, fewest: int, most_modes: int, highest: float
 ) -> Shapes:
     """Draw so many modes, between a first frequency and the ``highest``."""
-    gaps = random.uniform(0.3, 1.7, int(random.integers(fewest, most + 1)) - 1)
+    gaps = random.uniform(0.3, 1.7, int(random.integers(fewest, most_modes + 1)) - 1)
     return _keep_apart(
         np.append(1.0, 1 + (highest - 1) * np.cumsum(gaps) / gaps.sum())
         if gaps.size
@@ -236,16 +236,20 @@ def draw_close(random: np.random.Generator) -> Shapes:
     second = first * (
         1 + np.exp(random.uniform(np.log(0.003), np.log(0.06), first.size))
     )
-    other = random.uniform(1.3, 3.5, random.integers(0, 2))
-    return _keep_apart(np.concatenate([first, second, other]))
+    second_rate = random.uniform(1.3, 3.5, random.integers(0, 2))
+    return _keep_apart(np.concatenate([first, second, second_rate]))
 
 
 def draw_harmonic(random: np.random.Generator) -> Shapes:
     """Draw modes at two or three times a first frequency, or both, exactly or nearly, and perhaps another mode."""
     multiples = [(2.0,), (3.0,), (2.0, 3.0)][random.integers(0, 3)]
-    off = random.choice([0.0, 1e-3]) * random.normal(size=len(multiples))
-    other = random.uniform(1.2, 3.5, random.integers(0, 2))
-    return _keep_apart(np.concatenate([[1.0], np.array(multiples) * (1 + off), other]))
+    frequency_error = random.choice([0.0, 1e-3]) * random.normal(size=len(multiples))
+    second_rate = random.uniform(1.2, 3.5, random.integers(0, 2))
+    return _keep_apart(
+        np.concatenate(
+            [[1.0], np.array(multiples) * (1 + frequency_error), second_rate]
+        )
+    )
 
 
 def _keep_apart(ratios: Samples) -> Shapes:
@@ -258,34 +262,38 @@ def draw_exchange(random: np.random.Generator) -> Shapes:
     cabin = np.append(
         1 + random.uniform(-0.05, 0.05), random.uniform(1.3, 3.0, random.integers(0, 2))
     )
-    places = np.concatenate([frame, cabin])
+    positions = np.concatenate([frame, cabin])
     owners = np.repeat([0, 1], [frame.size, cabin.size])
     springs = [(0, frame.size, draw_log(random, 0.01, 0.15))]
-    if places.size > 2:
-        springs.append((0, places.size - 1, draw_log(random, 0.01, 0.3)))
+    if positions.size > 2:
+        springs.append((0, positions.size - 1, draw_log(random, 0.01, 0.3)))
     owners = np.append(owners, random.integers(0, 2, len(springs)))
-    return _couple(places, springs, owners, np.ones(places.size, dtype=bool))
+    return _couple(positions, springs, owners, np.ones(positions.size, dtype=bool))
 
 
 def draw_leak(random: np.random.Generator) -> Shapes:
     """Draw modes whose energy leaks through weak springs into others nearby, which are not recorded."""
     recorded = np.append(1.0, random.uniform(1.3, 3.0, random.integers(0, 3)))
-    places = [*recorded]
+    positions = [*recorded]
     springs: list[tuple[int, int, float]] = []
-    for place, frequency in enumerate(recorded):
+    for column_index, frequency in enumerate(recorded):
         for _ in range(int(random.integers(2, 6))):
             springs.append(
-                (place, len(places), draw_log(random, 0.0005, 0.01) * frequency**2)
+                (
+                    column_index,
+                    len(positions),
+                    draw_log(random, 0.0005, 0.01) * frequency**2,
+                )
             )
-            places.append(frequency * (1 + random.uniform(-0.05, 0.05)))
-    is_recorded = np.arange(len(places)) < recorded.size
+            positions.append(frequency * (1 + random.uniform(-0.05, 0.05)))
+    is_recorded = np.arange(len(positions)) < recorded.size
     return _couple(
-        np.array(places), springs, np.zeros(recorded.size, dtype=int), is_recorded
+        np.array(positions), springs, np.zeros(recorded.size, dtype=int), is_recorded
     )
 
 
 def _couple(
-    places: Samples,
+    positions: Samples,
     springs: Sequence[tuple[int, int, float]],
     owners: NDArray[np.int_],
     is_recorded: NDArray[np.bool_],
@@ -294,8 +302,8 @@ def _couple(
 
     ``owners`` are the parts of the recorded springs: those of recorded masses, then, if all are, those between them.
     """
-    identity = np.eye(places.size)
-    rows = list(places[:, np.newaxis] * identity)
+    identity = np.eye(positions.size)
+    rows = list(positions[:, np.newaxis] * identity)
     for start, end, stiffness in springs:
         rows.append(np.sqrt(stiffness) * (identity[start] - identity[end]))
     stretches = np.array(rows)
@@ -305,10 +313,12 @@ def _couple(
     in_modes = (
         vectors / frequencies
     )  # of the masses, so that the elastic energy is the sum of q^2
-    recorded = stretches if is_recorded.all() else stretches[: places.size][is_recorded]
+    recorded = (
+        stretches if is_recorded.all() else stretches[: positions.size][is_recorded]
+    )
     parts = Parts(recorded @ in_modes, in_modes[is_recorded] * unit, owners)
     return Shapes(
-        frequencies / unit, in_modes.T * places, is_recorded.astype(float), parts
+        frequencies / unit, in_modes.T * positions, is_recorded.astype(float), parts
     )
 
 
@@ -363,9 +373,9 @@ def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
     return Stretch(heights, course, rate)
 
 
-few_modes: Final = partial(draw_modes, fewest=1, most=4, highest=3.5)
-ten_modes: Final = partial(draw_modes, fewest=10, most=10, highest=8.0)
-several_modes: Final = partial(draw_modes, fewest=2, most=5, highest=4.0)
+few_modes: Final = partial(draw_modes, fewest=1, most_modes=4, highest=3.5)
+ten_modes: Final = partial(draw_modes, fewest=10, most_modes=10, highest=8.0)
+several_modes: Final = partial(draw_modes, fewest=2, most_modes=5, highest=4.0)
 
 _ALSO_NOISY: Final = {
     "damping by mode": partial(make_linear, shapes=several_modes, damping=damp_each),
@@ -385,10 +395,10 @@ LINEAR: Final[dict[str, Make]] = {
     "close modes": partial(make_linear, shapes=draw_close),
     "harmonic": partial(make_linear, shapes=draw_harmonic),
     "5 modes": partial(
-        make_linear, shapes=partial(draw_modes, fewest=5, most=5, highest=5.0)
+        make_linear, shapes=partial(draw_modes, fewest=5, most_modes=5, highest=5.0)
     ),
     "30 modes": partial(
-        make_linear, shapes=partial(draw_modes, fewest=30, most=30, highest=12.0)
+        make_linear, shapes=partial(draw_modes, fewest=30, most_modes=30, highest=12.0)
     ),
     "coarse": partial(make_linear, shapes=few_modes, coarse=True),
     "irregular": partial(make_linear, shapes=few_modes, irregular=True),

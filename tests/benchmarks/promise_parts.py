@@ -1,10 +1,10 @@
-"""What a good grade is worth on parts: random records, seeded, held against the exact motion of their modes.
+"""What a good grade of parts is worth: random records, seeded, compared with the exact motion of their modes.
 
-    python -m tests.benchmarks.promise_parts [N [SEED]]
+python -m tests.benchmarks.promise_parts [N [SEED]]
 
-The motion is written down here in the coordinates of its modes, by no code of d2rpick.  Springs with one mode each; two
-parts of a larger structure, or a free chain of masses whose springs, or groups of springs, are the parts, so that the
-modes mix in each; and a part that bends in two planes beside another one.  Damping is proportional to mass.
+The motion is computed here from its modes, independently of d2rpick.  The classes are: springs with one mode each; two
+parts of a larger structure, or a free chain of masses whose springs or groups of springs are the parts, so that modes
+mix in each part; and a part that bends in two planes next to another part.  Damping is proportional to mass.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 
 class Motion(NamedTuple):
-    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``, whose parts have the energies ``x' form x``.
+    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``; a part has the energy ``x' form x``.
 
-    ``rate`` and ``phase`` are of shape (m,), ``forms``, the stiffness of each of k parts in the modes, (k, m, m).
+    ``rate`` and ``phase`` have shape (m,); ``forms`` (k, m, m) are the stiffnesses of k parts in the modes.
     """
 
     alpha: float
@@ -38,32 +38,38 @@ class Motion(NamedTuple):
     forms: Samples
 
     def state(self, time: Samples | float) -> tuple[Samples, Samples]:
-        """Give coordinates and velocities over the undamped rates, both of the shape of ``time`` and an axis for m."""
+        """Return coordinates, and velocities over the undamped rates, in the shape of ``time`` with an axis for m."""
         angle, half = np.multiply.outer(time, self.rate) + self.phase, self.alpha / 2
         decay = np.exp(-half * np.asarray(time))[..., np.newaxis]
-        own = np.hypot(self.rate, half)
+        own_rate = np.hypot(self.rate, half)
         return decay * np.cos(angle), -decay * (
             self.rate * np.sin(angle) + half * np.cos(angle)
-        ) / own
+        ) / own_rate
 
     def energies(self, time: Samples) -> Samples:
-        """Energies of the parts, shape (n, k)."""
-        at = self.state(time)[0]
-        return np.asarray(np.einsum("ni,kij,nj->nk", at, self.forms, at))
+        """Return the energies of the parts, shape (n, k)."""
+        state_at_times = self.state(time)[0]
+        return np.asarray(
+            np.einsum("ni,kij,nj->nk", state_at_times, self.forms, state_at_times)
+        )
 
     def residual(self, tr: float, td: float) -> float:
-        """Energy norm of what the switched run lacks at td over that of the reference, summed over the modes.
+        """Return the energy norm of the missing motion at td over that of the reference, summed over the modes.
 
-        Of the parts of a larger structure that is the mean over time after td: there it is no sum at any time.
+        For parts of a larger structure it is the mean over time after td, because their energy is no sum at any one
+        time.
         """
-        (before, _), (after, velocity) = self.state(tr), self.state(td)
+        (state_at_tr, _), (state_at_td, velocity) = self.state(tr), self.state(td)
         stiffness = np.einsum("kii->i", self.forms)
-        lack, whole = (before - after) ** 2 + velocity**2, after**2 + velocity**2
+        lack, whole = (
+            (state_at_tr - state_at_td) ** 2 + velocity**2,
+            state_at_td**2 + velocity**2,
+        )
         return float(np.sqrt(stiffness @ lack / (stiffness @ whole)))
 
 
 class Record(NamedTuple):
-    """A history, the settings and window of td it is asked with, a single td as a window of no width, and the truth."""
+    """History, settings, td range (of width 0 for one td), and the true motion."""
 
     history: History
     settings: Settings
@@ -71,16 +77,16 @@ class Record(NamedTuple):
     residual: Callable[[float, float], float]
 
 
-def one_each(rng: np.random.Generator) -> Motion:
-    """Two or three parts with a mode each."""
+def draw_one_mode_each(rng: np.random.Generator) -> Motion:
+    """Draw two or three parts with one mode each."""
     count = int(rng.integers(2, 4))
-    return _planes(
+    return _draw_planes(
         rng, [(i, energy) for i, energy in enumerate(rng.uniform(0.1, 1, count))]
     )
 
 
-def mixed(rng: np.random.Generator) -> Motion:
-    """Two parts of a larger structure; or a free chain of three to six masses, whose springs are the parts.
+def draw_mixed_modes(rng: np.random.Generator) -> Motion:
+    """Draw two parts of a larger structure, or a free chain of three to six masses whose springs are the parts.
 
     In a third of the chains several springs are one part.
     """
@@ -98,20 +104,23 @@ def mixed(rng: np.random.Generator) -> Motion:
     mass, spring = rng.uniform(0.3, 3, count + 1), rng.uniform(0.3, 3, count)
     stretch = np.diff(np.eye(count + 1), axis=0) / np.sqrt(mass)
     square, shapes = np.linalg.eigh(stretch.T @ (spring[:, np.newaxis] * stretch))
-    own = np.sqrt(square[1:]) * 2 * np.pi / np.sqrt(square[1])
-    amplitude = rng.uniform(0.2, 1, count) / own
+    own_rates = np.sqrt(square[1:]) * 2 * np.pi / np.sqrt(square[1])
+    amplitude = rng.uniform(0.2, 1, count) / own_rates
     rows = stretch @ shapes[:, 1:] * amplitude * np.sqrt(spring)[:, np.newaxis]
     forms = np.einsum("si,sj->sij", rows, rows)
     if rng.uniform() < 1 / 3:
         forms = np.stack([forms[:-1].sum(axis=0), forms[-1]])
     alpha = rng.uniform(0, 0.5)
     return Motion(
-        alpha, np.sqrt(own**2 - alpha**2 / 4), rng.uniform(0, 2 * np.pi, count), forms
+        alpha,
+        np.sqrt(own_rates**2 - alpha**2 / 4),
+        rng.uniform(0, 2 * np.pi, count),
+        forms,
     )
 
 
-def two_planes(rng: np.random.Generator) -> Motion:
-    """A part whose second plane holds 0.3 to 50 % of its energy, beside one with a mode, or with two planes too."""
+def draw_two_planes(rng: np.random.Generator) -> Motion:
+    """Draw a part whose second plane holds 0.3 to 50 % of its energy, next to a part with one mode or two planes."""
     modes = [
         (0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))),
         (0, share),
@@ -122,15 +131,18 @@ def two_planes(rng: np.random.Generator) -> Motion:
         if rng.uniform() < 0.3
         else []
     )
-    return _planes(rng, [*modes, *second])
+    return _draw_planes(rng, [*modes, *second])
 
 
-def _planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
-    """Modes that belong to a part, by its number, and have an energy."""
+def _draw_planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
+    """Draw modes with an energy and the number of the part they belong to."""
     part, energy = (np.array(column) for column in zip(*modes, strict=True))
     rate = 2 * np.pi * rng.uniform(1, 3.5, len(modes))
     forms = np.array(
-        [np.diag(np.where(part == one, energy, 0.0)) for one in range(part.max() + 1)]
+        [
+            np.diag(np.where(part == plane_part, energy, 0.0))
+            for plane_part in range(part.max() + 1)
+        ]
     )
     return Motion(
         rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, len(modes)), forms
@@ -138,16 +150,16 @@ def _planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
 
 
 CLASSES: Final = {
-    "parts with one mode each": one_each,
-    "parts with mixed modes": mixed,
-    "two planes": two_planes,
+    "parts with one mode each": draw_one_mode_each,
+    "parts with mixed modes": draw_mixed_modes,
+    "two planes": draw_two_planes,
 }
 
 
-def records(kind: str, seed: int, number: int) -> Iterator[Record]:
-    """Give so many random records of a class: 4 to 14 slow periods, 20 to 150 states a fast one, some with noise."""
-    for one in range(number):
-        rng = np.random.default_rng([seed, list(CLASSES).index(kind), one])
+def draw_records(kind: str, seed: int, number: int) -> Iterator[Record]:
+    """Yield random records of a class: 4 to 14 slow periods, 20 to 150 states per fast period, some with noise."""
+    for record_number in range(number):
+        rng = np.random.default_rng([seed, list(CLASSES).index(kind), record_number])
         motion = CLASSES[kind](rng)
         last, states = rng.uniform(4, 14), np.exp(rng.uniform(np.log(20), np.log(150)))
         time = np.arange(0, last, 2 * np.pi / motion.rate.max() / states)
@@ -164,12 +176,15 @@ def records(kind: str, seed: int, number: int) -> Iterator[Record]:
         first = float(time[-1] * rng.uniform(0.4, 0.9))
         last = float(time[-1] * 0.95) if rng.uniform() < 0.5 else first
         yield Record(
-            history(time, energies), Settings(after=0.0), (first, last), motion.residual
+            make_history_of_parts(time, energies),
+            Settings(after=0.0),
+            (first, last),
+            motion.residual,
         )
 
 
-def history(time: Samples, energies: Samples) -> History:
-    """Give parts the energies, shape (n, k), as a file of them is read."""
+def make_history_of_parts(time: Samples, energies: Samples) -> History:
+    """Return the history of parts with these energies, shape (n, k), as a reader gives it."""
     names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
     return History(
         time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
@@ -177,8 +192,8 @@ def history(time: Samples, energies: Samples) -> History:
     )  # fmt: skip
 
 
-def stated(record: Record) -> Pair | None:
-    """Ask for a pair; None where none is recommended."""
+def recommend_pair(record: Record) -> Pair | None:
+    """Ask for a pair; return None if none is recommended."""
     first, last = record.window
     ask = (
         partial(suggest, td=first)
@@ -203,8 +218,8 @@ def stated(record: Record) -> Pair | None:
 
 
 def try_class(kind: str, count: int, seed: int) -> list[Trial]:
-    """Try so many records of a class, without an oracle."""
-    return [Trial(stated(record)) for record in records(kind, seed, count)]
+    """Try this number of records of a class, without an oracle."""
+    return [Trial(recommend_pair(record)) for record in draw_records(kind, seed, count)]
 
 
 if __name__ == "__main__":

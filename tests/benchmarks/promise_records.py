@@ -75,17 +75,21 @@ def make_integrated(
     end = begin + random.uniform(4, 15) * period
     density = states or np.exp(random.uniform(np.log(15), np.log(80)))
     time = np.arange(0.0, end, np.pi / rates[-1] / density)
-    rest = np.zeros(2 * modes)
+    state_at_rest = np.zeros(2 * modes)
     if stiffening:
         highest = np.abs(
-            structure.move(0.0, begin + period, rest)(time[time < begin + period])[0]
+            structure.move(0.0, begin + period, state_at_rest)(
+                time[time < begin + period]
+            )[0]
         ).max()
         structure = structure._replace(stiffening=np.array([stiffening / highest**2]))
     if join is not None:
         first_periods = np.linspace(begin, begin + 2 * period, 400)
-        free_states = structure.move(0.0, begin + 2 * period, rest)(first_periods)
+        free_states = structure.move(0.0, begin + 2 * period, state_at_rest)(
+            first_periods
+        )
         structure = structure._replace(joint=join(random, structure, free_states))
-    motion = structure.move(0.0, end, rest)
+    motion = structure.move(0.0, end, state_at_rest)
     states_of = motion(time)
     elastic, kinetic = (
         energies.sum(axis=0) for energies in structure.compute_energies(states_of)
@@ -147,8 +151,8 @@ def add_evidence(
     by_time, by_energy = units
     unit = by_energy * by_time  # of a momentum whose unit of length is the metre
     momenta = {
-        f"{axis}_momentum": MASS * speed[:, place] * unit
-        for place, axis in enumerate("xyz")
+        f"{axis}_momentum": MASS * speed[:, axis_index] * unit
+        for axis_index, axis in enumerate("xyz")
     }
     if kind == 2:
         return momenta

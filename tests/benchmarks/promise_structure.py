@@ -79,12 +79,12 @@ class Structure(NamedTuple):
 
     @property
     def is_linear(self) -> bool:
-        """Whether the sum of two free motions is another."""
+        """True if the sum of two free motions is a free motion."""
         return self.joint is None and not self.stiffening.any()
 
     @property
     def _settings(self) -> dict[str, Any]:
-        """How exactly scipy integrates one run."""
+        """Accuracy with which scipy integrates one run."""
         return _EXACT if self.joint is None else _EXACT_WITH_KINKS
 
     def move(
@@ -104,10 +104,10 @@ class Structure(NamedTuple):
             state = answer.y[:, -1]
 
         def evaluate(t: Samples) -> Samples:
-            place = np.clip(np.searchsorted(stops, t) - 1, 0, len(pieces) - 1)
+            piece_index = np.clip(np.searchsorted(stops, t) - 1, 0, len(pieces) - 1)
             states = np.empty((state.size, t.size))
-            for piece in np.unique(place):
-                states[:, place == piece] = pieces[piece](t[place == piece])
+            for piece in np.unique(piece_index):
+                states[:, piece_index == piece] = pieces[piece](t[piece_index == piece])
             return states
 
         return evaluate

@@ -93,8 +93,8 @@ class Truth(NamedTuple):
             else _surround(grid[deepest[:, 1]], nearby, self.flight)
         )
         finer = self._compute_allowed(finer_tr, finer_td, least_time)
-        least = min(errors.min(), finer.min(initial=np.inf))
-        return float(least) if np.isfinite(least) else float("nan")
+        least_residual = min(errors.min(), finer.min(initial=np.inf))
+        return float(least_residual) if np.isfinite(least_residual) else float("nan")
 
     def _compute_allowed(self, tr: Samples, td: Samples, least_time: float) -> Samples:
         """Return R of all pairs of times of shapes (m,) and (n,), infinite for those that are rigid too short."""

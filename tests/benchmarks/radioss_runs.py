@@ -1,8 +1,9 @@
-"""Random Radioss runs against the listings of OpenRadioss: when which part is rigid.
+"""Compare `check` with the listings of OpenRadioss for random Radioss runs: which part is rigid when.
 
 ``OPENRADIOSS_PATH=... python -m tests.benchmarks.radioss_runs 20 1`` writes 20 runs with seeds from 1 on, lets the
-solver compute them, and compares the windows of `check`.  Bodies have groups of parts or of nodes, are merged, switched
-by legs and by sensors that are reset; decks have included files, and files whose last line has no end.
+solver compute them, and compares the windows of `check` with the listings.  Bodies have groups of parts or of nodes,
+are merged, and are switched by engine files and by sensors that are reset.  Decks have included files, and files
+without a final line end.
 """
 
 import random
@@ -26,27 +27,30 @@ from tests.deck.test_solver_listings import (
     write_merge,
     write_run,
 )
-from tests.decks import wide
+from tests.decks import pad
 
 PARTS = (1, 2, 3)
 
 
 def write_group(chance: random.Random, part: int) -> tuple[int, str]:
-    """Give a group with all nodes of a part, and its number: that of parts, of nodes, or of groups."""
+    """Return the card and number of a group with all nodes of a part: a group of parts, of nodes, or of groups."""
     number = 10 * part
-    nodes = [number + at for at in range(1, 5)]
+    nodes = [number + corner for corner in range(1, 5)]
     kind = chance.choice(["PART", "NODE", "NODENS", "GRNOD", "GENE"])
     if kind == "PART":
         return part, ""
     if kind in ("NODE", "NODENS"):
-        return number, f"/GRNOD/{kind}/{number}\nnodes\n{wide(*nodes)}"
+        return number, f"/GRNOD/{kind}/{number}\nnodes\n{pad(*nodes)}"
     if kind == "GENE":
-        return number, f"/GRNOD/GENE/{number}\nnodes\n{wide(nodes[0], nodes[-1])}"
-    inner = f"/GRNOD/NODE/{number + 1}\ninner\n{wide(*nodes[:3])}"
-    outer = f"/GRNOD/NODE/{number + 2}\nrest\n{wide(nodes[3])}"
+        return (
+            number,
+            f"/GRNOD/GENE/{number}\nnodes\n{pad(nodes[0], nodes[-1])}",
+        )
+    inner = f"/GRNOD/NODE/{number + 1}\ninner\n{pad(*nodes[:3])}"
+    outer = f"/GRNOD/NODE/{number + 2}\nrest\n{pad(nodes[3])}"
     return (
         number,
-        f"{inner}{outer}/GRNOD/GRNOD/{number}\nboth\n{wide(number + 1, number + 2)}",
+        f"{inner}{outer}/GRNOD/GRNOD/{number}\nboth\n{pad(number + 1, number + 2)}",
     )
 
 
@@ -57,12 +61,12 @@ def write_sensors(chance: random.Random) -> str:
         6, times[2], chance.choice([None, times[3]])
     )
     kind = chance.choice(["OR", "AND", "NOT"])
-    asked = (5,) if kind == "NOT" else (5, 6)
-    return clocks + write_logic(kind, 7, *asked)
+    operand_count = (5,) if kind == "NOT" else (5, 6)
+    return clocks + write_logic(kind, 7, *operand_count)
 
 
 def write_leg(
-    chance: random.Random, nodes: list[int], off: set[int], *, first: bool
+    chance: random.Random, nodes: list[int], bodies_off: set[int], *, first: bool
 ) -> str:
     """Write what a leg switches: main nodes in any order, over several lines or cards; maybe a reset.
 
@@ -70,17 +74,17 @@ def write_leg(
     that it begins to be rigid there.
     """
     lines = []
-    on = chance.sample(sorted(off), chance.randint(0, len(off)))
-    others = [node for node in nodes if node not in on]
-    put_off = chance.sample(others, chance.randint(0, len(others)))
+    on = chance.sample(sorted(bodies_off), chance.randint(0, len(bodies_off)))
+    other_nodes = [node for node in nodes if node not in on]
+    put_off = chance.sample(other_nodes, chance.randint(0, len(other_nodes)))
     cards = [
         (keyword, chosen) for keyword, chosen in ((ON, on), (OFF, put_off)) if chosen
     ]
     chance.shuffle(cards)
     for keyword, chosen in cards:
         lines.append(keyword + chance.choice([" ", "\n"]).join(map(str, chosen)))
-    off -= {*on}
-    off |= {*put_off}
+    bodies_off -= {*on}
+    bodies_off |= {*put_off}
     if not first and chance.random() < 0.2:
         lines.append(RESET + "5 6")
     if chance.random() < 0.3:
@@ -94,18 +98,18 @@ def draw_run(seed: int) -> Listed:
     starter, nodes = "", []
     parts = chance.sample(PARTS, chance.randint(1, 3))
     sensed = chance.random() < 0.4
-    made = 0
+    group_count = 0
     for number, part in sorted(
         (chance.randint(1, 9) * 10 + part, part) for part in parts
     ):
-        named = chance.random() < 0.75
-        made += not named
-        node = 100 + part if named else 0
-        nodes.append(node or 103 + made)
+        is_named = chance.random() < 0.75
+        group_count += not is_named
+        node = 100 + part if is_named else 0
+        nodes.append(node or 103 + group_count)
         group, text = write_group(chance, part)
         sensor = chance.choice([5, 7]) if sensed and part == parts[0] else 0
         starter += text + write_body(number, node, part, sensor).replace(
-            wide(part, 0, 0, 0), wide(group, 0, 0, 0), 1
+            pad(part, 0, 0, 0), pad(group, 0, 0, 0), 1
         )
     if sensed:
         starter += write_sensors(chance)
@@ -115,16 +119,19 @@ def draw_run(seed: int) -> Listed:
             for line in starter.splitlines()
             if line.startswith("/RBODY/")
         )
-        first, other = chance.sample(ids, 2)
-        starter += write_merge((first, 1, other, 1))
+        first, second_part = chance.sample(ids, 2)
+        starter += write_merge((first, 1, second_part, 1))
     count = chance.choice([1, 2, 3])
-    off: set[int] = set()
-    legs = tuple(write_leg(chance, nodes, off, first=at == 0) for at in range(count))
+    bodies_off: set[int] = set()
+    legs = tuple(
+        write_leg(chance, nodes, bodies_off, first=window_index == 0)
+        for window_index in range(count)
+    )
     return Listed(starter, legs, {}, chance.choice([2018, 2023]))
 
 
-def spread(folder: Path, chance: random.Random, starter: str) -> None:
-    """Move what a run adds to the plates into an included file, or one that this includes; cut ends of files."""
+def spread_over_files(folder: Path, chance: random.Random, starter: str) -> None:
+    """Move the bodies of a run into an included file, or into a file that this one includes; drop final line ends."""
     main = folder / "X_0000.rad"
     text = main.read_text()
     if starter and chance.random() < 0.5:
@@ -148,33 +155,35 @@ def compare(folder: Path, seed: int) -> str:
     """Compare `check` with the listing of a run; empty where both agree."""
     run = draw_run(seed)
     main = write_run(folder, run)
-    spread(folder, random.Random(seed), run.starter)
+    spread_over_files(folder, random.Random(seed), run.starter)
     run_solver(folder, "X")
     listed, checked = find_spans_by_listing(folder), find_spans_by_check(main)
     closed = {
         part: [(tr, inf if td is None else td) for tr, td in spans]
         for part, spans in checked.items()
     }
-    kept = {
+    spans_to_compare = {
         part: [span for span in spans if span[1] - span[0] > 4 * STEP]
         for part, spans in closed.items()
     }
-    kept = {part: spans for part, spans in kept.items() if spans}
-    agree = listed.keys() == kept.keys() and all(
+    spans_to_compare = {
+        part: spans for part, spans in spans_to_compare.items() if spans
+    }
+    agree = listed.keys() == spans_to_compare.keys() and all(
         len(listed[part]) == len(spans)
         and all(
-            abs(time - other) <= 4 * STEP or time == other
-            for span, known in zip(spans, listed[part], strict=True)
-            for time, other in zip(span, known, strict=True)
+            abs(time - listed_time) <= 4 * STEP or time == listed_time
+            for span, listed_span in zip(spans, listed[part], strict=True)
+            for time, listed_time in zip(span, listed_span, strict=True)
         )
-        for part, spans in kept.items()
+        for part, spans in spans_to_compare.items()
     )
-    return "" if agree else f"listing {listed}, check {kept}"
+    return "" if agree else f"listing {listed}, check {spans_to_compare}"
 
 
 def main(count: int, seed: int) -> None:
-    """Compute some runs, and say in how many `check` agrees with the listing."""
-    wrong = 0
+    """Compute some runs, and print in how many `check` agrees with the listing."""
+    wrong_count = 0
     for number in range(seed, seed + count):
         with tempfile.TemporaryDirectory() as folder:
             try:
@@ -182,9 +191,9 @@ def main(count: int, seed: int) -> None:
             except AssertionError as error:
                 difference = f"not compared: {str(error)[-300:]}"
         if difference:
-            wrong += 1
+            wrong_count += 1
             print(f"seed {number}: {difference}", flush=True)
-    print(f"{count - wrong} of {count} agree")
+    print(f"{count - wrong_count} of {count} agree")
 
 
 if __name__ == "__main__":

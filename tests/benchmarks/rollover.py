@@ -1,7 +1,7 @@
-"""The twenty-one rehearsals as they are, and what switching saves: ``python -m tests.benchmarks.rollover``.
+"""Print the 21 rehearsals and the savings of switching: ``python -m tests.benchmarks.rollover``.
 
-Exit code 1 when a recommended tr rolls wrong, an energy comes back that was not announced, or a run costs more than a
-hundred of ``suggest`` on its history.
+The exit code is 1 if a recommended tr gives a wrong roll, if the energy after td is not the announced one, or if a run
+costs more than 100 calls of ``suggest`` for its history.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ HEAD = (
 )
 
 
-def rehearsed(number: int) -> Rehearsal:
-    """One set, a tr every 6 ms in the trip."""
+def rehearse_set(number: int) -> Rehearsal:
+    """Rehearse one set with a tr every 6 ms in the trip."""
     with TemporaryDirectory() as folder:
-        return rehearse(SETS[number], Path(folder), every=2)
+        return rehearse(SETS[number], Path(folder), stride=2)
 
 
-def line(number: int, one: Rehearsal) -> tuple[str, bool]:
-    """Everything about one set, and whether it is right."""
-    p, run = one.parameters, one.reference
-    good = one.roll_share < 0.1 and abs(one.energy_off) < 0.25
+def format_line(number: int, trial: Rehearsal) -> tuple[str, bool]:
+    """Return the line about one set, and True if it is right."""
+    p, run = trial.parameters, trial.reference
+    good = trial.roll_share < 0.1 and abs(trial.energy_off) < 0.25
     text = (
         f"{number:2d}  {p.stiffness:9.3g}  {p.yield_strain:.5f}  {p.damping:5.2f}  {p.speed:5.2f}  {p.mesh:4d}"
-        f"  {(run.released or np.nan) * 1e3:8.1f}  {(run.landed or np.nan) * 1e3:6.1f}  {one.td:.3f}"
-        f"  {one.tr or np.nan:.5f}  {one.error:10.4f}  {one.roll_share:8.4f}"
-        f"  {one.announced:9.3f}  {one.mean_ratio:.3f}  {one.energy_off:+.3f}{'' if good else '  FAILED'}"
+        f"  {(run.released or np.nan) * 1e3:8.1f}  {(run.landed or np.nan) * 1e3:6.1f}  {trial.td:.3f}"
+        f"  {trial.tr or np.nan:.5f}  {trial.error:10.4f}  {trial.roll_share:8.4f}"
+        f"  {trial.announced:9.3f}  {trial.mean_ratio:.3f}  {trial.energy_off:+.3f}{'' if good else '  FAILED'}"
     )
     return text, good
 
 
-def saving(mesh: int) -> str:
-    """Bar updates and wall time of a switched run over those of the run without switching."""
+def measure_saving(mesh: int) -> str:
+    """Return a text with bar updates and elapsed time of a switched run over those of the reference run."""
     parameters = Parameters(mesh=mesh)
     pairs = [
         (simulate(parameters, 0.42), simulate(parameters, 0.42, WINDOW))
@@ -64,12 +64,12 @@ def saving(mesh: int) -> str:
 
 
 def main() -> int:
-    """Print all rehearsals, the saving, and the cost of a run; tell whether all is well."""
+    """Print all rehearsals, the saving, and the cost of a run; return 1 if one of them fails."""
     missed = 0
     print(HEAD)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for number, one in enumerate(pool.map(rehearsed, range(len(SETS)))):
-            text, good = line(number, one)
+        for number, trial in enumerate(pool.map(rehearse_set, range(len(SETS)))):
+            text, good = format_line(number, trial)
             missed += not good
             print(text, flush=True)
     print(
@@ -77,7 +77,7 @@ def main() -> int:
     )
     print("mesh  step     bar updates   wall time  seconds")
     for mesh in (8, 16, 32, 64):
-        print(saving(mesh), flush=True)
+        print(measure_saving(mesh), flush=True)
     run = simulate(Parameters(), 0.4)
     start = perf_counter()
     suggest(make_history(run), 0.37, Settings())

@@ -1,9 +1,9 @@
-"""Cost of a study per run against a plain loop over the library call, and its memory.
+"""Cost of a study per run compared with a plain loop over the library call, and its memory.
 
-``python -m tests.benchmarks.study``: 1000 runs of 1e4 states each; every study is a process of its own.  What is
-compared takes turns, medians are told.
-Exit code 1 when a goal is missed: a study in one process costs no more than a quarter more than the loop, for it finds
-all windows of acceptable tr beside; a further run needs much less memory than its 160 kB of numbers.
+``python -m tests.benchmarks.study``: 1000 runs of 1e4 states each; every study is a separate process.  Compared calls
+take turns, and medians are printed.  The exit code is 1 if a goal is missed: a study in one process may cost 25 % more
+than the loop, because it also finds all windows of acceptable tr; each further run needs much less memory than its 160
+kB of numbers.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ assert all(found)
 
 
 def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> list[str]:
-    """Write records of the paper's oscillator whose rate scatters by a thousandth; names of the files.
+    """Write records of the paper's oscillator with frequencies scattered by 0.1 %; return the file names.
 
-    ``noise`` is the standard deviation of white noise, of the highest energy [-].
+    ``noise`` is the standard deviation of white noise over the highest energy [-].
     """
     rng = np.random.default_rng(7)
     time = np.linspace(0.0, 0.15, states)
@@ -72,7 +72,7 @@ def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> li
 
 
 def cluster_overhead(workers: int) -> float | None:
-    """Milliseconds that a run takes which does nothing, on a Dask cluster of so many workers on this machine."""
+    """Return the time of an empty run on a Dask cluster of this number of workers on this machine [ms]."""
     if not find_spec("distributed"):
         return None
     from distributed import Client
@@ -95,7 +95,7 @@ def cluster_overhead(workers: int) -> float | None:
 
 
 def process(*args: str) -> tuple[float, float, bytes]:
-    """Seconds and peak memory of the largest process [MB] of a command, and what it prints."""
+    """Run a command; return its time [s], the peak memory of its largest process [MB], and its output."""
     # the peak is that of the largest child so far, so each command has a parent of its own
     code = (
         "import json, subprocess, sys, time; from resource import *; start = time.perf_counter();"
@@ -107,13 +107,13 @@ def process(*args: str) -> tuple[float, float, bytes]:
         [sys.executable, "-c", code, sys.executable, *args], stdout=subprocess.PIPE, check=True, cwd=ROOT,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     ).stdout  # fmt: skip
-    head, _, rest = result.partition(b"\n")
+    head, _, last_line = result.partition(b"\n")
     seconds, memory = json.loads(head)
-    return seconds, memory, rest
+    return seconds, memory, last_line
 
 
-def study(names: list[str], *options: str) -> tuple[float, float]:
-    """Seconds and peak memory of a study in which every run has a tr and all share one."""
+def measure_study(names: list[str], *options: str) -> tuple[float, float]:
+    """Return time [s] and peak memory [MB] of a study in which every run has a tr and all share one."""
     args = (
         "-m",
         "d2rpick",
@@ -127,17 +127,17 @@ def study(names: list[str], *options: str) -> tuple[float, float]:
         *names,
     )
     seconds, memory, text = process(*args)
-    found = json.loads(text)
-    assert [run["status"] for run in found["runs"]] == ["ok"] * len(names)
-    assert found["common_tr"] is not None
+    document = json.loads(text)
+    assert [run["status"] for run in document["runs"]] == ["ok"] * len(names)
+    assert document["common_tr"] is not None
     return seconds, memory
 
 
 def main() -> int:
-    """Measure and tell; 1 when a goal is missed."""
+    """Measure and print the results; return 1 if a goal is missed."""
     everything = str(len(os.sched_getaffinity(0)))
-    with TemporaryDirectory() as place:
-        names = write_runs(Path(place), RUNS, STATES)
+    with TemporaryDirectory() as folder:
+        names = write_runs(Path(folder), RUNS, STATES)
         jobs = {
             f"study --jobs {number}": ("--jobs", number)
             for number in ("1", "2", everything)
@@ -148,11 +148,11 @@ def main() -> int:
         for _ in range(ROUNDS):
             loops.append(process("-c", LOOP, *names)[0])
             for name, options in jobs.items():
-                studies[name].append(study(names, *options)[0])
+                studies[name].append(measure_study(names, *options)[0])
         loop = median(loops)
-        after = os.getloadavg()[0]
+        load_after = os.getloadavg()[0]
         print(
-            f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {after:.1f} after"
+            f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {load_after:.1f} after"
         )
         for name, seconds in {
             "plain loop over the library call": loops,
@@ -162,14 +162,16 @@ def main() -> int:
                 f"{name:34} {median(seconds) / RUNS * 1e3:6.2f} ms per run, {median(seconds) / loop:4.2f} of the loop"
             )
         grown = []
-        for extra in ((), ("--plot", f"{place}/runs.png", "--overwrite")):
-            few, many = (
-                study(some, "--jobs", "2", *extra)[1] for some in (names[:FEW], names)
+        for extra in ((), ("--plot", f"{folder}/runs.png", "--overwrite")):
+            few_mb, many_mb = (
+                measure_study(chosen_names, "--jobs", "2", *extra)[1]
+                for chosen_names in (names[:FEW], names)
             )
-            grown.append((many - few) / (RUNS - FEW) * 1e3)
-            what = f"peak memory of study {' '.join(extra[:1])}".strip()
+            grown.append((many_mb - few_mb) / (RUNS - FEW) * 1e3)
+            quantity = f"peak memory of study {' '.join(extra[:1])}".strip()
             print(
-                f"{what}: {few:.1f} MB with {FEW} runs, {many:.1f} MB with {RUNS}: {grown[-1]:.1f} kB per run more"
+                f"{quantity}: {few_mb:.1f} MB with {FEW} runs, {many_mb:.1f} MB with {RUNS}: "
+                f"{grown[-1]:.1f} kB per run more"
             )
     return int(
         median(studies["study --jobs 1"]) > MOST * loop or max(grown) > MOST_GROWN

@@ -1,4 +1,4 @@
-"""How what is compared is timed: in turns, by medians."""
+"""Timing of compared calls: in turns, by medians."""
 
 from __future__ import annotations
 
@@ -18,67 +18,72 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def seconds(call: Callable[[], object]) -> float:
-    """How long a call takes."""
+def measure_seconds(call: Callable[[], object]) -> float:
+    """Return the elapsed time of a call [s]."""
     start = perf_counter()
     call()
     return perf_counter() - start
 
 
-def own_seconds(call: Callable[[], object]) -> float:
-    """Processor time of this process for a call."""
+def measure_own_seconds(call: Callable[[], object]) -> float:
+    """Return the processor time of this process for a call [s]."""
     start = process_time()
     call()
     return process_time() - start
 
 
-def processor_seconds(call: Callable[[], object]) -> float:
-    """Processor time of the processes that a call starts."""
-    before = getrusage(RUSAGE_CHILDREN)
+def measure_processor_seconds(call: Callable[[], object]) -> float:
+    """Return the processor time of the child processes of a call [s]."""
+    usage_before = getrusage(RUSAGE_CHILDREN)
     call()
-    after = getrusage(RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    usage_after = getrusage(RUSAGE_CHILDREN)
+    return (
+        usage_after.ru_utime
+        + usage_after.ru_stime
+        - usage_before.ru_utime
+        - usage_before.ru_stime
+    )
 
 
-def ratio(
-    one: Callable[[], object],
-    other: Callable[[], object],
+def measure_ratio(
+    first_call: Callable[[], object],
+    second_call: Callable[[], object],
     rounds: int,
     repeats: int = 1,
-    cost: Callable[[Callable[[], object]], float] = seconds,
+    cost: Callable[[Callable[[], object]], float] = measure_seconds,
 ) -> float:
-    """``cost`` of ``one`` over that of ``other``, taking turns of so many repeats.
+    """Return ``cost`` of ``first_call`` over that of ``second_call``, in turns of this number of repeats.
 
     With more than one repeat each turn begins with an unmeasured call, so that the measured ones find their memory.
     """
     costs: tuple[list[float], list[float]] = ([], [])
     for _ in range(rounds):
-        for call, found in zip((one, other), costs, strict=True):
+        for call, costs_of_call in zip((first_call, second_call), costs, strict=True):
             turn = [cost(call) for _ in range(repeats + (repeats > 1))]
-            found += turn[1:] or turn
+            costs_of_call += turn[1:] or turn
     return median(costs[0]) / median(costs[1])
 
 
-def output(*command: str) -> bytes:
-    """What a process of this Python prints, in the folder of the project."""
+def read_output(*command: str) -> bytes:
+    """Return the output of a process of this Python, run in the folder of the project."""
     result = subprocess.run(
         [sys.executable, *command],
         check=True,
         capture_output=True,
         cwd=ROOT,
-        env=environment(),
+        env=make_environment(),
     )
     return result.stdout
 
 
 @cache
-def environment() -> dict[str, str]:
-    """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
-    own = "PYTHONDONTWRITEBYTECODE"
+def make_environment() -> dict[str, str]:
+    """Return an environment for child processes that use compiled files, like an installed package."""
+    own_variable = "PYTHONDONTWRITEBYTECODE"
     clean = {
         name: value
         for name, value in os.environ.items()
-        if name != own and not name.startswith("D2RPICK_")
+        if name != own_variable and not name.startswith("D2RPICK_")
     }
     subprocess.run(
         [sys.executable, "-m", "compileall", "-q", "d2rpick"],

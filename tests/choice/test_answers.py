@@ -1,4 +1,4 @@
-"""What suggest decides and verify judges, and that a record is examined once: what is recommended verifies."""
+"""Choices of suggest and verdicts of verify: a recommended pair verifies, and each record is examined once."""
 
 from functools import partial
 from typing import Any
@@ -26,16 +26,23 @@ from d2rpick.rules.judgement import find_faults
 from tests import paper
 from tests.command import BOX as T01, ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
-from tests.energies import codes, of, rollover, suggest_in_window, sure, vibration
-from tests.reading import solved
+from tests.energies import (
+    list_codes,
+    make_energy_history,
+    make_vibration_energy,
+    read_rollover,
+    require,
+    suggest_in_window,
+)
+from tests.reading import read_solved
 
 PLAIN = Settings()
 
 
 @pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
-    """By the contact energy the trip ends at 90.8 ms."""
-    answer = suggest(rollover(), 0.37, PLAIN)
+    """According to the contact energy, the trip ends at 90.8 ms."""
+    answer = suggest(read_rollover(), 0.37, PLAIN)
     flight = answer.situation.flight
     assert (answer.situation.basis, flight.source, flight.certain) == (
         "energy",
@@ -43,8 +50,8 @@ def test_the_rollover_is_switched_after_the_trip() -> None:
         False,
     )
     assert flight.settled == pytest.approx(0.0850, abs=0.002)
-    assert 0.0908 < sure(flight.start) <= sure(answer.recommended).tr <= 0.185
-    assert "flight-from-energy" in codes(answer)
+    assert 0.0908 < require(flight.start) <= require(answer.recommended).tr <= 0.185
+    assert "flight-from-energy" in list_codes(answer)
     assert answer.situation.kinetic_share is None
     for c in answer.candidates:
         assert (c.sign_match, c.lock_in_error, c.residual, c.timing_tolerance) == (
@@ -53,7 +60,7 @@ def test_the_rollover_is_switched_after_the_trip() -> None:
             None,
             None,
         )
-    early = [c for c in answer.candidates if c.tr < sure(flight.start)]
+    early = [c for c in answer.candidates if c.tr < require(flight.start)]
     assert early
     assert all(
         not c.acceptable and "before the end of the load" in c.notes[0] for c in early
@@ -68,13 +75,17 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(
     energy = 20 * np.exp(-8 * time) + np.random.default_rng(seed).standard_normal(
         time.size
     )
-    answer = suggest(of(energy, time), 0.9, Settings(replay=False))
-    own, better = answer.situation, sure(answer.better_pair).td
-    nearer = [td for td in own.peaks(sure(own.earliest_tr), own.td) if td > better]
+    answer = suggest(make_energy_history(energy, time), 0.9, Settings(replay=False))
+    situation, better = answer.situation, require(answer.better_pair).td
+    nearer = [
+        td
+        for td in situation.peaks(require(situation.earliest_tr), situation.td)
+        if td > better
+    ]
     assert nearer
     for td in nearer:
-        there = suggest_at(own.at(td), with_better=False).chosen
-        assert there is None or there.same_swing
+        answer_there = suggest_at(situation.at(td), with_better=False).chosen
+        assert answer_there is None or answer_there.same_swing
 
 
 @pytest.mark.slow
@@ -84,22 +95,26 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(
     st.sampled_from([1e-6, 1.0, 1e6]),
 )
 def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
-    plain = vibration(decay=0.3)
-    there = of(joule * plain.energy, unit * (plain.time + shift))
-    expected = suggest(plain, 3.1, PLAIN)
-    found = suggest(there, float(unit * (3.1 + shift)), PLAIN)
-    assert sure(found.recommended).tr / unit - shift == pytest.approx(
-        sure(expected.recommended).tr, abs=1e-7
+    plain = make_vibration_energy(decay=0.3)
+    scaled_history = make_energy_history(
+        joule * plain.energy, unit * (plain.time + shift)
     )
-    assert sure(found.recommended).residual == pytest.approx(
-        sure(expected.recommended).residual, abs=1e-6
+    expected = suggest(plain, 3.1, PLAIN)
+    suggestion = suggest(scaled_history, float(unit * (3.1 + shift)), PLAIN)
+    assert require(suggestion.recommended).tr / unit - shift == pytest.approx(
+        require(expected.recommended).tr, abs=1e-7
+    )
+    assert require(suggestion.recommended).residual == pytest.approx(
+        require(expected.recommended).residual, abs=1e-6
     )
 
 
 def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> None:
     time = np.linspace(0.0, 0.01, 400)
     answer = suggest(
-        of(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time), 0.01, Settings()
+        make_energy_history(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time),
+        0.01,
+        Settings(),
     )
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
@@ -107,27 +122,37 @@ def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> 
 
 @pytest.mark.slow
 def test_without_a_known_flight_the_verdict_is_unknown() -> None:
-    history = rollover()
+    history = read_rollover()
     flying = history.time > 0.1
-    answer = suggest(of(history.energy[flying], history.time[flying]), 0.37, PLAIN)
+    answer = suggest(
+        make_energy_history(history.energy[flying], history.time[flying]), 0.37, PLAIN
+    )
     assert answer.situation.flight.start is None
     assert answer.recommended is None
-    assert {"no-flight", "no-candidate"} <= codes(answer)
-    judged = verify(of(history.energy[flying], history.time[flying]), 0.12, 0.37, PLAIN)
+    assert {"no-flight", "no-candidate"} <= list_codes(answer)
+    judged = verify(
+        make_energy_history(history.energy[flying], history.time[flying]),
+        0.12,
+        0.37,
+        PLAIN,
+    )
     assert (judged.tr_ok, judged.verified) == (None, False)
 
 
 def test_the_sign_is_judged_before_the_tolerance() -> None:
     judged = verify(
-        paper.history(), 0.0122658849405802, paper.TD, Settings(tolerance=1.0)
+        paper.make_history(),
+        0.0122658849405802,
+        paper.TD,
+        Settings(tolerance=1.0),
     )
     assert judged.tr_ok is False
     assert judged.reasons == ("opposite sign of the deformation",)
 
 
 def test_verify_measures_what_suggest_measures() -> None:
-    best = suggest(paper.history(), paper.TD, PLAIN).candidates[0]
-    judged = verify(paper.history(), best.tr, paper.TD, PLAIN)
+    best = suggest(paper.make_history(), paper.TD, PLAIN).candidates[0]
+    judged = verify(paper.make_history(), best.tr, paper.TD, PLAIN)
     for name in [
         "energy",
         "level_ratio",
@@ -147,15 +172,15 @@ def test_verify_measures_what_suggest_measures() -> None:
     assert judged.td_ok is False  # a kinetic share of 0.92
 
 
-def ringing() -> History:
-    """Three modes and noise, finely sampled: of several modes a tr may be a closest match, which is off the level."""
+def make_ringing_history() -> History:
+    """Return three modes with noise, finely sampled; a tr for several modes may be a closest match, off the level."""
     time = np.linspace(0, 0.5, 10_001)
     modes = [(5, 4, 300, 0.3), (2, 6, 777, 1), (1, 9, 1500, 2)]
     energy = sum(
         a * np.exp(-alpha * time) * np.sin(omega * time + phase) ** 2
         for a, alpha, omega, phase in modes
     )
-    return of(
+    return make_energy_history(
         energy + 0.01 * np.abs(np.random.default_rng(5).standard_normal(time.size)),
         time,
     )
@@ -163,15 +188,15 @@ def ringing() -> History:
 
 @pytest.mark.slow
 def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
-    history, asked = ringing(), Settings(after=0.05)
-    found = suggest(history, 0.4, asked).candidates
-    assert found
-    situation = examine(history, 0.4, asked)
-    for one in found:
-        judged = verify_at(situation, one.tr).candidate
-        assert judged.notes == one.notes
+    history, settings_asked = make_ringing_history(), Settings(after=0.05)
+    suggestion = suggest(history, 0.4, settings_asked).candidates
+    assert suggestion
+    situation = examine(history, 0.4, settings_asked)
+    for remark_row in suggestion:
+        judged = verify_at(situation, remark_row.tr).candidate
+        assert judged.notes == remark_row.notes
         assert (judged.tr_low, judged.tr_high) == pytest.approx(
-            (one.tr_low, one.tr_high), rel=1e-9
+            (remark_row.tr_low, remark_row.tr_high), rel=1e-9
         )
 
 
@@ -189,7 +214,7 @@ OPTIONS = st.builds(
 
 @st.composite
 def histories(draw: st.DrawFn) -> History:
-    """A load that falls, then one or two modes, damped or not, with noise, sampled finely or coarsely."""
+    """Draw a load that falls, then one or two modes, damped or not, with noise, finely or coarsely sampled."""
     count, rng = (
         draw(st.integers(12, 90)),
         np.random.default_rng(draw(st.integers(0, 2**32 - 1))),
@@ -210,44 +235,46 @@ def histories(draw: st.DrawFn) -> History:
     energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(
         rng.standard_normal(count)
     )
-    return of(energy, time)
+    return make_energy_history(energy, time)
 
 
-def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
-    """Whether a pair is verified; none is."""
+def verify_pair(history: History, pair: Pair | None, settings_asked: Settings) -> bool:
+    """Return True if a pair verifies; no pair counts as verified."""
     if pair is None:
         return True
-    return verify(history, pair.tr, pair.td, asked).admissible
+    return verify(history, pair.tr, pair.td, settings_asked).admissible
 
 
 @settings(max_examples=8)
 @given(histories(), st.floats(3.0, 9.9), OPTIONS)
 def test_what_is_chosen_for_a_td_is_verified(
-    history: History, td: float, asked: Settings
+    history: History, td: float, settings_asked: Settings
 ) -> None:
     td = min(td, float(history.time[-1]))
-    answer = suggest(history, td, asked)
-    assert holds(history, answer.recommended, asked)
-    assert holds(history, answer.better_pair, asked)
+    answer = suggest(history, td, settings_asked)
+    assert verify_pair(history, answer.recommended, settings_asked)
+    assert verify_pair(history, answer.better_pair, settings_asked)
 
 
 @pytest.mark.slow
 @settings(max_examples=5)
 @given(histories(), st.floats(3.0, 8.0), OPTIONS)
 def test_what_is_chosen_in_a_window_is_verified(
-    history: History, low: float, asked: Settings
+    history: History, low: float, settings_asked: Settings
 ) -> None:
     answer = suggest_in_window(
-        history, (low, min(low + 1.5, float(history.time[-1]))), asked
+        history, (low, min(low + 1.5, float(history.time[-1]))), settings_asked
     )
-    assert holds(history, answer.recommended, asked)
-    assert holds(history, answer.better_pair, asked)
+    assert verify_pair(history, answer.recommended, settings_asked)
+    assert verify_pair(history, answer.better_pair, settings_asked)
 
 
 @pytest.mark.parametrize("td", [0.72, 0.8, 0.87])
 def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
-    history = solved("faults/better_td_unverified.csv").history
-    assert holds(history, suggest(history, td, Settings()).better_pair, Settings())
+    history = read_solved("faults/better_td_unverified.csv").history
+    assert verify_pair(
+        history, suggest(history, td, Settings()).better_pair, Settings()
+    )
 
 
 @pytest.mark.parametrize("limit", [{"max_kinetic_share": 0.3}, {"max_residual": 0.3}])
@@ -260,7 +287,7 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
         + np.sin(3 * time) ** 2
         + 0.6 * np.cos(5.1 * time) ** 2
     )
-    history = of(energy, time)
+    history = make_energy_history(energy, time)
     free = suggest_in_window(history, (6.0, 9.0), Settings(replay=False))
     assert free.recommended
     assert (
@@ -273,7 +300,7 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
 
 def test_too_few_states_per_period_recommend_nothing() -> None:
     time = np.linspace(0, 10, 141)
-    history = of(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
+    history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     answer = suggest(
         history, 8.0, Settings()
     )  # six states in each period of the energy
@@ -291,9 +318,9 @@ def test_the_health_of_the_run_comes_with_every_answer() -> None:
         suggest_of(whole, 0.37, PLAIN),
         suggest_of(whole, (0.3, 0.38), PLAIN),
     )
-    verdict = verify_of(whole, sure(answer.recommended).tr, 0.37, PLAIN)
-    assert sure(answer.health) == verdict.health
-    assert sure(answer.health).window == (sure(answer.recommended).tr, 0.37)
+    verdict = verify_of(whole, require(answer.recommended).tr, 0.37, PLAIN)
+    assert require(answer.health) == verdict.health
+    assert require(answer.health).window == (require(answer.recommended).tr, 0.37)
     assert in_window.health is not None
     assert (
         suggest_of(read([ENERGY]), 0.064, PLAIN).health is None
@@ -307,8 +334,8 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
     )
     (of_whole, *_), (of_box, *_) = whole.momenta, box.momenta
     assert of_whole.parts == of_box.parts
-    assert of_whole.chosen == tuple(range(len(sure(of_whole.parts))))
-    assert [sure(of_whole.parts)[i].title for i in of_box.chosen] == ["box"]
+    assert of_whole.chosen == tuple(range(len(require(of_whole.parts))))
+    assert [require(of_whole.parts)[i].title for i in of_box.chosen] == ["box"]
     assert of_whole.values is of_box.values  # read once
 
 
@@ -320,13 +347,13 @@ def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     reference, fits = read([T01], BOX), CountedFits()
     box = suggest_of(reference, 0.37, PLAIN, fits=fits)
-    before = fits.made
-    assert before > 0
-    judge = partial(verify_of, reference, settings=PLAIN, known=box.situation)
+    fits_made = fits.made
+    assert fits_made > 0
+    judge = partial(verify_of, reference, settings=PLAIN, earlier=box.situation)
     assert judged_card(
-        [sure(box.recommended)[:2]],
+        [require(box.recommended)[:2]],
         box.situation.history,
         judge,
         CardRequest("ls-dyna"),
     )
-    assert fits.made == before
+    assert fits.made == fits_made

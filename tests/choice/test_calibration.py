@@ -1,4 +1,4 @@
-"""Weights fitted to legs: what the legs tell is found, what they do not keeps its ratio."""
+"""Element weights fitted to the times of restart segments; ratios that the segments do not determine are kept."""
 
 import shutil
 from collections.abc import Mapping
@@ -15,14 +15,14 @@ from d2rpick.choice.calibration import (
 )
 from d2rpick.choice.cost import MEASURED
 from tests.deck.test_radioss_inventory import BEGIN, PROPS, write_nodes
-from tests.decks import wide
+from tests.decks import pad
 
 TRUE = {"QBAT": 2.0, "BT": 0.9, "solid": 1.5}
 REST, RIGID, NODES = 0.01, 0.1, 20_000
 ALL = {"QBAT": 400.0, "BT": 500.0, "solid": 300.0}
 
 
-def leg(
+def make_leg(
     counts: Mapping[str, float], rigid_nodes: float, *, elements: bool = True
 ) -> Observation:
     spent = sum(TRUE[name] * count for name, count in counts.items())
@@ -32,42 +32,46 @@ def leg(
     )
 
 
-def legs(*, elements: bool = True) -> list[Observation]:
-    one_less = [leg({**ALL, name: 0.0}, NODES // 2, elements=elements) for name in ALL]
+def make_legs(*, elements: bool = True) -> list[Observation]:
+    one_less = [
+        make_leg({**ALL, name: 0.0}, NODES // 2, elements=elements) for name in ALL
+    ]
     return [
-        leg(ALL, 0, elements=elements),
+        make_leg(ALL, 0, elements=elements),
         *one_less,
-        leg(dict.fromkeys(ALL, 0.0), NODES, elements=elements),
+        make_leg(dict.fromkeys(ALL, 0.0), NODES, elements=elements),
     ]
 
 
 @pytest.mark.parametrize("elements", [True, False])
 def test_weights_of_a_made_site_are_found(elements: bool) -> None:
-    found = calibrate(legs(elements=elements))
-    assert found.misfit < 0.03
+    calibration = calibrate(make_legs(elements=elements))
+    assert calibration.misfit < 0.03
     for name, weight in TRUE.items():
-        assert found.weights.per_element[name] == pytest.approx(weight, rel=0.1)
-    assert found.weights.rigid_node == pytest.approx(RIGID, rel=0.15)
-    assert found.weights.element_share == pytest.approx(
-        1 - REST * NODES / leg(ALL, 0).total, abs=0.03
+        assert calibration.weights.per_element[name] == pytest.approx(weight, rel=0.1)
+    assert calibration.weights.rigid_node == pytest.approx(RIGID, rel=0.15)
+    assert calibration.weights.element_share == pytest.approx(
+        1 - REST * NODES / make_leg(ALL, 0).total, abs=0.03
     )
-    assert {*TRUE} <= {*found.told}
+    assert {*TRUE} <= {*calibration.told}
 
 
 def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
-    found = calibrate([leg({"QBAT": 400.0, "BT": 1000.0, "solid": 180.0}, 0)])
-    ratios = {found.weights.per_element[name] / MEASURED[name] for name in ALL}
+    calibration = calibrate(
+        [make_leg({"QBAT": 400.0, "BT": 1000.0, "solid": 180.0}, 0)]
+    )
+    ratios = {calibration.weights.per_element[name] / MEASURED[name] for name in ALL}
     assert max(ratios) / min(ratios) == pytest.approx(1, rel=0.02)
-    assert "solid" not in found.told
+    assert "solid" not in calibration.told
 
 
 def test_a_run_without_switching_is_needed() -> None:
     with pytest.raises(ConfigurationError, match="no leg without rigid parts"):
-        calibrate([leg(ALL, 10)])
+        calibrate([make_leg(ALL, 10)])
 
 
-def listing(cycles: int, elements: float, total: float) -> str:
-    """End of an engine listing."""
+def write_listing(cycles: int, elements: float, total: float) -> str:
+    """Return the end of an engine listing."""
     return (
         f" ** CUMULATIVE CPU TIME SUMMARY **\n CONTACT SORTING.............: .2224E+00     1.53 %\n"
         f" ELEMENT FORCES..............: {elements:.4E}    85.72 %\n"
@@ -77,20 +81,18 @@ def listing(cycles: int, elements: float, total: float) -> str:
 
 
 def run_folder(folder: Path) -> Path:
-    """A run of two legs, in the second of which part 1 of its two shells is rigid."""
+    """Write a run of two restart segments; part 1 of its two shells is rigid in the second."""
     parts = "".join(
-        f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}"
+        f"/PART/{n}\np{n}\n{pad(1, 1)}/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}"
         for n in (1, 2)
     )
-    body = (
-        f"/GRNOD/PART/1\ng\n{wide(1)}/RBODY/1\nbody\n{wide(9)[:-1]}{' ' * 50}{wide(1)}"
-    )
+    body = f"/GRNOD/PART/1\ng\n{pad(1)}/RBODY/1\nbody\n{pad(9)[:-1]}{' ' * 50}{pad(1)}"
     deck = f"{BEGIN}{write_nodes(9)}{parts}{PROPS}{body}/END\n"
     (folder / "TEST_0000.rad").write_text(deck)
     (folder / "TEST_0001.rad").write_text("/RUN/TEST/1\n0.1\n/RBODY/OFF\n9\n")
     (folder / "TEST_0002.rad").write_text("/RUN/TEST/2\n0.2\n/RBODY/ON\n9\n")
-    (folder / "TEST_0001.out").write_text(listing(100, 0.8e-3, 1.0e-3))
-    (folder / "TEST_0002.out").write_text(listing(200, 0.8e-3, 1.4e-3))
+    (folder / "TEST_0001.out").write_text(write_listing(100, 0.8e-3, 1.0e-3))
+    (folder / "TEST_0002.out").write_text(write_listing(200, 0.8e-3, 1.4e-3))
     return folder
 
 
@@ -100,16 +102,16 @@ def test_legs_of_radioss_are_read_with_what_is_rigid_in_them(tmp_path: Path) -> 
     assert [free.elements, free.total] == pytest.approx([8.0, 10.0])
     assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0, "point": 2.0}, 4.0)
     assert [rigid.elements, rigid.total] == pytest.approx([4.0, 7.0])
-    found = calibrate([free, rigid]).weights.per_element
-    assert found["QEPH"] + 2 * found["point"] == pytest.approx(
+    calibration = calibrate([free, rigid]).weights.per_element
+    assert calibration["QEPH"] + 2 * calibration["point"] == pytest.approx(
         4.0, rel=0.02
     )  # an element of three layers
 
 
 def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
     windows = (
-        "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1         0      0.02\n" + wide(0, 0, 0, 0, 1, 0) + wide(7, 0)
-        + "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         2         0      0.05\n" + wide(0, 0, 0, 0, 0, 1) + wide(7)
+        "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1         0      0.02\n" + pad(0, 0, 0, 0, 1, 0) + pad(7, 0)
+        + "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         2         0      0.05\n" + pad(0, 0, 0, 0, 0, 1) + pad(7)
     )  # fmt: skip
     shells = "".join(
         f"{n:8d}{part:8d}       1       2       3       4\n"
@@ -160,13 +162,13 @@ def test_a_run_that_is_given_twice_counts_once(tmp_path: Path) -> None:
     copy = shutil.copytree(folder, tmp_path / "copy")
     once = observations_of(str(folder))
     for again in (str(folder), f"{folder}/.", str(copy)):
-        found, cautions = observations_of_runs([str(folder), again])
-        assert found == once
-        assert [one.code for one in cautions] == ["same-leg-twice"] * 2
+        observations, cautions = observations_of_runs([str(folder), again])
+        assert observations == once
+        assert [caution.code for caution in cautions] == ["same-leg-twice"] * 2
         assert (
             "has the content of" if again == str(copy) else "is given twice; it counts"
         ) in cautions[0].message
-    (copy / "TEST_0002.out").write_text(listing(200, 0.8e-3, 1.3e-3))
-    found, cautions = observations_of_runs([str(folder), str(copy)])
-    assert len(found) == 3
+    (copy / "TEST_0002.out").write_text(write_listing(200, 0.8e-3, 1.3e-3))
+    observations, cautions = observations_of_runs([str(folder), str(copy)])
+    assert len(observations) == 3
     assert len(cautions) == 1

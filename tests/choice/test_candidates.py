@@ -1,4 +1,4 @@
-"""Candidates for tr: which times are offered, what is measured at them, and what speaks against them."""
+"""Candidates for tr: the times offered, their measures, and the reasons against them."""
 
 import numpy as np
 import pytest
@@ -10,24 +10,29 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import looking
 from d2rpick.vibration import measures
 from tests import paper
-from tests.energies import codes, of, sure, vibration
+from tests.energies import (
+    list_codes,
+    make_energy_history,
+    make_vibration_energy,
+    require,
+)
 
 PLAIN = Settings()
 
 
 def test_all_crossings_of_the_published_example_and_their_signs() -> None:
-    answer = suggest(paper.history(), paper.TD, PLAIN)
-    found = sorted(
+    answer = suggest(paper.make_history(), paper.TD, PLAIN)
+    crossings = sorted(
         (c.tr * 1e3, c.sign_match) for c in answer.candidates if c.kind == "crossing"
     )
-    assert [sign for _, sign in found] == [sign for _, sign in paper.CROSSINGS]
-    assert [time for time, _ in found] == pytest.approx(
+    assert [sign for _, sign in crossings] == [sign for _, sign in paper.CROSSINGS]
+    assert [time for time, _ in crossings] == pytest.approx(
         [time for time, _ in paper.CROSSINGS], rel=1e-9
     )
 
 
 def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
-    answer = suggest(paper.history(), paper.TD, PLAIN)
+    answer = suggest(paper.make_history(), paper.TD, PLAIN)
     opposite = [c for c in answer.candidates if c.sign_match is False]
     share = (4 * paper.ENERGY_TD + paper.KINETIC_TD) / (
         paper.ENERGY_TD + paper.KINETIC_TD
@@ -39,23 +44,27 @@ def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
 
 
 def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
-    answer = suggest(paper.history(), 0.05, PLAIN)
+    answer = suggest(paper.make_history(), 0.05, PLAIN)
     for c in answer.candidates:
         expected = measures.residual(
-            sure(c.lock_in_error), sure(answer.situation.kinetic_share)
+            require(c.lock_in_error), require(answer.situation.kinetic_share)
         )
         assert c.residual == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_first_sample_counts_like_any_other() -> None:
     time = np.linspace(0, 1, 2001)
-    answer = suggest(of(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
-    assert sure(answer.recommended).tr == pytest.approx(0.0, abs=1e-9)
+    answer = suggest(
+        make_energy_history(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN
+    )
+    assert require(answer.recommended).tr == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
     time = np.linspace(0, 1, 2001)
-    answer = suggest(of(4 * np.sin(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
+    answer = suggest(
+        make_energy_history(4 * np.sin(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN
+    )
     times = [round(c.tr, 6) for c in answer.candidates if c.kind == "crossing"]
     assert len(times) == len(set(times)) == 6
 
@@ -63,28 +72,30 @@ def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
 def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates() -> (
     None
 ):
-    history = vibration()
+    history = make_vibration_energy()
     answer = suggest(history, 3.25, PLAIN)
     assert {c.kind for c in answer.candidates if c.acceptable} == {"extremum"}
     # the peak at 0.75 has the other sign; of 0.25, 1.25, 2.25 the earliest saves most
-    assert sure(answer.recommended).tr == pytest.approx(0.25, abs=1e-6)
-    assert sure(answer.recommended).residual == pytest.approx(0.0, abs=1e-6)
+    assert require(answer.recommended).tr == pytest.approx(0.25, abs=1e-6)
+    assert require(answer.recommended).residual == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("energy", [np.zeros(50), np.full(50, 3.0), -np.ones(50)])
 def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> None:
-    answer = suggest(of(energy, np.arange(50.0)), 40.0, PLAIN)
+    answer = suggest(make_energy_history(energy, np.arange(50.0)), 40.0, PLAIN)
     assert not answer.candidates
     assert answer.recommended is None
-    assert "no-candidate" in codes(answer)
+    assert "no-candidate" in list_codes(answer)
 
 
 def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -> None:
-    look = looking(paper.history(), PLAIN)
+    look = looking(paper.make_history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]
-    alone = [next(candidates_at([one]))[:] for one in situations]
+    alone = [next(candidates_at([ranked_at_td]))[:] for ranked_at_td in situations]
     for together in (judged_of(situations), judged_of(situations, most=15)):
-        assert [one[:] for judged in together for one in ranked(judged)] == alone
+        assert [
+            ranked_at_td[:] for judged in together for ranked_at_td in ranked(judged)
+        ] == alone
     assert list(judged_of([])) == []
 
 
@@ -92,7 +103,9 @@ def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_onc
     None
 ):
     energy = np.r_[np.zeros(20), 4 + np.random.default_rng(1).random(4000)]
-    look = looking(of(energy, np.arange(energy.size, dtype=float)), PLAIN)
+    look = looking(
+        make_energy_history(energy, np.arange(energy.size, dtype=float)), PLAIN
+    )
     situations = [look(td) for td in (10.0, *np.linspace(3900, 4000, 40))]
     assert (
         max(judged.place.size for judged in judged_of(situations, most=4000)) < 40_000
@@ -101,9 +114,18 @@ def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_onc
 
 @pytest.mark.parametrize("noise", [0.0, 0.8])
 def test_a_candidate_alone_is_the_one_among_all(noise: float) -> None:
-    clean = vibration()
+    clean = make_vibration_energy()
     energy = clean.energy + noise * np.random.default_rng(1).random(clean.energy.size)
-    found = next(candidates_at([looking(of(energy, clean.time), PLAIN)(3.2)]))
-    assert len(found) > 3
-    assert [found[i] for i in range(len(found))] == list(found) == list(found[:])
-    assert (found[-1], found[1:3]) == (found[:][-1], found[:][1:3])
+    ranked_candidates = next(
+        candidates_at([looking(make_energy_history(energy, clean.time), PLAIN)(3.2)])
+    )
+    assert len(ranked_candidates) > 3
+    assert (
+        [ranked_candidates[i] for i in range(len(ranked_candidates))]
+        == list(ranked_candidates)
+        == list(ranked_candidates[:])
+    )
+    assert (ranked_candidates[-1], ranked_candidates[1:3]) == (
+        ranked_candidates[:][-1],
+        ranked_candidates[:][1:3],
+    )

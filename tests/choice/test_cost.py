@@ -1,4 +1,4 @@
-"""The cost model: shares of a step, and what is said where they are not known."""
+"""Cost model: shares of a time step, and the warnings if they are unknown."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from d2rpick.choice.cost import (
 from d2rpick.deck.formulations import find_ls_dyna_formulation, find_radioss_formulation
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
-from tests.energies import sure
+from tests.energies import require
 
 QBAT, UNKNOWN = (
     Formulation("QBAT", "QBAT"),
@@ -28,7 +28,7 @@ QBAT, UNKNOWN = (
 )
 
 
-def inventory(
+def make_inventory(
     counts: Mapping[int, int],
     *,
     solver: str = "ls-dyna",
@@ -36,18 +36,18 @@ def inventory(
     rigid: int | None = None,
     notes: tuple[str, ...] = (),
 ) -> Inventory:
-    """Parts of shells in a row, each with nodes of its own."""
+    """Return parts that are rows of shells, each with its own nodes."""
     part = np.repeat(list(counts), list(counts.values()))
     nodes = np.arange(4 * part.size).reshape(-1, 4)
-    own = formulations or {}
+    formulation_by_part = formulations or {}
     parts = {
-        one: PartData(
-            one,
-            f"part {one}",
-            Material("MAT", "rigid" if one == rigid else "deformable"),
-            Section({"shell": own.get(one, QBAT)}),
+        count: PartData(
+            count,
+            f"part {count}",
+            Material("MAT", "rigid" if count == rigid else "deformable"),
+            Section({"shell": formulation_by_part.get(count, QBAT)}),
         )
-        for one in counts
+        for count in counts
     }
     elements = (Elements("shell", part, nodes),)
     return Inventory(
@@ -56,7 +56,7 @@ def inventory(
 
 
 def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> None:
-    model = CostModel(inventory({1: 30, 2: 70}), Weights(rigid_node=0.0))
+    model = CostModel(make_inventory({1: 30, 2: 70}), Weights(rigid_node=0.0))
     assert [model.share_of(part).value for part in (1, 2)] == pytest.approx([0.3, 0.7])
     assert model.saved([2]).value == pytest.approx(0.7 * 0.91)
     assert model.saved([1, 2]).value == pytest.approx(0.91)
@@ -66,24 +66,22 @@ def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> Non
 def test_shells_cost_more_with_more_integration_points(
     layers: int | None, extra: int
 ) -> None:
-    """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
-    of_deck = sure(find_radioss_formulation("shell", 12, 0, 0))
-    found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
+    """Four points per layer, of which 3 are assumed; without a weight for points they cost nothing."""
+    of_deck = require(find_radioss_formulation("shell", 12, 0, 0))
+    mesh = make_inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     parts = {
-        1: found.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)),
-        2: found.parts[2],
+        1: mesh.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)),
+        2: mesh.parts[2],
     }
-    found = replace(found, parts=parts)
-    assert found.further_points(1, "shell") == extra
-    model = CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0, "point": 0.5}))
+    mesh = replace(mesh, parts=parts)
+    assert mesh.further_points(1, "shell") == extra
+    model = CostModel(mesh, Weights({"QBAT": 1.0, "strange": 1.0, "point": 0.5}))
     assert model.of_part(1).cost == 30 * (1 + 0.5 * extra)
-    assert (
-        CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0})).of_part(1).cost == 30
-    )
+    assert CostModel(mesh, Weights({"QBAT": 1.0, "strange": 1.0})).of_part(1).cost == 30
 
 
 def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:
-    model = CostModel(inventory({1: 30, 2: 70}, rigid=2))
+    model = CostModel(make_inventory({1: 30, 2: 70}, rigid=2))
     assert model.share_of(1).value == 1.0
     assert model.saved([2]).value == 0.0
 
@@ -91,31 +89,35 @@ def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:
 def test_a_formulation_without_a_weight_leaves_every_share_open_but_with_one_of_its_own_it_is_known() -> (
     None
 ):
-    found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
-    share = CostModel(found).saved([1])
+    mesh = make_inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
+    share = CostModel(mesh).saved([1])
     assert share.value is None
     assert "strange" in str(share.reason)
-    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 3.0})).share_of(
+    assert CostModel(mesh, Weights({"QBAT": 1.0, "strange": 3.0})).share_of(
         1
     ).value == pytest.approx(30 / 240)
 
 
 def test_what_the_deck_does_not_have_leaves_the_cost_open() -> None:
-    share = CostModel(inventory({1: 30}, notes=("mesh.k was not read",))).saved([1])
+    share = CostModel(make_inventory({1: 30}, notes=("mesh.k was not read",))).saved(
+        [1]
+    )
     assert share.value is None
     assert "mesh.k was not read" in str(share.reason)
-    absent = CostModel(inventory({1: 30, 2: 70})).saved([2, 3, 4])
+    absent = CostModel(make_inventory({1: 30, 2: 70})).saved([2, 3, 4])
     assert absent == (None, "parts 3, 4 are not in the deck")
 
 
 def test_formulations_that_were_not_measured_are_named() -> None:
-    own = {
+    formulations = {
         1: QBAT,
         2: Formulation("fully integrated (ELFORM 16)", "QBAT", measured=False),
     }
-    found = inventory({1: 1, 2: 1}, formulations=own)
-    assert CostModel(found).assumed == ("fully integrated (ELFORM 16)",)
-    assert CostModel(found, Weights({"QBAT": 1.0, own[2].name: 1.0})).assumed == ()
+    mesh = make_inventory({1: 1, 2: 1}, formulations=formulations)
+    assert CostModel(mesh).assumed == ("fully integrated (ELFORM 16)",)
+    assert (
+        CostModel(mesh, Weights({"QBAT": 1.0, formulations[2].name: 1.0})).assumed == ()
+    )
 
 
 @given(
@@ -130,16 +132,16 @@ def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit
 ) -> None:
     weights = Weights({"BT": 1.0}, share, 0.05)
     scaled = Weights({"BT": scale}, share, 0.05 * scale)
-    found = saved_share(weights, total, part * total, nodes)
-    assert 0.0 <= found <= share * (1 + 1e-12)
+    share_saved = saved_share(weights, total, part * total, nodes)
+    assert 0.0 <= share_saved <= share * (1 + 1e-12)
     assert saved_share(
         scaled, scale * total, scale * part * total, nodes
-    ) == pytest.approx(found, abs=1e-9)
+    ) == pytest.approx(share_saved, abs=1e-9)
     assert saved_share(weights, total, total, 0) == pytest.approx(share)
 
 
 @pytest.mark.parametrize(
-    ("found", "cost"),
+    ("formulation_class", "cost"),
     [
         (find_radioss_formulation("shell", 12, 0, 0), "QBAT"),
         (find_radioss_formulation("shell", 24, 0, 0), "QEPH"),
@@ -152,9 +154,11 @@ def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit
         (find_ls_dyna_formulation("spring", 0), "spring"),
     ],
 )
-def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
-    assert found.cost == cost
-    assert not (found.measured and "ELFORM" in found.name)
+def test_classes_of_formulations(
+    formulation_class: Formulation, cost: str | None
+) -> None:
+    assert formulation_class.cost == cost
+    assert not (formulation_class.measured and "ELFORM" in formulation_class.name)
 
 
 def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
@@ -166,7 +170,7 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "no table"),
         ("[per_element]\nBT = 'much'", "BT is 'much'"),
@@ -184,13 +188,13 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
     ],
 )
 def test_weights_that_make_no_sense_are_refused_with_the_file(
-    tmp_path: Path, text: str, told: str
+    tmp_path: Path, text: str, message: str
 ) -> None:
     (tmp_path / "site.toml").write_text(text, "utf-8")
     with pytest.raises(ConfigurationError, match="site") as error:
         read_weights(str(tmp_path / "site.toml"))
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 def test_counts_by_part_are_counters() -> None:
-    assert inventory({1: 3}).counts == {1: Counter(shell=3)}
+    assert make_inventory({1: 3}).counts == {1: Counter(shell=3)}

@@ -1,4 +1,4 @@
-"""What a deck tells of a run, and what makes it worth little: the same words in every command, nothing of another."""
+"""Evidence from the deck of a run, and deck errors that make it useless; decks of other models are ignored."""
 
 import shutil
 from dataclasses import replace
@@ -23,7 +23,16 @@ from d2rpick.histories.surroundings import Support, Surroundings
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.rule import Example
 from tests import made_car
-from tests.command import ENERGY, MATSUM, OSCILLATOR, answer, codes, put, refused, run
+from tests.command import (
+    ENERGY,
+    MATSUM,
+    OSCILLATOR,
+    list_warning_codes,
+    put,
+    read_refusal,
+    run,
+    run_json,
+)
 from tests.decks import write
 from tests.histories.test_listings import listing
 from tests.sample_deck import DECK
@@ -31,16 +40,20 @@ from tests.sample_deck import DECK
 TD = ("--td", "0.0687534")
 
 
-def placed(folder: Path, example: Example) -> str:
+def place_example(folder: Path, example: Example) -> str:
     return write(folder, example.deck, example.files, example.name)
 
 
-def warned(*args: str) -> dict[str, str]:
-    return {one["code"]: one["message"] for one in answer(*args)["warnings"]}
+def list_warnings(*args: str) -> dict[str, str]:
+    return {
+        warning["code"]: warning["message"] for warning in run_json(*args)["warnings"]
+    }
 
 
-def doubts(deck: str, *parts: int) -> dict[str, Caution]:
-    return {one.code: one for one in doubts_of_solver(parts, read_inventory(deck))}
+def list_doubts(deck: str, *parts: int) -> dict[str, Caution]:
+    return {
+        doubt.code: doubt for doubt in doubts_of_solver(parts, read_inventory(deck))
+    }
 
 
 @pytest.mark.slow
@@ -51,10 +64,14 @@ def doubts(deck: str, *parts: int) -> dict[str, Caution]:
 def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
     tmp_path: Path, rule: str, code: str
 ) -> None:
-    deck = placed(tmp_path, RULES[rule].failing[0])
-    (finding,) = [one for one in check_deck(deck).findings if one.rule == rule]
-    said = f"{finding.file}:{finding.line}: {finding.message}"
-    assert doubts(deck)[code].message == said
+    deck = place_example(tmp_path, RULES[rule].failing[0])
+    (finding,) = [
+        finding_row
+        for finding_row in check_deck(deck).findings
+        if finding_row.rule == rule
+    ]
+    deck_message = f"{finding.file}:{finding.line}: {finding.message}"
+    assert list_doubts(deck)[code].message == deck_message
     for args in (
         ("suggest", *TD),
         ("verify", "--tr", "0.0135867", *TD),
@@ -62,8 +79,8 @@ def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
         ("parts",),
     ):
         if args[0] != "parts":  # which asks for parts with energies
-            assert warned(*args, "--deck", deck, ENERGY)[code] == said
-    assert doubts(placed(tmp_path, RULES[rule].passing[0])) == {}
+            assert list_warnings(*args, "--deck", deck, ENERGY)[code] == deck_message
+    assert list_doubts(place_example(tmp_path, RULES[rule].passing[0])) == {}
 
 
 def test_solids_whose_stresses_do_not_turn_are_told_of_the_parts_in_question(
@@ -81,10 +98,10 @@ def test_solids_whose_stresses_do_not_turn_are_told_of_the_parts_in_question(
     )
     assert (
         "part 1: the stresses of these solids do not turn"
-        in doubts(deck, 1)["stresses-unturned"].message
+        in list_doubts(deck, 1)["stresses-unturned"].message
     )
-    assert doubts(deck, 7) == {}
-    assert [one.rule for one in check_deck(deck).findings] == ["D2R116"]
+    assert list_doubts(deck, 7) == {}
+    assert [finding.rule for finding in check_deck(deck).findings] == ["D2R116"]
 
 
 def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> None:
@@ -95,7 +112,7 @@ def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> 
         {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n1810\n"},
         good.name,
     )
-    asked = (
+    card_options = (
         "-q",
         "--deck",
         deck,
@@ -108,7 +125,7 @@ def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> 
         ENERGY,
     )
     for args in (("suggest", *TD), ("plan",)):
-        printed = run(*args, *asked)
+        printed = run(*args, *card_options)
         assert printed.exit_code == 0, printed.stderr
         assert printed.stdout.count("/RBODY/OFF\n1808 1809 1810\n") == 2
         assert printed.stdout.count("/RBODY/ON\n1808\n/RBODY/OFF\n1809 1810\n") == 1
@@ -155,8 +172,8 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(
         listing("1986-2025 Altair Engineering, Inc.")
     )
     pair = ("--tr", "0.0135867", *TD)
-    deck = placed(tmp_path, RULES["D2R401"].passing[0])
-    asked = (
+    deck = place_example(tmp_path, RULES["D2R401"].passing[0])
+    commands = (
         *(
             ("info", history),
             ("suggest", *TD, history),
@@ -169,13 +186,13 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(
             ("check", deck, "--history", history),
         ),
     )
-    for args in asked:
-        assert "CAR_0002.out: built in 2025" in warned(*args)["engine-wrong-energy"], (
-            args
-        )
-    codes = [one["code"] for one in answer("plan", history)["warnings"]]
+    for args in commands:
+        assert (
+            "CAR_0002.out: built in 2025" in list_warnings(*args)["engine-wrong-energy"]
+        ), args
+    codes = [warning["code"] for warning in run_json("plan", history)["warnings"]]
     assert codes.count("engine-wrong-energy") == 1  # however many flights there are
-    assert "engine-wrong-energy" not in warned("suggest", *TD, ENERGY)
+    assert "engine-wrong-energy" not in list_warnings("suggest", *TD, ENERGY)
 
 
 # Bodies that no leg switches.
@@ -201,10 +218,13 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
         ).exit_code
         == 0
     )
-    listed = answer("check", deck, "--history", history, "--select", "D2R408,D2R409")[
+    listed = run_json("check", deck, "--history", history, "--select", "D2R408,D2R409")[
         "findings"
     ]
-    assert [f"{one['rule']} {one['severity']}" for one in listed] == found
+    assert [
+        f"{listed_message['rule']} {listed_message['severity']}"
+        for listed_message in listed
+    ] == found
 
 
 ASKED = {
@@ -237,8 +257,8 @@ def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return str(put(tmp_path / "main.k", OTHER[request.param]))
 
 
-def told(found: dict[str, Any]) -> dict[str, Any]:
-    return {**found, "command": None, "warnings": None}
+def list_messages(message_words: dict[str, Any]) -> dict[str, Any]:
+    return {**message_words, "command": None, "warnings": None}
 
 
 @pytest.mark.slow
@@ -246,26 +266,28 @@ def told(found: dict[str, Any]) -> dict[str, Any]:
 def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     args = command, *ASKED[command], "--deck", foreign, MATSUM
     without = command, *ASKED[command], MATSUM
-    found, plain = answer(*args), answer(*without)
-    assert told(found) == told(plain)
-    assert codes(found) == codes(plain) | {"deck-of-another-model"}
+    document, plain = run_json(*args), run_json(*without)
+    assert list_messages(document) == list_messages(plain)
+    assert list_warning_codes(document) == list_warning_codes(plain) | {
+        "deck-of-another-model"
+    }
 
 
 @pytest.mark.slow
 def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) -> None:
-    asked = ("suggest", *ASKED["suggest"], MATSUM)
+    arguments = ("suggest", *ASKED["suggest"], MATSUM)
     assert (
-        run(*asked, "--deck", foreign, "-f", "card").stdout
-        == run(*asked, "-f", "card").stdout
+        run(*arguments, "--deck", foreign, "-f", "card").stdout
+        == run(*arguments, "-f", "card").stdout
     )
     page = tmp_path / "page.html"
-    run(*asked, "--deck", foreign, "--report", str(page))
+    run(*arguments, "--deck", foreign, "--report", str(page))
     assert "nothing of the deck is used" in page.read_text("utf-8")
     assert "of the reference's run time" not in page.read_text("utf-8")
 
 
 def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
-    for asked in (
+    for command in (
         ("suggest", "--td", "0.37", "--part", "recommended", "--deck", foreign, MATSUM),
         (
             "plan",
@@ -278,25 +300,25 @@ def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
             MATSUM,
         ),
     ):
-        assert "nothing of the deck is used" in refused(*asked)
+        assert "nothing of the deck is used" in read_refusal(*command)
     assert not (tmp_path / "next").exists()
 
 
 def test_the_library_leaves_it_out_too(foreign: str) -> None:
-    asked: dict[str, Any] = {"td": 0.37, "parts": "all", "replay": False}
-    found, without = (
-        d2.suggest(d2.read(MATSUM), **asked, deck=foreign),
-        d2.suggest(d2.read(MATSUM), **asked),
+    arguments: dict[str, Any] = {"td": 0.37, "parts": "all", "replay": False}
+    suggestion, without = (
+        d2.suggest(d2.read(MATSUM), **arguments, deck=foreign),
+        d2.suggest(d2.read(MATSUM), **arguments),
     )
-    assert told(found.to_dict()) == told(without.to_dict())
+    assert list_messages(suggestion.to_dict()) == list_messages(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:
-    found = answer(
+    suggestion = run_json(
         "suggest", "--td", "0.37", "--part", "box", "--deck", str(DECK), MATSUM
     )
-    assert "deck-of-another-model" not in codes(found)
-    assert found["candidates"][0]["run_time_share"] < 1
+    assert "deck-of-another-model" not in list_warning_codes(suggestion)
+    assert suggestion["candidates"][0]["run_time_share"] < 1
 
 
 @pytest.mark.parametrize(
@@ -308,7 +330,7 @@ def test_a_group_of_elements_that_the_history_lists_is_no_missing_part(
     (tmp_path / "TEST_0000.rad").write_text(
         f"#RADIOSS STARTER\n/BEGIN\nTEST\n/PART/1\nbox\n         1         1\n{group}/END\n"
     )
-    asked = (
+    arguments = (
         "suggest",
         "--td",
         "0.37",
@@ -319,7 +341,7 @@ def test_a_group_of_elements_that_the_history_lists_is_no_missing_part(
     )
     assert (
         "deck-of-another-model"
-        in codes(answer(*asked, MATSUM.replace(".matsum", "T01")))
+        in list_warning_codes(run_json(*arguments, MATSUM.replace(".matsum", "T01")))
     ) == foreign
 
 
@@ -328,8 +350,8 @@ def test_titles_are_compared_without_letters_that_files_encode_in_different_ways
 ) -> None:
     text = DECK.read_text("utf-8").replace("\nbox\n", "\nbox \u7bb1\n")
     (tmp_path / "main.k").write_bytes(text.encode("gbk"))
-    assert "deck-of-another-model" not in codes(
-        answer(
+    assert "deck-of-another-model" not in list_warning_codes(
+        run_json(
             "suggest",
             "--td",
             "0.37",
@@ -353,12 +375,12 @@ MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         
 MOVED += f"{0:20d}{1:20d}{0:20d}{{stop:20g}}\n"
 
 
-def gravity(*values: float) -> Surroundings:
+def make_gravity(*values: float) -> Surroundings:
     return Surroundings({1: values, 2: values, None: values})
 
 
-def falling(acceleration: float, surroundings: Surroundings) -> Momenta:
-    """Momentum of a part of mass 10 that is pushed, and falls."""
+def make_falling_momenta(acceleration: float, surroundings: Surroundings) -> Momenta:
+    """Return the momentum of a part of mass 10 that is pushed, then falls."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 2] = PUSH - 10.0 * acceleration * TIME
     return Momenta(
@@ -374,35 +396,46 @@ def falling(acceleration: float, surroundings: Surroundings) -> Momenta:
 
 @pytest.mark.parametrize("acceleration", [9.81, 3.71, 1.62, 24.8])
 def test_the_gravity_of_the_deck_is_what_is_believed(acceleration: float) -> None:
-    """Of another planet, or another load: without a deck only that of the earth is."""
-    known = find_flight_around(falling(acceleration, gravity(acceleration)), 0.6)
-    assert known
-    assert known.gravity == pytest.approx(acceleration, rel=1e-3)
-    assert bool(find_flight_around(falling(acceleration, Surroundings()), 0.6)) is (
-        acceleration == 9.81
+    """The acceleration may be another planet's or a load's; without a deck only the earth's is accepted."""
+    flight_found = find_flight_around(
+        make_falling_momenta(acceleration, make_gravity(acceleration)), 0.6
     )
-    assert find_flight_around(falling(acceleration, gravity(0.0)), 0.6) is None
-    assert find_flight_around(falling(acceleration, gravity(5.0)), 0.6) is None
+    assert flight_found
+    assert flight_found.gravity == pytest.approx(acceleration, rel=1e-3)
+    assert bool(
+        find_flight_around(make_falling_momenta(acceleration, Surroundings()), 0.6)
+    ) is (acceleration == 9.81)
+    assert (
+        find_flight_around(make_falling_momenta(acceleration, make_gravity(0.0)), 0.6)
+        is None
+    )
+    assert (
+        find_flight_around(make_falling_momenta(acceleration, make_gravity(5.0)), 0.6)
+        is None
+    )
 
 
 def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
-    assert find_flight_around(falling(0.0, gravity(0.0)), 0.6)
+    assert find_flight_around(make_falling_momenta(0.0, make_gravity(0.0)), 0.6)
     assert find_flight_around(
-        falling(0.0, gravity(0.0, 9.81)), 0.6
+        make_falling_momenta(0.0, make_gravity(0.0, 9.81)), 0.6
     )  # it acts for a time only
-    assert find_flight_around(falling(0.0, gravity(9.81)), 0.6) is None
+    assert (
+        find_flight_around(make_falling_momenta(0.0, make_gravity(9.81)), 0.6) is None
+    )
     constant = replace(
-        falling(0.0, gravity(9.81)), values=np.full((TIME.size, 1, 3), 5.0)
+        make_falling_momenta(0.0, make_gravity(9.81)),
+        values=np.full((TIME.size, 1, 3), 5.0),
     )
     assert find_flight_around(constant, 0.6) is None
-    assert find_flight_around(replace(constant, surroundings=gravity(0.0)), 0.6)
+    assert find_flight_around(replace(constant, surroundings=make_gravity(0.0)), 0.6)
 
 
-def flying_history(
+def make_flying_history(
     surroundings: Surroundings, parts: tuple[Part, ...] | None = PARTS[:1]
 ) -> History:
-    """A part that flies from 0.2 on, and rings."""
-    evidence = Given((falling(0.0, surroundings),))
+    """Return a part that flies from 0.2 on and vibrates."""
+    evidence = Given((make_falling_momenta(0.0, surroundings),))
     energy = 2 + np.sin(300 * TIME) ** 2
     return History(
         TIME,
@@ -420,13 +453,17 @@ def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_give
     None
 ):
     held = Surroundings(supports={1: (Support("/BCS/7 (deck:12)"),)})
-    assert suggest(flying_history(Surroundings()), 0.8, PLAIN).recommended
+    assert suggest(make_flying_history(Surroundings()), 0.8, PLAIN).recommended
     for settings in (PLAIN, replace(PLAIN, after=0.3)):
-        found = suggest(flying_history(held), 0.8, settings)
-        assert found.recommended is None
-        (why,) = [one.message for one in found.cautions if one.code == "no-free-flight"]
+        suggestion = suggest(make_flying_history(held), 0.8, settings)
+        assert suggestion.recommended is None
+        (why,) = [
+            caution.message
+            for caution in suggestion.cautions
+            if caution.code == "no-free-flight"
+        ]
         assert "part 1 is held or moved by /BCS/7 (deck:12)" in why
-    assert flights_of(flying_history(held), PLAIN) == ()
+    assert flights_of(make_flying_history(held), PLAIN) == ()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, replace(PLAIN, after=0.3)])
@@ -434,19 +471,20 @@ def test_a_flight_begins_where_an_imposed_motion_ends_and_ends_where_one_begins(
     settings: Settings,
 ) -> None:
     moved = Surroundings(supports={1: (Support("a", 0.0, 0.4), Support("b", 0.9, 2.0))})
-    flight = examine(flying_history(moved), 0.7, settings).flight
+    flight = examine(make_flying_history(moved), 0.7, settings).flight
     assert (flight.start, flight.end) == (0.4, 0.9)
-    assert examine(flying_history(moved), 0.35, settings).flight.refusal
+    assert examine(make_flying_history(moved), 0.35, settings).flight.refusal
     assert [
-        (one.start, one.end) for one in flights_of(flying_history(moved), settings)
+        (flight_row.start, flight_row.end)
+        for flight_row in flights_of(make_flying_history(moved), settings)
     ] == [(0.4, 0.9)]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    found = tmp_path_factory.mktemp("car")
-    made_car.t01(found, 3.0)
-    body = made_car.momenta(3.0)[:, : len(made_car.BODY)].sum(axis=1)
+    car_folder = tmp_path_factory.mktemp("car")
+    made_car.write_t01(car_folder, 3.0)
+    body = made_car.compute_momenta(3.0)[:, : len(made_car.BODY)].sum(axis=1)
     kinetic = (body**2).sum(axis=1) / (2 * made_car.MASSES.sum())
     internal = 50 + 20 * np.cos(2 * np.pi * 90 * made_car.TIME)
     table = np.column_stack([made_car.TIME, internal, kinetic, body])
@@ -454,36 +492,38 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, columns in (("totals.csv", 3), ("momenta.csv", 6)):
         text = header.split(",")[:columns]
         np.savetxt(
-            found / name,
+            car_folder / name,
             table[:, :columns],
             delimiter=",",
             header=",".join(text),
             comments="",
         )
-    return found
+    return car_folder
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "asked", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)]
+    "arguments", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)]
 )
 def test_a_support_refuses_the_flight_in_any_form_of_input(
-    folder: Path, tmp_path: Path, asked: tuple[str, ...]
+    folder: Path, tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:
     wheels = "/GRNOD/NODE/1\nnodes\n        21        31\n/BCS/7\nheld\n   111 000         0         1\n"
-    deck = made_car.starter(
+    deck = made_car.write_starter(
         tmp_path,
         HELD + wheels.replace("/1\n", "/2\n").replace("0         1\n", "0         2\n"),
     )
-    name, *options = asked
+    name, *options = arguments
     for command in (("suggest", "--td", "0.12"), ("explore",)):
-        found = run(
+        result = run(
             *command, "--no-verify", str(folder / name), *options, "--deck", deck
         )
-        assert found.exit_code in (1, 2), found.stderr
-        assert "held or moved by /BCS/7 (" in found.stderr
-        assert "MADE_0000.rad:" in found.stderr
-    assert answer("info", str(folder / name), *options, "--deck", deck)["flights"] == []
+        assert result.exit_code in (1, 2), result.stderr
+        assert "held or moved by /BCS/7 (" in result.stderr
+        assert "MADE_0000.rad:" in result.stderr
+    assert (
+        run_json("info", str(folder / name), *options, "--deck", deck)["flights"] == []
+    )
     reference = d2.read(str(folder / name))
     with pytest.raises(D2RPickError, match=r"held or moved by /BCS/7"):
         d2.suggest(reference, parts=options[1:] or None, deck=deck, replay=False)
@@ -494,8 +534,8 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
 
 @pytest.mark.slow
 def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
-    history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, HELD)
-    assert answer(
+    history, deck = str(folder / "MADET01"), made_car.write_starter(tmp_path, HELD)
+    assert run_json(
         "suggest",
         "--no-verify",
         "--part",
@@ -508,7 +548,7 @@ def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
     )["recommended"]
     rows = {
         row["id"]: row
-        for row in answer("parts", "--no-verify", "--deck", deck, history)["parts"]
+        for row in run_json("parts", "--no-verify", "--deck", deck, history)["parts"]
     }
     assert "held or moved by /BCS/7" in rows[1]["reasons"][0]
     assert {rows[part]["verdict"] for part in made_car.BODY} == {"keep"}
@@ -519,18 +559,18 @@ def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
 def test_the_flight_begins_where_the_deck_lets_go(folder: Path, tmp_path: Path) -> None:
     history, deck = (
         str(folder / "MADET01"),
-        made_car.starter(tmp_path, MOVED.format(stop=0.04)),
+        made_car.write_starter(tmp_path, MOVED.format(stop=0.04)),
     )
-    asked = ("suggest", "--no-verify", "--part", "1-6", "--td", "0.12", history)
-    assert answer(*asked)["flight"]["start"] == pytest.approx(0.0, abs=1e-3)
-    assert answer(*asked, "--deck", deck)["flight"]["start"] == 0.04
+    arguments = ("suggest", "--no-verify", "--part", "1-6", "--td", "0.12", history)
+    assert run_json(*arguments)["flight"]["start"] == pytest.approx(0.0, abs=1e-3)
+    assert run_json(*arguments, "--deck", deck)["flight"]["start"] == 0.04
 
 
 @pytest.mark.slow
 def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(
     folder: Path, tmp_path: Path
 ) -> None:
-    asked = (
+    arguments = (
         "suggest",
         "--no-verify",
         "--part",
@@ -540,14 +580,14 @@ def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(
         str(folder / "MADET01"),
         "--deck",
     )
-    for deck in (made_car.starter(tmp_path), made_car.keywords(tmp_path)):
+    for deck in (made_car.write_starter(tmp_path), made_car.write_keywords(tmp_path)):
         assert [
-            part["id"] for part in answer(*asked, deck)["history"]["parts"]
+            part["id"] for part in run_json(*arguments, deck)["history"]["parts"]
         ] == list(made_car.BODY)
-    held = made_car.starter(tmp_path, HELD)
-    assert {part["id"] for part in answer(*asked, held)["history"]["parts"]} == set(
-        made_car.WHEELS
-    )
+    held = made_car.write_starter(tmp_path, HELD)
+    assert {
+        part["id"] for part in run_json(*arguments, held)["history"]["parts"]
+    } == set(made_car.WHEELS)
 
 
 @pytest.mark.parametrize("rule", ["D2R406", "D2R407"])
@@ -556,16 +596,16 @@ def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(
 ) -> None:
     example = RULES[rule].failing[0]
     deck = write(tmp_path, example.deck, example.files, example.name)
-    plain, found = (
-        answer("suggest", "--td", "0.0687534", ENERGY, *more)
-        for more in ((), ("--deck", deck))
+    plain, with_deck = (
+        run_json("suggest", "--td", "0.0687534", ENERGY, *options)
+        for options in ((), ("--deck", deck))
     )
     assert plain["quality"] != "poor"
-    assert found["quality"] == "poor"
-    assert rule in found["quality_reasons"][0]
-    told = str(answer("plan", ENERGY, "--deck", deck))
-    assert "'quality': 'poor'" in told
-    assert "'quality': 'good'" not in told
+    assert with_deck["quality"] == "poor"
+    assert rule in with_deck["quality_reasons"][0]
+    plan_text = str(run_json("plan", ENERGY, "--deck", deck))
+    assert "'quality': 'poor'" in plan_text
+    assert "'quality': 'good'" not in plan_text
 
 
 @pytest.mark.slow
@@ -579,24 +619,28 @@ def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(
             (2, 92, "         8"),
         )
     )
-    deck = made_car.starter(tmp_path, bodies)
+    deck = made_car.write_starter(tmp_path, bodies)
     for number, word, nodes in ((1, "OFF", "91"), (2, "ON", "91"), (3, "OFF", "91")):
         leg = f"/RUN/MADE/{number}\n{0.02 + 0.05 * (number - 1)}\n/RBODY/{word}\n{nodes}\n"
         (tmp_path / f"MADE_000{number}.rad").write_text(leg)
     history = str(folder / "MADET01")
-    found = answer("suggest", "--part", "1-6", "--td", "0.12", "--deck", deck, history)
-    assert found["quality"] == "poor"
-    assert "D2R409" in found["quality_reasons"][0]
-    (told,) = [
-        one["message"] for one in found["warnings"] if one["code"] == "body-left-rigid"
+    suggestion = run_json(
+        "suggest", "--part", "1-6", "--td", "0.12", "--deck", deck, history
+    )
+    assert suggestion["quality"] == "poor"
+    assert "D2R409" in suggestion["quality_reasons"][0]
+    (message,) = [
+        reported["message"]
+        for reported in suggestion["warnings"]
+        if reported["code"] == "body-left-rigid"
     ]
     (error,) = [
-        one
-        for one in answer("check", deck, "--history", history)["findings"]
-        if one["rule"] == "D2R409"
+        reported
+        for reported in run_json("check", deck, "--history", history)["findings"]
+        if reported["rule"] == "D2R409"
     ]
     assert error["severity"] == "error"
-    assert error["message"] in told
+    assert error["message"] in message
 
 
 @pytest.mark.slow
@@ -613,6 +657,6 @@ def test_check_and_suggest_agree_on_what_is_held(folder: Path, tmp_path: Path) -
             "*BOUNDARY_SPC_NODE\n         1         0         1         1         1\n"
             * held
         )
-        deck = made_car.keywords(tmp_path, cards + spc)
-        found = run("check", deck, "--history", str(folder / "MADET01"), "-f", "json")
-        assert ("held or moved by *BOUNDARY_SPC_NODE" in found.stdout) is held
+        deck = made_car.write_keywords(tmp_path, cards + spc)
+        result = run("check", deck, "--history", str(folder / "MADET01"), "-f", "json")
+        assert ("held or moved by *BOUNDARY_SPC_NODE" in result.stdout) is held

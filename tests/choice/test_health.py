@@ -1,4 +1,4 @@
-"""Health of a run: every threshold from both sides, every missing term, real runs, and runs that cannot be judged."""
+"""Health of a run: each threshold from both sides, each missing term, real runs, and runs that cannot be judged."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +13,10 @@ from d2rpick.histories.history import Balance, Given, History, Precision, Sample
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
-from tests.command import BOX, ENERGY, GLSTAT, answer, codes, put, run
-from tests.computed import stored
-from tests.energies import of, sure
-from tests.made_t01 import t01, value
+from tests.command import BOX, ENERGY, GLSTAT, list_warning_codes, put, run, run_json
+from tests.computed import locate_stored
+from tests.energies import make_energy_history, require
+from tests.made_t01 import make_t01, make_value
 
 TIME: Samples = np.linspace(0.0, 1.0, 201)
 ONES = np.ones_like(TIME)
@@ -33,7 +33,9 @@ PART = Part(7, "floor")
 WINDOW = (0.2, 0.8)
 
 
-def warned(balance: Balance, window: tuple[float, float] | None = WINDOW) -> list[str]:
+def list_warnings(
+    balance: Balance, window: tuple[float, float] | None = WINDOW
+) -> list[str]:
     return [caution.code for caution in cautions_of_health(assess(balance, window))]
 
 
@@ -41,11 +43,11 @@ def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
     health = assess(HEALTHY, WINDOW)
     assert not list(cautions_of_health(health))
     assert health.window_work == pytest.approx(0.0, abs=1e-3)
-    assert all(one.good for one in measures_of(health) if one.value)
+    assert all(measure.good for measure in measures_of(health) if measure.value)
 
 
 @pytest.mark.parametrize(
-    ("code", "terms", "more"),
+    ("code", "terms", "more_terms"),
     [
         ("hourglass", {"hourglass": 0.29 * TIME}, {"hourglass": 0.31 * TIME}),
         ("part-hourglass", {"hourglass_of_parts": ((PART, 0.09, 1.0),)}, {"hourglass_of_parts": ((PART, 0.11, 1.0),)}),
@@ -63,10 +65,10 @@ def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
     ],
 )  # fmt: skip
 def test_a_warning_comes_beyond_its_threshold_only(
-    code: str, terms: dict[str, Any], more: dict[str, Any]
+    code: str, terms: dict[str, Any], more_terms: dict[str, Any]
 ) -> None:
-    assert code not in warned(replace(HEALTHY, **terms))
-    assert code in warned(replace(HEALTHY, **more))
+    assert code not in list_warnings(replace(HEALTHY, **terms))
+    assert code in list_warnings(replace(HEALTHY, **more_terms))
 
 
 @pytest.mark.parametrize(
@@ -93,28 +95,32 @@ def test_what_the_files_do_not_have_is_unknown_and_not_zero(
 
 
 def test_a_window_of_too_few_states_is_not_judged() -> None:
-    few, enough = (0.2, 0.2 + 4.5 / 200), (0.2, 0.2 + 5.5 / 200)
+    few_states, enough = (0.2, 0.2 + 4.5 / 200), (0.2, 0.2 + 5.5 / 200)
     reason = (
         "the window holds 5 states: at least 6 are needed to tell a load from gravity"
     )
-    assert assess(HEALTHY, few).window_reason == reason
-    assert [one.message for one in cautions_of_health(assess(HEALTHY, few))] == [reason]
-    assert warned(HEALTHY, few) == ["window-not-judged"]
-    assert "window-not-judged" not in warned(HEALTHY, enough)
-    assert "window-not-judged" not in warned(replace(HEALTHY, external_work=None), few)
+    assert assess(HEALTHY, few_states).window_reason == reason
+    assert [
+        caution.message for caution in cautions_of_health(assess(HEALTHY, few_states))
+    ] == [reason]
+    assert list_warnings(HEALTHY, few_states) == ["window-not-judged"]
+    assert "window-not-judged" not in list_warnings(HEALTHY, enough)
+    assert "window-not-judged" not in list_warnings(
+        replace(HEALTHY, external_work=None), few_states
+    )
 
 
 def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> None:
     written, nan = (
-        np.array(value(3, 0, 12), ">f4").tobytes(),
+        np.array(make_value(3, 0, 12), ">f4").tobytes(),
         np.array(np.nan, ">f4").tobytes(),
     )
     for name, content in (
-        ("whole", bytes(t01(8).data)),
-        ("damaged", bytes(t01(8).data).replace(written, nan)),
+        ("whole", bytes(make_t01(8).data)),
+        ("damaged", bytes(make_t01(8).data).replace(written, nan)),
     ):
         run_of = open_run([str(put(tmp_path / f"{name}T01", content))])
-        balance = sure(read_balance(run_of.databases, run_of.parts))
+        balance = require(read_balance(run_of.databases, run_of.parts))
         assert (balance.hourglass is None, balance.kinetic is None) == (
             name == "damaged",
             False,
@@ -135,7 +141,7 @@ def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(
     assert health.reason
     assert not [
         code
-        for code in warned(replace(HEALTHY, internal=internal, hourglass=ONES))
+        for code in list_warnings(replace(HEALTHY, internal=internal, hourglass=ONES))
         if code != "energy-ratio"
     ]
 
@@ -148,7 +154,9 @@ def test_a_part_without_energy_of_its_own_is_not_the_worst_part() -> None:
 def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None:
     total = 10 * TIME + 1e-3
     ratio = np.where(TIME < 0.05, 30.0, 1.0)
-    assert "energy-ratio" not in warned(replace(HEALTHY, total=total, ratio=ratio))
+    assert "energy-ratio" not in list_warnings(
+        replace(HEALTHY, total=total, ratio=ratio)
+    )
 
 
 def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_is_written() -> (
@@ -156,14 +164,14 @@ def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_i
 ):
     taken = 10 * TIME
     damped = replace(
-        HEALTHY, kinetic=sure(HEALTHY.kinetic) - taken, total=None, ratio=None
+        HEALTHY, kinetic=require(HEALTHY.kinetic) - taken, total=None, ratio=None
     )
-    assert "energy-ratio" in warned(damped)
+    assert "energy-ratio" in list_warnings(damped)
     whole = assess(HEALTHY, WINDOW)
     for term in ("damping", "wall"):
         health = assess(replace(damped, **{term: taken}), WINDOW)  # type: ignore[arg-type]
         assert health.energy_ratio_min == pytest.approx(whole.energy_ratio_min)
-    total = 50 + sure(HEALTHY.external_work)
+    total = 50 + require(HEALTHY.external_work)
     written = assess(replace(damped, total=total), WINDOW)
     assert (written.energy_ratio_min, written.energy_ratio_max) == pytest.approx(
         (1.0, 1.0)
@@ -179,7 +187,7 @@ def test_the_total_energy_of_abaqus_is_without_the_external_work(
         "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode(),
     )
     run_of = open_run([str(path)])
-    health = assess(sure(read_balance(run_of.databases, None)))
+    health = assess(require(read_balance(run_of.databases, None)))
     assert (health.energy_ratio_min, health.energy_ratio_max) == (1.0, 1.0)
 
 
@@ -196,21 +204,21 @@ def test_damping_that_counts_as_external_work_is_no_load() -> None:
     damped = replace(
         HEALTHY, kinetic=kinetic, external_work=gravity + damping, velocity=velocity
     )
-    assert "work-in-window" not in warned(damped)
-    assert "work-in-window" in warned(replace(damped, kinetic=None))
+    assert "work-in-window" not in list_warnings(damped)
+    assert "work-in-window" in list_warnings(replace(damped, kinetic=None))
 
 
 def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> None:
     run_of = open_run([BOX])
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
-    before = assess(
+    up_to_td = assess(
         read_balance(run_of.databases, box, until=0.37) or Balance(TIME),
         flight,
         locked=1.75,
     )
-    assert not list(cautions_of_health(before))
-    assert before.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
+    assert not list(cautions_of_health(up_to_td))
+    assert up_to_td.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
     for window, code in (
         ((0.06, 0.37), "work-in-window"),
         ((0.0886, 0.4), "contact-in-window"),
@@ -225,20 +233,27 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
     "name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"]
 )
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
-    run_of = open_run([stored(name)])
+    run_of = open_run([locate_stored(name)])
     health = assess(
         read_balance(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064)
     )
-    assert sure(health.window_work) < 1e-3
+    assert require(health.window_work) < 1e-3
     assert not list(cautions_of_health(health))
 
 
 def test_suggest_and_info_tell_the_health() -> None:
-    found = answer("suggest", "--no-verify", "--td", "0.37", "--part", "box", BOX)
-    assert found["health"]["part"] == {"id": 1, "title": "box"}
-    assert found["health"]["window"] == [found["recommended"]["tr"], 0.37]
-    assert not codes(found) & {"hourglass", "energy-ratio", "sliding", "work-in-window"}
-    about = answer("info", BOX)
+    suggestion = run_json(
+        "suggest", "--no-verify", "--td", "0.37", "--part", "box", BOX
+    )
+    assert suggestion["health"]["part"] == {"id": 1, "title": "box"}
+    assert suggestion["health"]["window"] == [suggestion["recommended"]["tr"], 0.37]
+    assert not list_warning_codes(suggestion) & {
+        "hourglass",
+        "energy-ratio",
+        "sliding",
+        "work-in-window",
+    }
+    about = run_json("info", BOX)
     assert about["health"]["sliding_share"] == pytest.approx(0.0523, abs=1e-3)
     assert "hourglass energy of box" in run("info", BOX).stdout
 
@@ -255,19 +270,19 @@ def test_verify_judges_the_window_between_its_times() -> None:
         "0.05",
         BOX,
     )
-    found = answer(*flying, "--tr", "0.1")
-    assert found["health"]["window"] == [0.1, 0.37]
-    assert not codes(found) & {"contact-in-window", "work-in-window"}
-    assert {"contact-in-window", "work-in-window"} <= codes(
-        answer(*flying, "--tr", "0.06")
+    document = run_json(*flying, "--tr", "0.1")
+    assert document["health"]["window"] == [0.1, 0.37]
+    assert not list_warning_codes(document) & {"contact-in-window", "work-in-window"}
+    assert {"contact-in-window", "work-in-window"} <= list_warning_codes(
+        run_json(*flying, "--tr", "0.06")
     )
 
 
 def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
-    found = answer(
+    suggestion = run_json(
         "suggest", "--no-verify", "--td", "0.39", "--part", "box", "--after", "0.1", BOX
     )
-    assert "contact-in-window" in codes(found)
+    assert "contact-in-window" in list_warning_codes(suggestion)
 
 
 @pytest.mark.slow
@@ -290,25 +305,25 @@ def test_hourglass_is_an_alarm_only_where_a_level_is_matched(
         comments="",
     )
     for args in (("suggest",), ("verify", "--tr", "0.41")):
-        found = answer(*args, "--td", "0.9", "--after", "0.3", str(file))
-        assert ("at-rest" in codes(found)) == (swing == 0)
-        assert ("hourglass" in codes(found)) == (swing > 0)
-        assert found["health"]["hourglass_share"] == pytest.approx(0.2, abs=1e-3)
+        document = run_json(*args, "--td", "0.9", "--after", "0.3", str(file))
+        assert ("at-rest" in list_warning_codes(document)) == (swing == 0)
+        assert ("hourglass" in list_warning_codes(document)) == (swing > 0)
+        assert document["health"]["hourglass_share"] == pytest.approx(0.2, abs=1e-3)
 
 
 def test_of_files_with_nothing_to_judge_nothing_is_said() -> None:
-    assert answer("suggest", "--td", "0.064", ENERGY)["health"] is None
-    assert answer("info", ENERGY)["health"] is None
+    assert run_json("suggest", "--td", "0.064", ENERGY)["health"] is None
+    assert run_json("info", ENERGY)["health"] is None
 
 
 def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
-    found = answer("suggest", "--td", "0.064", GLSTAT)
+    suggestion = run_json("suggest", "--td", "0.064", GLSTAT)
     assert {
         value
-        for key, value in found["health"].items()
+        for key, value in suggestion["health"].items()
         if key not in ("window", "until")
     } == {None}
-    assert found["health"]["until"] == 0.064
+    assert suggestion["health"]["until"] == 0.064
 
 
 LOADED = np.linspace(0, 0.1, 201)
@@ -326,18 +341,18 @@ def record(internal: Samples, kinetic: Samples, **terms: Any) -> History:
     )
 
 
-def said(history: History) -> list[str]:
-    return [one.code for one in unsound(history)]
+def list_objections(history: History) -> list[str]:
+    return [objection.code for objection in unsound(history)]
 
 
 @pytest.mark.parametrize("terms", [{}, {"external_work": 4 * LOADED}])
 def test_a_run_that_gains_energy_from_nothing_blew_up(
     terms: dict[str, Samples],
 ) -> None:
-    (found,) = unsound(record(TORN_INTERNAL, TORN_KINETIC, **terms))
-    assert found.code == "blew-up"
-    assert "from 0.1" in found.message
-    assert "its energy reaches 1.5e+13 at 0.0305" in found.message
+    (objection_row,) = unsound(record(TORN_INTERNAL, TORN_KINETIC, **terms))
+    assert objection_row.code == "blew-up"
+    assert "from 0.1" in objection_row.message
+    assert "its energy reaches 1.5e+13 at 0.0305" in objection_row.message
 
 
 @pytest.mark.parametrize(
@@ -368,17 +383,21 @@ def test_a_run_that_gains_energy_from_nothing_blew_up(
 def test_a_run_with_a_sudden_load_is_sound(
     internal: Samples, kinetic: Samples, terms: dict[str, Samples]
 ) -> None:
-    assert "blew-up" not in said(record(internal, kinetic, **terms))
+    assert "blew-up" not in list_objections(record(internal, kinetic, **terms))
 
 
 def test_energies_of_nothing_are_nothing_to_judge() -> None:
-    assert said(record(0 * LOADED, 0 * LOADED + 1.9e-9)) == ["nothing-to-judge"]
-    assert said(record(1e-32 * LOADED, 1e-31 * LOADED)) == ["nothing-to-judge"]
+    assert list_objections(record(0 * LOADED, 0 * LOADED + 1.9e-9)) == [
+        "nothing-to-judge"
+    ]
+    assert list_objections(record(1e-32 * LOADED, 1e-31 * LOADED)) == [
+        "nothing-to-judge"
+    ]
     assert (
-        said(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []
+        list_objections(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []
     )  # a free fall deforms nothing yet
     assert (
-        said(of(0 * LOADED, LOADED)) == []
+        list_objections(make_energy_history(0 * LOADED, LOADED)) == []
     )  # of a column alone its energy is objected to
 
 
@@ -439,6 +458,6 @@ def test_where_nothing_deforms_nothing_is_chosen(
 def test_info_tells_it_and_lists_no_flight(
     csv: Any, columns: tuple[Samples, Samples], code: str
 ) -> None:
-    found = answer("info", csv(*columns))
-    assert code in codes(found)
-    assert found["flights"] == []
+    run_info = run_json("info", csv(*columns))
+    assert code in list_warning_codes(run_info)
+    assert run_info["flights"] == []

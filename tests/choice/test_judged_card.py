@@ -1,4 +1,4 @@
-"""Cards judged as they are printed: for which solver, whom they switch, and what their comments say."""
+"""Cards judged as printed: the solver, the switched parts, and the comments."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,7 +10,7 @@ from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.question import Settings
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
-from tests.energies import sure
+from tests.energies import require
 from tests.reading import read_history
 
 PAIR = (0.0135867, 0.0687534)
@@ -50,10 +50,10 @@ def test_each_window_has_its_verdict_in_the_comments() -> None:
     windows = [PAIR, (0.0939, 0.119)]
     history = read_history([GLSTAT])
     judge = partial(verify, history, settings=Settings())
-    found = sure(
+    printed_card = require(
         judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,))))
     )
-    card, verdicts = found
+    card, verdicts = printed_card
     assert card.windows == tuple(windows)
     assert [verdict.verified for verdict in verdicts] == [True, False]
     lines = " ".join(line.removeprefix("$ ").strip() for line in card.text.splitlines())

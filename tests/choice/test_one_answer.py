@@ -1,4 +1,4 @@
-"""One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
+"""One question has one answer: each command confirms the pairs, windows and flights that another one prints."""
 
 import re
 from dataclasses import replace
@@ -20,11 +20,17 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import find_faults
-from tests.choice.test_same_answers import made
+from tests.choice.test_same_answers import make_record
 from tests.command import BOX, run
-from tests.computed import stored
-from tests.drops import drop, written
-from tests.energies import codes, of, reference, suggest_in_window, sure
+from tests.computed import locate_stored
+from tests.drops import drop, write_run_files
+from tests.energies import (
+    list_codes,
+    make_energy_history,
+    make_reference,
+    require,
+    suggest_in_window,
+)
 from tests.reading import read
 
 PLAIN = Settings()
@@ -36,34 +42,37 @@ planned = cache(plan_of)
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> Reference:
     return read(
-        written(drop(), tmp_path_factory.mktemp("run")), Selection(parts=("box",))
+        write_run_files(drop(), tmp_path_factory.mktemp("run")),
+        Selection(parts=("box",)),
     )
 
 
-def resting() -> History:
-    """Constant energy over times of many digits."""
+def make_resting_history() -> History:
+    """Return a constant energy over times of many digits."""
     time = 0.10005206614732742 + np.linspace(0, 1, 101)
-    return of(np.ones(time.size), time)
+    return make_energy_history(np.ones(time.size), time)
 
 
-def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
-    """Judge a pair as it is read."""
-    return verify(history, round_as_read(tr), round_as_read(td), asked)
+def read_again(history: History, tr: float, td: float, settings: Settings) -> Verdict:
+    """Judge a pair with its times as they are printed."""
+    return verify(history, round_as_read(tr), round_as_read(td), settings)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.7, 0.8])
 def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
-    history = made("five modes")
-    pair = sure(suggest(history, td, PLAIN).better_pair)
+    history = make_record("five modes")
+    pair = require(suggest(history, td, PLAIN).better_pair)
     assert suggest(history, pair.td, PLAIN).recommended == pair
 
 
-@pytest.mark.parametrize("asked", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}])
+@pytest.mark.parametrize(
+    "arguments", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}]
+)
 def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(
-    asked: dict[str, Any],
+    arguments: dict[str, Any],
 ) -> None:
-    history, settings = resting(), Settings(after=0.3, **asked)
+    history, settings = make_resting_history(), Settings(after=0.3, **arguments)
     answer = suggest(history, 0.8, settings)
     assert answer.situation.at_rest
     assert not verify(history, 0.5, 0.8, settings).admissible
@@ -72,60 +81,66 @@ def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(
 
 
 def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
-    history = resting()
-    asked = Settings(after=float(history.time[0]))
-    answer = suggest(history, 0.8, asked)
-    assert "at-rest" in codes(answer)
-    assert read_again(history, *sure(answer.recommended)[:2], asked).admissible
+    history = make_resting_history()
+    settings = Settings(after=float(history.time[0]))
+    answer = suggest(history, 0.8, settings)
+    assert "at-rest" in list_codes(answer)
+    assert read_again(history, *require(answer.recommended)[:2], settings).admissible
 
 
 @pytest.mark.slow
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
-    asked = replace(LEVEL, margin=0.0123456789)
-    for row in plan_of(box, asked).flights:
+    settings = replace(LEVEL, margin=0.0123456789)
+    for row in plan_of(box, settings).flights:
         if row.window:
-            assert read_again(box.history, *row.window, asked).admissible
+            assert read_again(box.history, *row.window, settings).admissible
 
 
 @pytest.mark.slow
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
-    history, asked = made("five modes"), Settings(after=0.1, replay=False)
-    answer = suggest(history, 0.8, asked)
+    history, settings = make_record("five modes"), Settings(after=0.1, replay=False)
+    answer = suggest(history, 0.8, settings)
     line = acceptable(answer.windows or (), None)
     windows = re.findall(r"(\S+) to (\S+) \(", line)
     assert len(windows) > 2
     assert all(
-        verify_at(answer.situation, float(one)).admissible
+        verify_at(answer.situation, float(tr_read)).admissible
         for window in windows
-        for one in window
+        for tr_read in window
     )
 
 
 @pytest.mark.slow
 def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
     second = planned(box, LEVEL).flights[1]
-    after = (second.start + second.end) / 2
-    asked = replace(LEVEL, after=after)
-    (row,) = (one for one in plan_of(box, asked).flights if one.number == second.number)
+    load_end = (second.start + second.end) / 2
+    settings = replace(LEVEL, after=load_end)
+    (row,) = (
+        flight_row
+        for flight_row in plan_of(box, settings).flights
+        if flight_row.number == second.number
+    )
     assert row.window
-    flight = verify(box.history, *row.window, asked).situation.flight
+    flight = verify(box.history, *row.window, settings).situation.flight
     assert (row.flight.start, row.flight.end, row.flight.source) == (
-        after,
+        load_end,
         flight.end,
         flight.source,
     )
-    assert row.margin.time == pytest.approx(0.03 * (second.end - after))
+    assert row.margin.time == pytest.approx(0.03 * (second.end - load_end))
     assert row.window[1] <= row.end - row.margin.time
 
 
 def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
-    asked = replace(LEVEL, margin=0.01)
+    settings = replace(LEVEL, margin=0.01)
     flight = planned(box, LEVEL).flights[1]
-    verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
+    verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, settings)
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
-    told = [fault.message for fault in find_faults(verdict) if fault.rule == "D2R204"]
-    assert len(reasons) == len(told) == 2
-    for reason, message in zip(reasons, told, strict=True):
+    messages = [
+        fault.message for fault in find_faults(verdict) if fault.rule == "D2R204"
+    ]
+    assert len(reasons) == len(messages) == 2
+    for reason, message in zip(reasons, messages, strict=True):
         assert reason.removeprefix("td ") in message
 
 
@@ -133,22 +148,24 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
 def test_the_last_td_that_is_named_lies_in_the_flight(
     box: Reference, margin: float | None
 ) -> None:
-    asked, flights = replace(LEVEL, margin=margin), planned(box, LEVEL).flights
-    answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
+    settings, flights = replace(LEVEL, margin=margin), planned(box, LEVEL).flights
+    answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, settings)
     (message,) = (
-        one.message for one in answer.cautions if one.code == "no-free-flight"
+        caution.message
+        for caution in answer.cautions
+        if caution.code == "no-free-flight"
     )
-    found = sure(
+    match = require(
         re.search(
             r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$",
             message,
         )
     )
-    assert suggest(box.history, float(found[1]), asked).recommended
+    assert suggest(box.history, float(match[1]), settings).recommended
 
 
 @pytest.mark.parametrize(
-    "file", [stored("rollover_r100_T01.gz"), BOX, stored("drop2T01.gz")]
+    "file", [locate_stored("rollover_r100_T01.gz"), BOX, locate_stored("drop2T01.gz")]
 )
 def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
     history = read([file]).history
@@ -160,14 +177,14 @@ def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
 
 
 def test_an_error_that_is_refused_reads_as_too_large() -> None:
-    history, td = made("one mode"), 0.8
-    best = sure(suggest(history, td, PLAIN).chosen)
+    history, td = make_record("one mode"), 0.8
+    best = require(suggest(history, td, PLAIN).chosen)
     assert best.residual
     barely = Settings(max_residual=best.residual * (1 - 1e-6))
     (reason,) = (
-        one
-        for one in verify(history, best.tr, td, barely).reasons
-        if "above the limit" in one
+        reason_text
+        for reason_text in verify(history, best.tr, td, barely).reasons
+        if "above the limit" in reason_text
     )
     value, limit = map(float, re.findall(r"[\d.]+", reason))
     assert value > limit
@@ -175,7 +192,7 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
 
 @pytest.mark.slow
 def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
-    """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
+    """An oscillator fits around some td of the flight, but not around the chosen one."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
     load, contact, omega, alpha = (
         rng.uniform(0.05, 0.3),
@@ -186,11 +203,11 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
     energy = np.exp(-alpha * time) * np.sin(omega * time + omega) ** 2
     energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
     energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
-    record = reference(of(energy, time))
+    record = make_reference(make_energy_history(energy, time))
     rows = [row for row in plan_of(record, PLAIN).flights if row.window]
     assert rows
     for row in rows:
-        flight = verify(record.history, *sure(row.window), PLAIN).situation.flight
+        flight = verify(record.history, *require(row.window), PLAIN).situation.flight
         assert (row.flight.source, row.flight.certain, row.start) == (
             flight.source,
             flight.certain,
@@ -203,18 +220,21 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
     energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(
         time > 0.8, 30 * (time - 0.8), 0
     )
-    record, asked = reference(of(energy, time)), Settings(after=0.1)
-    (row,) = plan_of(record, asked).flights
-    flight = verify(record.history, *sure(row.window), asked).situation.flight
+    record, settings = (
+        make_reference(make_energy_history(energy, time)),
+        Settings(after=0.1),
+    )
+    (row,) = plan_of(record, settings).flights
+    flight = verify(record.history, *require(row.window), settings).situation.flight
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
-    assert suggest_in_window(record.history, None, asked).td_window == (0.1, row.end)
+    assert suggest_in_window(record.history, None, settings).td_window == (0.1, row.end)
 
 
 @pytest.mark.slow
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
-    """Also of the health of the run, and of a td that is not printed as it was chosen."""
+    """This includes the health of the run, and a td that is printed with other digits than chosen."""
     time = np.linspace(0, 1, 1500) / 7
     values = np.stack(
         [time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1
@@ -241,7 +261,7 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
 
 
 def test_a_plan_keeps_the_margin_that_it_lists() -> None:
-    """To a td in it the energy alone shows no end of that flight."""
+    """For a td in this flight, the energy alone shows no end of the flight."""
     rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
     omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
     energy = (
@@ -251,24 +271,26 @@ def test_a_plan_keeps_the_margin_that_it_lists() -> None:
     )
     rows = [
         row
-        for row in plan_of(reference(of(energy, time)), LEVEL).flights
+        for row in plan_of(
+            make_reference(make_energy_history(energy, time)), LEVEL
+        ).flights
         if row.window and row.flight.end
     ]
     assert rows
     for row in rows:
-        assert sure(row.window)[1] <= row.end - row.margin.time
+        assert require(row.window)[1] <= row.end - row.margin.time
 
 
 def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> None:
     time = 0.10005206614732742 + np.linspace(0, 1, 401)
-    history = of(1 + np.sin(40 * (time - time[60])) ** 2, time)
+    history = make_energy_history(1 + np.sin(40 * (time - time[60])) ** 2, time)
     start = float(time[60])
-    asked = replace(LEVEL, after=start)
+    settings = replace(LEVEL, after=start)
     assert round_as_read(start) < start
     for tr in (start, round_as_read(start)):
-        verdict = verify(history, tr, float(time[60] + np.pi / 10), asked)
+        verdict = verify(history, tr, float(time[60] + np.pi / 10), settings)
         assert verdict.admissible
         assert not list(find_faults(verdict))
     assert not verify(
-        history, start - 1e-5, float(time[60] + np.pi / 10), asked
+        history, start - 1e-5, float(time[60] + np.pi / 10), settings
     ).admissible

@@ -1,4 +1,4 @@
-"""A grade and a stated residual are promises: they hold in the motion that was integrated, and in that of parts."""
+"""Grades and stated residuals hold for motions that are integrated, and for motions of parts."""
 
 from itertools import islice
 from pathlib import Path
@@ -13,12 +13,12 @@ from tests.benchmarks.promise_parts import (
     CLASSES as CLASSES_OF_PARTS,
     Motion,
     Record,
-    history,
-    records,
-    stated,
+    draw_records,
+    make_history_of_parts,
+    recommend_pair,
 )
-from tests.energies import sure
-from tests.vibration.test_identify import about_a_preload
+from tests.energies import require
+from tests.vibration.test_identify import move_about_preload
 
 
 @pytest.mark.parametrize(
@@ -35,21 +35,21 @@ from tests.vibration.test_identify import about_a_preload
 def test_what_was_upside_down_has_the_sign_of_td(
     name: str, seed: int, number: int, tmp_path: Path
 ) -> None:
-    """The energy alone, or an oscillator about a preload, gave these pairs the other sign: residuals of 2."""
-    found = sure(
+    """The energy alone, or an oscillator about a preload, gives these pairs the opposite sign: residuals of 2."""
+    pair = require(
         ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path)
     )
-    assert found.kept or found.true < sure(found.residual)
-    assert found.true < BAD
+    assert pair.kept or pair.true < require(pair.residual)
+    assert pair.true < BAD
 
 
 def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
     tmp_path: Path,
 ) -> None:
-    """Half the rate, and a quarter of the kinetic share: the residual is twice the one of a vibration through zero."""
+    """The residual at half the frequency and a quarter of the kinetic fraction is twice that of a plain vibration."""
     time, td = np.arange(0.0, 6.711, 1 / 40), 5.506
     path = tmp_path / "preloaded.csv"
-    energy = 100 * about_a_preload(time, 2 * np.pi, 3.4484)[0] ** 2
+    energy = 100 * move_about_preload(time, 2 * np.pi, 3.4484)[0] ** 2
     np.savetxt(
         path,
         np.stack([time, energy], axis=1),
@@ -59,12 +59,16 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
         comments="",
     )
     answer = d2rpick.suggest(d2rpick.read(str(path)), td=td).to_dict()
-    best = next(one for one in answer["candidates"] if one["recommended"])
-    before, after = (
-        about_a_preload(np.array(at), 2 * np.pi, 3.4484) for at in (best["tr"], td)
+    best = next(
+        candidate for candidate in answer["candidates"] if candidate["recommended"]
+    )
+    deformation_at_tr, deformation_at_td = (
+        move_about_preload(np.array(moment), 2 * np.pi, 3.4484)
+        for moment in (best["tr"], td)
     )
     true = float(
-        np.hypot(before[0] - after[0], after[1]) / np.hypot(after[0] - 1, after[1])
+        np.hypot(deformation_at_tr[0] - deformation_at_td[0], deformation_at_td[1])
+        / np.hypot(deformation_at_td[0] - 1, deformation_at_td[1])
     )
     assert best["residual"] - 0.05 < BAD < true < best["residual_high"] + 0.05
     assert answer["quality"] != "good"
@@ -73,26 +77,27 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", CLASSES_OF_PARTS)
 def test_what_is_stated_of_random_records_holds(kind: str) -> None:
-    asked = [
-        record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 2)
+    records = [
+        record._replace(window=record.window[:1] * 2)
+        for record in draw_records(kind, 1, 2)
     ]  # one td is cheap
-    found = [one for record in asked if (one := stated(record))]
-    assert found
-    assert all(one.kept is not False for one in found)
-    assert not any(one.true > BAD for one in found if one.grade == "good")
+    pairs = [pair for record in records if (pair := recommend_pair(record))]
+    assert pairs
+    assert all(pair.kept is not False for pair in pairs)
+    assert not any(pair.true > BAD for pair in pairs if pair.grade == "good")
 
 
 @pytest.mark.slow
 def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
-    """A residual of 0.32 was good, since 0.18 was the most that the floor was thought to hide."""
-    record = next(islice(records("parts with mixed modes", 101, 77), 76, None))
-    found = sure(stated(record))
-    assert found.true < BAD or found.grade != "good"
+    """A residual of 0.32 must not be good, although the lower envelope seems to hide 0.18 at most."""
+    record = next(islice(draw_records("parts with mixed modes", 101, 77), 76, None))
+    pair = require(recommend_pair(record))
+    assert pair.true < BAD or pair.grade != "good"
 
 
 @pytest.mark.slow
 def test_two_planes_turn_no_pair_upside_down() -> None:
-    """97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
+    """The planes have 97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])
     truth = Motion(
         7.7,
@@ -101,18 +106,18 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
         forms,
     )
     time = np.arange(0, 0.4, 4e-4)
-    found = sure(
-        stated(
+    pair = require(
+        recommend_pair(
             Record(
-                history(time, truth.energies(time)),
+                make_history_of_parts(time, truth.energies(time)),
                 Settings(after=0.0),
                 (0.2, 0.38),
                 truth.residual,
             )
         )
     )
-    assert (found.basis, found.kept) == ("modal", True)
-    assert found.true < KEEPS_NOTHING
+    assert (pair.basis, pair.kept) == ("modal", True)
+    assert pair.true < KEEPS_NOTHING
 
 
 def test_the_truth_of_the_benchmark_is_that_of_its_motion() -> None:
@@ -124,19 +129,21 @@ def test_the_truth_of_the_benchmark_is_that_of_its_motion() -> None:
         np.array([[[1.0, 0.2], [0.2, 0.5]], [[0.3, -0.2], [-0.2, 0.6]]]),
     )
     step, td = 1e-5, 2.0
-    (before, now, after) = (motion.state(td + shift)[0] for shift in (-step, 0.0, step))
-    assert motion.state(td)[1] * np.hypot(rate, alpha / 2) == pytest.approx(
-        (after - before) / (2 * step), abs=1e-6
+    (state_before, state_at_td, state_after) = (
+        motion.state(td + shift)[0] for shift in (-step, 0.0, step)
     )
-    acceleration = (after - 2 * now + before) / step**2
-    velocity = (after - before) / (2 * step)
+    assert motion.state(td)[1] * np.hypot(rate, alpha / 2) == pytest.approx(
+        (state_after - state_before) / (2 * step), abs=1e-6
+    )
+    acceleration = (state_after - 2 * state_at_td + state_before) / step**2
+    velocity = (state_after - state_before) / (2 * step)
     assert acceleration == pytest.approx(
-        -alpha * velocity - (rate**2 + alpha**2 / 4) * now, abs=1e-3
+        -alpha * velocity - (rate**2 + alpha**2 / 4) * state_at_td, abs=1e-3
     )
     assert motion.residual(td, td) ** 2 == pytest.approx(
         float(
             [1.3, 1.1]
             @ motion.state(td)[1] ** 2
-            / ([1.3, 1.1] @ (now**2 + motion.state(td)[1] ** 2))
+            / ([1.3, 1.1] @ (state_at_td**2 + motion.state(td)[1] ** 2))
         )
     )

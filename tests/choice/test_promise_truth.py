@@ -1,4 +1,4 @@
-"""The truth that recommended pairs are compared with: closed forms agree with integration, records with physics."""
+"""True residuals for comparison: closed forms agree with integration, and records with physics."""
 
 from functools import partial
 from typing import Any
@@ -34,7 +34,7 @@ END = 4.0
 
 
 def integrate(modes: Modes, time: Samples) -> Samples:
-    """Integrate the modes from the equilibrium under their preload; q and q', shape (2 k, n)."""
+    """Integrate the modes from equilibrium under their preload; return q and q', shape (2 k, n)."""
 
     def slope(t: float, state: Samples) -> Samples:
         deformation, velocity = np.split(state, 2)
@@ -75,12 +75,12 @@ def test_the_impulse_of_a_load_is_its_integral(load: Load) -> None:
 
 
 def test_the_residual_is_given_by_the_energy_halfway() -> None:
-    """The identity of the midpoint, which holds for any damping, knows nothing of the modes' signs."""
+    """The midpoint identity holds for any damping and does not depend on the signs of the modes."""
     truth = Truth(MODES, (MODES.loaded_until, END))
     tr, td = 2.1, 3.3
     halfway = (tr + td) / 2
-    (before, middle, after), (_, middle_rate, after_rate) = MODES.compute_states(
-        np.array([tr, halfway, td])
+    (state_at_tr, middle, state_at_td), (_, middle_rate, after_rate) = (
+        MODES.compute_states(np.array([tr, halfway, td]))
     )
     # The amplitude of each mode halfway, from its state there.
     quadrature = (middle_rate + MODES.decay * middle) / MODES.rate
@@ -88,8 +88,8 @@ def test_the_residual_is_given_by_the_energy_halfway() -> None:
     product = np.sum(
         middle**2 - amplitudes / 2 + amplitudes * np.cos(MODES.rate * (td - tr)) / 2
     )
-    size = np.sum(after**2 + (after_rate / MODES.undamped) ** 2)
-    expected = np.sqrt(1 + (np.sum(before**2) - 2 * product) / size)
+    size = np.sum(state_at_td**2 + (after_rate / MODES.undamped) ** 2)
+    expected = np.sqrt(1 + (np.sum(state_at_tr**2) - 2 * product) / size)
     assert truth.compute_residual(tr, td) == pytest.approx(expected, rel=1e-6)
 
 
@@ -179,7 +179,7 @@ def test_a_gap_keeps_the_energy_and_friction_takes_it() -> None:
     rates, row = np.array([6.0, 13.0]), np.array([0.6, 0.8])
     start = np.array([1.0, 0.5, 0.0, 0.0])
     time = np.linspace(0.0, 5.0, 200)
-    for joint, least in (
+    for joint, least_energy in (
         (Joint(row, stiffness=20.0, gap=0.4), 0.999),
         (Joint(row, friction=0.05, creep=0.05), 0.0),
     ):
@@ -190,7 +190,7 @@ def test_a_gap_keeps_the_energy_and_friction_takes_it() -> None:
             np.split(states, 2)[0]
         )
         assert np.all(np.diff(energy) < 1e-3 * energy[0])
-        assert least * energy[0] <= energy[-1] <= 1.001 * energy[0]
+        assert least_energy * energy[0] <= energy[-1] <= 1.001 * energy[0]
         assert (energy[-1] < 0.8 * energy[0]) == (joint.friction > 0)
 
 

@@ -1,4 +1,4 @@
-"""The order of candidates, the limits that a recommendation keeps, and how good it is called."""
+"""Order of candidates, limits of a recommendation, and its grade."""
 
 import re
 from dataclasses import replace
@@ -28,9 +28,9 @@ from d2rpick.report.formats import Shown
 from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
-from tests.energies import of, rollover, sure
-from tests.reading import solved
-from tests.records import ENERGY, TIME, vibration
+from tests.energies import make_energy_history, read_rollover, require
+from tests.reading import read_solved
+from tests.records import ENERGY, TIME, make_mode
 
 rows = st.lists(
     st.tuples(
@@ -44,30 +44,38 @@ rows = st.lists(
 
 
 def test_limits_that_cannot_be_judged_are_not_kept() -> None:
-    asked = Settings(max_residual=10.0, replay=False)
-    answer = suggest(rollover(), 0.37, asked)
+    settings_asked = Settings(max_residual=10.0, replay=False)
+    answer = suggest(read_rollover(), 0.37, settings_asked)
     assert answer.recommended is None
-    judged = verify(rollover(), 0.0886, 0.37, asked)
+    judged = verify(read_rollover(), 0.0886, 0.37, settings_asked)
     assert "residual unknown" in " ".join(judged.reasons)
 
 
 @given(rows)
-def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> None:
+def test_the_order_of_candidates(
+    candidate_rows: list[tuple[float, float, int, bool]],
+) -> None:
     rigid, error = (
-        np.array([row[0] for row in some]),
-        np.array([row[1] for row in some]),
+        np.array([row[0] for row in candidate_rows]),
+        np.array([row[1] for row in candidate_rows]),
     )
     # what they differ by in further decimals is rounding
-    some = [(row[0], float(np.round(row[1], 4)), *row[2:]) for row in some]
-    group, off = (
-        np.array([row[2] for row in some], dtype=np.int32),
-        np.array([row[3] for row in some], dtype=bool),
+    candidate_rows = [
+        (row[0], float(np.round(row[1], 4)), *row[2:]) for row in candidate_rows
+    ]
+    group, is_out_of_place = (
+        np.array([row[2] for row in candidate_rows], dtype=np.int32),
+        np.array([row[3] for row in candidate_rows], dtype=bool),
     )
-    places = order(group, error, rigid, off, np.full(3, EQUALLY_GOOD)).tolist()
-    assert sorted(places) == list(range(len(some)))
-    assert [some[i][2] for i in places] == sorted(group.tolist())
+    order_found = order(
+        group, error, rigid, is_out_of_place, np.full(3, EQUALLY_GOOD)
+    ).tolist()
+    assert sorted(order_found) == list(range(len(candidate_rows)))
+    assert [candidate_rows[i][2] for i in order_found] == sorted(group.tolist())
     for number in set(group.tolist()):
-        ranked = [some[i] for i in places if some[i][2] == number]
+        ranked = [
+            candidate_rows[i] for i in order_found if candidate_rows[i][2] == number
+        ]
         near = min(row[1] for row in ranked) + EQUALLY_GOOD
         good = [row for row in ranked if row[1] <= near]
         longest = max(row[0] for row in good)
@@ -75,51 +83,54 @@ def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> 
         early = sorted(
             (row for row in good if row not in late), key=lambda row: (row[3], -row[0])
         )
-        rest = sorted(
+        rows_far_off = sorted(
             (row for row in ranked if row[1] > near), key=lambda row: (row[1], -row[0])
         )
-        assert ranked == early + sorted(late, key=lambda row: -row[0]) + rest
+        assert ranked == early + sorted(late, key=lambda row: -row[0]) + rows_far_off
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
-    """From 49.6 to 82.4 ms it did, as td moved by 3 ms, and gained nothing: the mean energy after td hardly differs."""
-    history, known, found = solved("carT01.gz", parts).history, Fits(), []
+    """A jump from 49.6 to 82.4 ms, for td 3 ms later, would gain nothing: the mean energy after td hardly changes."""
+    history, known_fits, grades = read_solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
-        situation = examine(history, td, Settings(), known)
-        best = sure(next(candidates_at([situation])).chosen)
-        assert sure(best.level_error) < 0.06
-        found.append(best.tr)
-    assert max(found) - min(found) < 3e-3
-    assert min(found) > 0.0384  # the flight begins there
+        situation = examine(history, td, Settings(), known_fits)
+        best = require(next(candidates_at([situation])).chosen)
+        assert require(best.level_error) < 0.06
+        grades.append(best.tr)
+    assert max(grades) - min(grades) < 3e-3
+    assert min(grades) > 0.0384  # the flight begins there
 
 
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
-    situation = examine(solved("carT01.gz", "1-17").history, 0.12, Settings())
+    situation = examine(read_solved("carT01.gz", "1-17").history, 0.12, Settings())
     assert situation.bodies is not None
-    found = next(candidates_at([situation]))
+    ranked_candidates = next(candidates_at([situation]))
 
     def first(until: float) -> float:
-        """The best where those before a time leave the body out of place."""
-        off = np.where(found.judged.moments.tr < until, 1.0, 0.0)
+        """Return the best tr if those before ``until`` displace the body."""
+        out_of_place = np.where(ranked_candidates.judged.moments.tr < until, 1.0, 0.0)
         return next(
             ranked(
                 replace(
-                    found.judged,
-                    columns={**found.judged.columns, "position_error": off},
+                    ranked_candidates.judged,
+                    columns={
+                        **ranked_candidates.judged.columns,
+                        "position_error": out_of_place,
+                    },
                 )
             )
         )[0].tr
 
-    best = found[0].tr
+    best = ranked_candidates[0].tr
     assert best < 0.0395 < first(0.0395) < best + 0.1 * (0.12 - best)
     assert first(0.09) == best
 
 
 @cache
-def fits(_: float) -> Fits:
-    """What is found in the record that is asked about this td: limits change nothing of it."""
+def make_fits(_: float) -> Fits:
+    """Return the fits of a record, which do not depend on the limits."""
     return Fits()
 
 
@@ -128,36 +139,40 @@ def fits(_: float) -> Fits:
     [{}, {"max_kinetic_share": 0.9, "max_residual": 0.95}, {"tolerance": 1e-3}],
 )
 @pytest.mark.parametrize(
-    ("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)]
+    ("history", "td"),
+    [(paper.make_history(), paper.TD), (read_rollover(), 0.37)],
 )
 def test_candidates_are_kept_together_as_one_by_one(
     history: History, td: float, limits: dict[str, float]
 ) -> None:
-    situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
+    situation = examine(history, td, Settings(**limits), make_fits(td))  # type: ignore[arg-type]
     ranked = next(candidates_at([situation]))
     assert len(ranked) > 3
-    kept = ranked.kept.tolist()
-    assert kept == [
-        one.admissible and not over_limits(situation, one) for one in ranked
+    kept_flags = ranked.kept.tolist()
+    assert kept_flags == [
+        candidate.admissible and not over_limits(situation, candidate)
+        for candidate in ranked
     ]
-    assert ranked.recommended == (kept.index(True) if any(kept) else None)
-    assert [one.rank for one in ranked] == list(range(1, len(ranked) + 1))
-    assert [one.error for one in ranked] == ranked.judged.error[ranked.order].tolist()
-    assert [one.admissible for one in ranked] == ranked.judged.acceptable[
+    assert ranked.recommended == (kept_flags.index(True) if any(kept_flags) else None)
+    assert [candidate.rank for candidate in ranked] == list(range(1, len(ranked) + 1))
+    assert [candidate.error for candidate in ranked] == ranked.judged.error[
+        ranked.order
+    ].tolist()
+    assert [candidate.admissible for candidate in ranked] == ranked.judged.acceptable[
         ranked.order
     ].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
     assert ranked[-1].tr == ranked.tr[-1]
 
 
-RECORD = of(ENERGY, TIME)
+RECORD = make_energy_history(ENERGY, TIME)
 ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
 
 
-def grade(history: History, td: float, **asked: float | bool) -> str | None:
-    """Grade of what is recommended at a td."""
-    found = suggest(history, td, Settings(**asked)).quality  # type: ignore[arg-type]
-    return found.grade if found else None
+def find_grade(history: History, td: float, **arguments: float | bool) -> str | None:
+    """Return the grade of the recommendation at a td."""
+    suggestion = suggest(history, td, Settings(**arguments)).quality  # type: ignore[arg-type]
+    return suggestion.grade if suggestion else None
 
 
 @settings(max_examples=15)
@@ -166,7 +181,7 @@ def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
     answer = suggest(RECORD, td, Settings())
     if answer.chosen is None or answer.quality is None:
         return
-    residual = sure(answer.chosen.residual)
+    residual = require(answer.chosen.residual)
     assert answer.quality.grade == (
         "good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor"
     )
@@ -174,21 +189,21 @@ def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
 
 
 def test_the_energy_alone_says_nothing_of_the_vibration() -> None:
-    mode = vibration(np.array([200.0, 2.0, 1.0, 0.0]))
-    record = of(mode.energy(TIME), TIME)
+    mode = make_mode(np.array([200.0, 2.0, 1.0, 0.0]))
+    record = make_energy_history(mode.energy(TIME), TIME)
     at_a_peak = float(mode.peaks(0.06, 0.08)[0])
-    assert grade(record, at_a_peak) == "good"
-    assert grade(record, at_a_peak, replay=False, after=0.005) == "poor"
+    assert find_grade(record, at_a_peak) == "good"
+    assert find_grade(record, at_a_peak, replay=False, after=0.005) == "poor"
     answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
-    (reason,) = sure(answer.quality).reasons
+    (reason,) = require(answer.quality).reasons
     assert reason.startswith(
         "how the deformations at tr and td lie to each other is unknown"
     )
-    assert sure(answer.quality).motion == Grade("good")
+    assert require(answer.quality).motion == Grade("good")
 
 
 def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
-    assert grade(RECORD, 0.064, replay=False, after=0.005) == "poor"
+    assert find_grade(RECORD, 0.064, replay=False, after=0.005) == "poor"
 
 
 @pytest.mark.parametrize(
@@ -202,16 +217,17 @@ def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
 def test_a_record_that_no_level_can_be_read_from_is_poor(
     energy: np.ndarray, reason: str
 ) -> None:
-    history = of(energy, np.linspace(0, 1, 400))
+    history = make_energy_history(energy, np.linspace(0, 1, 400))
     answers = [
         suggest(history, td, Settings(after=0.1, replay=False))
         for td in np.linspace(0.7, 0.9, 3)
     ]
-    found = [answer.quality for answer in answers if answer.quality]
-    assert found
+    grades = [answer.quality for answer in answers if answer.quality]
+    assert grades
     assert all(
-        one.grade == "poor" and any(reason in text for text in one.reasons)
-        for one in found
+        grade_found.grade == "poor"
+        and any(reason in text for text in grade_found.reasons)
+        for grade_found in grades
     )
 
 
@@ -222,19 +238,19 @@ def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
         np.zeros(500),
     )
     energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
-    answer = suggest(of(energy, time), 0.8, Settings())
+    answer = suggest(make_energy_history(energy, time), 0.8, Settings())
     guessed = replace(
         answer.situation, flight=answer.situation.flight._replace(source="energy")
     )
-    motion = quality_of(guessed, sure(answer.chosen)).motion
+    motion = quality_of(guessed, require(answer.chosen)).motion
     assert (motion.grade, motion.reasons) == ("fair", ("the flight is not certain",))
 
 
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
     for td in (0.064, 0.0687534, 0.07):
         answer = suggest(RECORD, td, Settings())
-        verdict = verify(RECORD, sure(answer.recommended).tr, td, Settings())
-        assert sure(verdict.quality).grade == sure(answer.quality).grade
+        verdict = verify(RECORD, require(answer.recommended).tr, td, Settings())
+        assert require(verdict.quality).grade == require(answer.quality).grade
         assert quality_of(verdict.situation, verdict.candidate).grade in GRADES
     assert verify(RECORD, 0.02, 0.064, Settings()).quality is None
 
@@ -244,8 +260,8 @@ def test_states_per_period_are_counted_over_whole_periods(
     states: int, periods: int
 ) -> None:
     wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
-    found = sure(states_per_period(wave))
-    assert found == pytest.approx(states, rel=2 / periods)
+    states_per_cycle = require(states_per_period(wave))
+    assert states_per_cycle == pytest.approx(states, rel=2 / periods)
     noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
     noisy = states_per_period(wave + noise)
     assert noisy == pytest.approx(
@@ -264,14 +280,15 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(
         1
     ).random(201)
-    found = suggest(of(energy, time), 0.9, Settings(after=0.25))
-    assert found.situation.at_rest
-    assert found.quality == ALL_GOOD
+    suggestion = suggest(make_energy_history(energy, time), 0.9, Settings(after=0.25))
+    assert suggestion.situation.at_rest
+    assert suggestion.quality == ALL_GOOD
     guessed = replace(
-        found.situation, flight=found.situation.flight._replace(source="energy")
+        suggestion.situation,
+        flight=suggestion.situation.flight._replace(source="energy"),
     )
     assert guessed.at_rest
-    quality = quality_of(guessed, sure(found.chosen))
+    quality = quality_of(guessed, require(suggestion.chosen))
     assert (quality.grade, quality.reasons) == ("fair", ("the flight is not certain",))
 
 
@@ -281,8 +298,8 @@ STATES = np.arange(400)
 EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
 
 
-def crushed(vibration: float) -> np.ndarray:
-    """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
+def make_crushed_energy(vibration: float) -> np.ndarray:
+    """Return 100 J with little vibration: the level says nothing, and a frozen tr may lose the whole vibration."""
     swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
     return np.asarray(
         100 * np.minimum(UNIT / 0.1, 1) ** 2
@@ -291,11 +308,11 @@ def crushed(vibration: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("energy", "time", "td", "after", "rest"),
+    ("energy", "time", "td", "energy_after", "energy_at_rest"),
     [
         (np.full(TIME.size, 3.0), TIME, 0.1, 0.01, True),
-        (crushed(0.05), UNIT, 0.9, 0.15, False), (crushed(2.6), UNIT, 0.9, 0.15, False),
-        (crushed(0.0), UNIT, 0.9, 0.15, True),
+        (make_crushed_energy(0.05), UNIT, 0.9, 0.15, False), (make_crushed_energy(2.6), UNIT, 0.9, 0.15, False),
+        (make_crushed_energy(0.0), UNIT, 0.9, 0.15, True),
         (DAMPED, FINE, 0.9, 0.5, True), (DAMPED, FINE, 0.9, 0.05, False),
         # one state and td in the same output interval say nothing of what happens between them
         (np.tile([1.5, 2.5, 1.0, 2.5], 10), np.linspace(0, 3.9, 40), 2.2, 2.15, False),
@@ -303,81 +320,96 @@ def crushed(vibration: float) -> np.ndarray:
     ],
 )  # fmt: skip
 def test_rest_is_told_from_a_vibration(
-    energy: np.ndarray, time: np.ndarray, td: float, after: float, rest: bool
+    energy: np.ndarray,
+    time: np.ndarray,
+    td: float,
+    energy_after: float,
+    energy_at_rest: bool,
 ) -> None:
-    found = suggest(of(energy, time), td, Settings(after=after))
-    assert found.situation.at_rest is rest
-    assert rest is (found.chosen is not None and found.chosen.kind == "start")
+    suggestion = suggest(
+        make_energy_history(energy, time), td, Settings(after=energy_after)
+    )
+    assert suggestion.situation.at_rest is energy_at_rest
+    assert energy_at_rest is (
+        suggestion.chosen is not None and suggestion.chosen.kind == "start"
+    )
 
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
-    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
-    history = solved("oscillator_referenceT01.gz").history
+    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing far."""
+    history = read_solved("oscillator_referenceT01.gz").history
     early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
     for answer, wanted in ((early, "good"), (late, "fair")):
         best, quality = answer.chosen, answer.quality
         assert best is not None
         assert best.residual == pytest.approx(0, abs=1e-3)
-        assert sure(quality).grade == wanted
-        assert (sure(best.tr_high) - best.tr > 4 * sure(best.timing_tolerance)) is (
-            wanted == "fair"
-        )
+        assert require(quality).grade == wanted
+        assert (
+            require(best.tr_high) - best.tr > 4 * require(best.timing_tolerance)
+        ) is (wanted == "fair")
         verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
-        assert verdict == sure(quality)
+        assert verdict == require(quality)
     worst = [
         float(
             re.findall(
-                r"At worst: vibration\s+wrong by (\d+)%", as_table(one, Shown())
+                r"At worst: vibration\s+wrong by (\d+)%",
+                as_table(answer_of_td, Shown()),
             )[0]
         )
-        for one in (early, late)
+        for answer_of_td in (early, late)
     ]
     assert worst[0] < 10
     assert worst[1] == 46
 
 
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
-    """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
+    """A structure with many modes is quiet for moments, but free flight excites nothing again."""
     time = np.linspace(0, 1, 201)
     energy = (
         np.where(time < 0.2, 50 * time, 10.0)
         + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
     )
-    quiet = suggest(of(energy, time), 0.4, Settings(after=0.25)).situation
+    quiet = suggest(
+        make_energy_history(energy, time), 0.4, Settings(after=0.25)
+    ).situation
     assert quiet.at_rest  # of what comes after td nothing is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
     assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
 
 
 def test_where_nothing_vibrates_there_is_no_residual() -> None:
-    """What is left of a vibration when its energy is round-off is described by the oscillator, and is nothing."""
+    """If the energy is round-off, the oscillator describes noise, and no vibration is left."""
     time = np.linspace(0, 1, 4001)
     energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
-    found = suggest(of(energy, time), 0.95, Settings(after=0.6))
-    assert found.situation.vibration.unknown is None
-    assert found.situation.at_rest
-    assert found.situation.kinetic_share is None
-    best = sure(found.chosen)
+    suggestion = suggest(make_energy_history(energy, time), 0.95, Settings(after=0.6))
+    assert suggestion.situation.vibration.unknown is None
+    assert suggestion.situation.at_rest
+    assert suggestion.situation.kinetic_share is None
+    best = require(suggestion.chosen)
     assert (best.residual, best.sign_match, best.notes) == (None, None, ())
-    assert found.quality == ALL_GOOD
-    verdict = verify(found.situation.history, 0.7, 0.95, Settings(after=0.6))
+    assert suggestion.quality == ALL_GOOD
+    verdict = verify(suggestion.situation.history, 0.7, 0.95, Settings(after=0.6))
     assert verdict.verified
     assert verdict.candidate.residual is None
 
 
 def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> None:
-    """Pairs on all swings of one mode have one error, which rounding makes another one in each."""
+    """Pairs on all cycles of one mode have the same error, except for rounding."""
     count = 12
     rng = np.random.default_rng(5)
-    group, off = np.zeros(count, np.int32), np.zeros(count, np.bool_)
+    group, out_of_place = np.zeros(count, np.int32), np.zeros(count, np.bool_)
     rigid = rng.permutation(np.linspace(0.1, 0.9, count))
     error = np.where(np.arange(count) < count // 2, 0.9026349, 1.2472975)
 
     def places(rounding: float) -> list[int]:
         noise = rounding * rng.standard_normal(count)
         room = np.full(1, EQUALLY_GOOD)
-        return [*map(int, order(group, error + noise, rigid, off, room))]
+        return [*map(int, order(group, error + noise, rigid, out_of_place, room))]
 
     assert places(1e-16) == places(1e-7) == places(0.0)
-    behind = [place for place in places(0.0) if error[place] > 1]
-    assert behind == sorted(behind, key=lambda place: -rigid[place])
+    places_above = [
+        place_in_order for place_in_order in places(0.0) if error[place_in_order] > 1
+    ]
+    assert places_above == sorted(
+        places_above, key=lambda place_in_order: -rigid[place_in_order]
+    )

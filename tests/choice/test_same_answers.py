@@ -1,14 +1,17 @@
-"""Answers stay what they were: a table of old ones, to the digits people read, that work on speed must not change."""
+"""Answers stay the same: a table of frozen answers, to the digits users read, which faster code must reproduce."""
+
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from d2rpick.choice.answers import Suggestion, suggest, suggest_of
+from d2rpick.choice.candidates import Pair
 from d2rpick.choice.question import Settings, read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
-from tests.computed import stored
+from tests.computed import locate_stored
 from tests.energies import suggest_in_window
 
 SAMPLES = {
@@ -42,8 +45,8 @@ MADE = {
 STATES = 2500
 
 
-def made(name: str) -> History:
-    """Energy of the modes, damped, with white noise."""
+def make_record(name: str) -> History:
+    """Return the damped energy of these modes with white noise."""
     modes, noise = MADE[name]
     time = np.linspace(0.0, 1.0, STATES)
     energy = sum(
@@ -55,11 +58,11 @@ def made(name: str) -> History:
     return History(time, energy, source=(name,), format="made", channel="E")
 
 
-def answer(
-    name: str, td: float | tuple[float, float], **asked: float | bool
+def suggest_for(
+    name: str, td: float | tuple[float, float], **arguments: float | bool
 ) -> Suggestion:
-    """Answer for a sample or a made-up record; a window of td is given by its two ends."""
-    settings = Settings(**asked)  # type: ignore[arg-type]
+    """Choose a pair in a sample or a synthetic record, for one td or for a td range given by its two ends."""
+    settings = Settings(**arguments)  # type: ignore[arg-type]
     if name in SAMPLES:
         file, selection = SAMPLES[name]
         return suggest_of(
@@ -67,134 +70,349 @@ def answer(
         )
     if name in COMPUTED:
         file, selection = COMPUTED[name]
-        return suggest_of(read([stored(file)], selection), td, settings)
+        return suggest_of(read([locate_stored(file)], selection), td, settings)
     return (
-        suggest_in_window(made(name), td, settings)
+        suggest_in_window(make_record(name), td, settings)
         if isinstance(td, tuple)
-        else suggest(made(name), td, settings)
+        else suggest(make_record(name), td, settings)
     )
 
 
-def digest(found: Suggestion) -> str:
-    """What is recommended, how sure it is, and the first of the ranks, to printed digits."""
-    pair, better, best = found.recommended, found.better_pair, found.chosen
-    parts = [found.situation.basis]
-    parts += [
-        f"{pair.tr:.6g} {pair.td:.6g} {_measure(pair.residual)}" if pair else "none"
-    ]
-    parts += [
-        f"+-{(best.tr_high - best.tr_low) / 2:.1e}"
-        if best and best.tr_high and best.tr_low
-        else "-"
-    ]
-    parts += [
-        f"{better.tr:.6g} {better.td:.6g} {_measure(better.residual)}"
-        if better
-        else "none"
-    ]
-    parts += [
-        f"{len(found.candidates)}/{sum(one.acceptable for one in found.candidates)}"
-    ]
-    parts += [" ".join(f"{one.tr:.6g}" for one in found.candidates[1:4])]
-    parts += [
-        "; ".join(f"{one.start:.5g}-{one.end:.5g}" for one in (found.windows or ())[:3])
-    ]
-    return " | ".join(parts)
+class RoundedPair(NamedTuple):
+    """Times of a pair [s], to six digits, and its residual to three decimals; None if unknown."""
+
+    tr: float
+    td: float
+    residual: float | None
 
 
-def _measure(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+class FrozenAnswer(NamedTuple):
+    """Facts of an answer that users read, rounded as they are printed.
+
+    ``tr_half_width`` is the half width of the interval of the chosen tr [s], None if unknown.  ``candidates`` and
+    ``admissible`` are numbers of candidates; ``next_tr`` are the tr of ranks 2 to 4; ``windows`` are start and end of
+    the first three windows of acceptable tr [s].
+    """
+
+    basis: str
+    recommended: RoundedPair | None
+    tr_half_width: float | None
+    better_pair: RoundedPair | None
+    candidates: int
+    admissible: int
+    next_tr: tuple[float, ...]
+    windows: tuple[tuple[float, float], ...]
+
+
+def summarize(suggestion: Suggestion) -> FrozenAnswer:
+    """Return the facts of a suggestion that must not change."""
+    chosen = suggestion.chosen
+    tr_half_width = None
+    if chosen and chosen.tr_high and chosen.tr_low:
+        tr_half_width = float(f"{(chosen.tr_high - chosen.tr_low) / 2:.1e}")
+    candidates = suggestion.candidates
+    return FrozenAnswer(
+        suggestion.situation.basis,
+        _round_pair(suggestion.recommended),
+        tr_half_width,
+        _round_pair(suggestion.better_pair),
+        len(candidates),
+        sum(candidate.admissible for candidate in candidates),
+        tuple(_round(candidate.tr, 6) for candidate in candidates[1:4]),
+        tuple(
+            (_round(window.start, 5), _round(window.end, 5))
+            for window in (suggestion.windows or ())[:3]
+        ),
+    )
+
+
+def _round_pair(pair: Pair | None) -> RoundedPair | None:
+    if pair is None:
+        return None
+    residual = pair.residual
+    if residual is not None:
+        residual = float(f"{residual:.3f}")
+    return RoundedPair(_round(pair.tr, 6), _round(pair.td, 6), residual)
+
+
+def _round(number: float, digits: int) -> float:
+    """Return a number rounded to so many significant digits."""
+    return float(f"{number:.{digits}g}")
 
 
 # fmt: off
-OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]] = [
-    ("paper", 0.064, {},
-     ("oscillator | 0.0128853 0.064 0.957 | +-1.0e-07 | 0.0135867 0.0687534 0.000 | "
-     "10/4 | 0.0247264 0.0383104 0.0495088 | ")),
-    ("paper", 0.1, {"margin": 0.005},
-     ("oscillator | 0.0126389 0.1 0.990 | +-1.0e-07 | 0.013103 0.0938997 0.000 | "
-     "15/7 | 0.0250568 0.0378429 0.050125 | ")),
-    ("paper", (0.06, 0.07), {},
-     ("oscillator | 0.0135867 0.0687534 0.000 | +-1.0e-07 | 0.0135867 0.0687534 0.000 | "
-     "10/4 | 0.0238274 0.0397308 0.0477726 | ")),
-    ("paper", 0.064, {"replay": False},
-     ("energy | 0.000223445 0.064 - | +-6.4e-06 | 0.00101301 0.0562 - | "
-     "10/10 | 0.0122694 0.0128831 0.0247289 | 0.00017669-0.00026935; 0.012206-0.012332; 0.012819-0.012945")),
-    ("shell box", 0.37, {},
-     ("energy | 0.182002 0.37 - | +-2.9e-04 | 0.181405 0.36901 - | "
-     "286/186 | 0.18325 0.183505 0.18401 | 0.181-0.20282; 0.20312-0.21659; 0.21812-0.22551")),
-    ("shell box", (0.25, 0.37), {},
-     ("energy | 0.17834 0.360472 - | +-1.2e-04 | 0.186924 0.362505 - | "
-      "207/142 | 0.178503 0.179208 0.179501 | 0.17783-0.18697; 0.18756-0.19383; 0.19542-0.20081")),
-    ("time history", 0.37, {},
-     ("modal | 0.158046 0.37 0.605 | +-3.2e-05 | 0.119338 0.372005 "
-      "0.616 | 32/31 | 0.123033 0.12079 0.0928778 | ")),
-    ("planar box", 0.3, {},
-     "modal | 0.101608 0.3 0.739 | +-4.3e-04 | 0.094112 0.296 0.591 | 5/5 | 0.195026 0.155497 0.240945 | "),
-    ("planar box", (0.2, 0.37), {"max_residual": 0.5},
-     "modal | none | - | 0.0983731 0.197 0.497 | 6/6 | 0.123891 0.222688 0.278399 | "),
-    ("one mode", 0.8, {},
-     "oscillator | 0.0941268 0.8 0.705 | +-1.3e-04 | 0.104731 0.828681 0.000 | 13/6 | 0.168248 0.329018 0.398432 | "),
-    ("one mode", (0.5, 0.9), {},
-     ("oscillator | 0.104731 0.828681 0.000 | +-1.3e-04 | 0.104731 0.828681 0.000 | "
-     "14/7 | 0.157443 0.34176 0.385479 | ")),
-    ("two modes", 0.8, {},
-     "modal | 0.0166974 0.8 1.005 | +-2.7e-03 | 0.0170545 0.79952 1.003 | 10/2 | 0.010989 0.45814 0.634973 | "),
-    ("five modes", 0.8, {},
-     ("modal | 0.00523426 0.8 0.995 | +-7.4e-04 | 0.367984 0.796719 "
-      "0.908 | 22/3 | 0.367837 0.648681 0.45376 | ")),
-    ("five modes", 0.8, {"after": 0.1},
-     ("modal | 0.367833 0.8 0.981 | +-7.4e-04 | 0.368012 0.796719 0.908 "
-      "| 19/2 | 0.648665 0.45374 0.707527 | ")),
-    ("five modes", 0.77, {"after": 0.2, "strict": True},
-     ("modal | 0.44908 0.77 0.790 | +-7.4e-04 | 0.449371 0.769108 0.799 "
-      "| 14/2 | 0.384841 0.741723 0.35389 | ")),
-    ("five modes", 0.8, {"max_kinetic_share": 0.3, "after": 0.1},
-     "modal | none | - | 0.433002 0.726691 0.731 | 19/2 | 0.648665 0.45374 0.707527 | "),
-    ("noise", 0.8, {},
-     "modal | 0.628692 0.8 0.892 | +-4.8e-03 | 0.629077 0.79952 0.889 | 2/1 | 0.581965 | "),
-    ("noise", (0.6, 0.9), {"replay": False, "after": 0.05},
-     ("energy | 0.0508203 0.896759 - | +-1.6e-04 | 0.0508203 0.896759 - | "
-      "1081/989 | 0.0523772 0.052421 0.0524464 | 0.050542-0.051014; 0.052089-0.052614; 0.053954-0.054064")),
-    ("shell box, parts", 0.37, {},
-     ("energy | 0.0924649 0.37 - | +-8.6e-05 | 0.093506 0.36901 - | "
-      "286/280 | 0.093506 0.0940106 0.0973571 | 0.091005-0.10943; 0.10991-0.1309; 0.13182-0.17525")),
-    ("planar box, glstat", 0.37, {},
-     ("modal | 0.123654 0.37 0.623 | +-4.3e-04 | 0.123654 0.37 0.623 "
-      "| 6/6 | 0.170694 0.222715 0.278342 | ")),
-    ("planar box, matsum", 0.37, {},
-     ("energy | 0.0970304 0.37 - | +-1.6e-04 | 0.0970304 0.37 - | "
-      "35/31 | 0.099 0.100551 0.123 | 0.086-0.37")),
-    ("chain", 0.13505, {},
-     ("parts | 0.0808313 0.13505 0.065 | +-9.9e-05 | 0.0808327 0.135004 "
-      "0.066 | 24/4 | 0.0790052 0.134987 0.135004 | ")),
-    ("chain", (0.1, 0.2), {},
-     ("parts | 0.0808327 0.135004 0.066 | +-9.9e-05 | 0.0808327 0.135004 "
-      "0.066 | 22/2 | 0.0790052 0.0457062 0.0260541 | ")),
-    ("oscillator", 0.064, {},
-     ("oscillator | 0.0128856 0.064 0.957 | +-1.9e-05 | 0.0135875 0.068753 0.000 | "
-      "10/4 | 0.0247256 0.0383106 0.0495077 | ")),
-    ("oscillator S2", 0.055, {},
-     ("oscillator | 0.00762042 0.055 0.394 | +-1.2e-06 | 0.00763041 0.0559095 0.000 | "
-      "14/6 | 0.014814 0.0228 0.0295477 | ")),
-    ("load L1", 0.084, {"after": 0.021},
-     ("oscillator | 0.023572 0.084 0.886 | +-5.4e-07 | 0.0241592 0.0793252 0.000 | "
-      "11/5 | 0.0351485 0.0491028 0.0597998 | ")),
-    ("car", 0.1464, {},
-     ("energy | 0.0385932 0.1464 - | +-1.6e-05 | 0.0386669 0.146717 - | "
-      "404/288 | 0.0387039 0.0388894 0.0394147 | 0.03851-0.1464")),
-    ("falling box", 0.414, {},
-     ("energy | 0.344005 0.414 - | +-1.0e-04 | 0.344005 0.414006 - | "
-      "116/87 | 0.353181 0.353204 0.353231 | 0.3396-0.33981; 0.34153-0.34913")),
-    ("falling box", 0.27, {},
-     "energy | 0 0.27 - | +-2.4e-05 | 0 0.270007 - | 1/1 |  | 0-0.27"),
+FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], FrozenAnswer]] = [
+    (
+        "paper", 0.064, {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.0128853, td=0.064, residual=0.957), tr_half_width=1e-07,
+            better_pair=RoundedPair(tr=0.0135867, td=0.0687534, residual=0.0),
+            candidates=10, admissible=4, next_tr=(0.0247264, 0.0383104, 0.0495088),
+            windows=(),
+        ),
+    ),
+    (
+        "paper", 0.1, {"margin": 0.005},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.0126389, td=0.1, residual=0.99), tr_half_width=1e-07,
+            better_pair=RoundedPair(tr=0.013103, td=0.0938997, residual=0.0),
+            candidates=15, admissible=7, next_tr=(0.0250568, 0.0378429, 0.050125),
+            windows=(),
+        ),
+    ),
+    (
+        "paper", (0.06, 0.07), {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.0135867, td=0.0687534, residual=0.0), tr_half_width=1e-07,
+            better_pair=RoundedPair(tr=0.0135867, td=0.0687534, residual=0.0),
+            candidates=10, admissible=4, next_tr=(0.0238274, 0.0397308, 0.0477726),
+            windows=(),
+        ),
+    ),
+    (
+        "paper", 0.064, {"replay": False},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.000223445, td=0.064, residual=None), tr_half_width=6.4e-06,
+            better_pair=RoundedPair(tr=0.00101301, td=0.0562, residual=None),
+            candidates=10, admissible=10, next_tr=(0.0122694, 0.0128831, 0.0247289),
+            windows=((0.00017669, 0.00026935), (0.012206, 0.012332), (0.012819, 0.012945)),
+        ),
+    ),
+    (
+        "shell box", 0.37, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.182002, td=0.37, residual=None), tr_half_width=0.00029,
+            better_pair=RoundedPair(tr=0.181405, td=0.36901, residual=None),
+            candidates=286, admissible=186, next_tr=(0.18325, 0.183505, 0.18401),
+            windows=((0.181, 0.20282), (0.20312, 0.21659), (0.21812, 0.22551)),
+        ),
+    ),
+    (
+        "shell box", (0.25, 0.37), {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.17834, td=0.360472, residual=None), tr_half_width=0.00012,
+            better_pair=RoundedPair(tr=0.186924, td=0.362505, residual=None),
+            candidates=207, admissible=142, next_tr=(0.178503, 0.179208, 0.179501),
+            windows=((0.17783, 0.18697), (0.18756, 0.19383), (0.19542, 0.20081)),
+        ),
+    ),
+    (
+        "time history", 0.37, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.158046, td=0.37, residual=0.605), tr_half_width=3.2e-05,
+            better_pair=RoundedPair(tr=0.119338, td=0.372005, residual=0.616),
+            candidates=32, admissible=31, next_tr=(0.123033, 0.12079, 0.0928778),
+            windows=(),
+        ),
+    ),
+    (
+        "planar box", 0.3, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.101608, td=0.3, residual=0.739), tr_half_width=0.00043,
+            better_pair=RoundedPair(tr=0.094112, td=0.296, residual=0.591),
+            candidates=5, admissible=5, next_tr=(0.195026, 0.155497, 0.240945),
+            windows=(),
+        ),
+    ),
+    (
+        "planar box", (0.2, 0.37), {"max_residual": 0.5},
+        FrozenAnswer(
+            basis="modal", recommended=None, tr_half_width=None,
+            better_pair=RoundedPair(tr=0.0983731, td=0.197, residual=0.497),
+            candidates=6, admissible=6, next_tr=(0.123891, 0.222688, 0.278399),
+            windows=(),
+        ),
+    ),
+    (
+        "one mode", 0.8, {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.0941268, td=0.8, residual=0.705), tr_half_width=0.00013,
+            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.0),
+            candidates=13, admissible=6, next_tr=(0.168248, 0.329018, 0.398432),
+            windows=(),
+        ),
+    ),
+    (
+        "one mode", (0.5, 0.9), {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.104731, td=0.828681, residual=0.0), tr_half_width=0.00013,
+            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.0),
+            candidates=14, admissible=7, next_tr=(0.157443, 0.34176, 0.385479),
+            windows=(),
+        ),
+    ),
+    (
+        "two modes", 0.8, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.0166974, td=0.8, residual=1.005), tr_half_width=0.0027,
+            better_pair=RoundedPair(tr=0.0170545, td=0.79952, residual=1.003),
+            candidates=10, admissible=2, next_tr=(0.010989, 0.45814, 0.634973),
+            windows=(),
+        ),
+    ),
+    (
+        "five modes", 0.8, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.00523426, td=0.8, residual=0.995), tr_half_width=0.00074,
+            better_pair=RoundedPair(tr=0.367984, td=0.796719, residual=0.908),
+            candidates=22, admissible=3, next_tr=(0.367837, 0.648681, 0.45376),
+            windows=(),
+        ),
+    ),
+    (
+        "five modes", 0.8, {"after": 0.1},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.367833, td=0.8, residual=0.981), tr_half_width=0.00074,
+            better_pair=RoundedPair(tr=0.368012, td=0.796719, residual=0.908),
+            candidates=19, admissible=2, next_tr=(0.648665, 0.45374, 0.707527),
+            windows=(),
+        ),
+    ),
+    (
+        "five modes", 0.77, {"after": 0.2, "strict": True},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.44908, td=0.77, residual=0.79), tr_half_width=0.00074,
+            better_pair=RoundedPair(tr=0.449371, td=0.769108, residual=0.799),
+            candidates=14, admissible=2, next_tr=(0.384841, 0.741723, 0.35389),
+            windows=(),
+        ),
+    ),
+    (
+        "five modes", 0.8, {"max_kinetic_share": 0.3, "after": 0.1},
+        FrozenAnswer(
+            basis="modal", recommended=None, tr_half_width=None,
+            better_pair=RoundedPair(tr=0.433002, td=0.726691, residual=0.731),
+            candidates=19, admissible=2, next_tr=(0.648665, 0.45374, 0.707527),
+            windows=(),
+        ),
+    ),
+    (
+        "noise", 0.8, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.628692, td=0.8, residual=0.892), tr_half_width=0.0048,
+            better_pair=RoundedPair(tr=0.629077, td=0.79952, residual=0.889),
+            candidates=2, admissible=1, next_tr=(0.581965,),
+            windows=(),
+        ),
+    ),
+    (
+        "noise", (0.6, 0.9), {"replay": False, "after": 0.05},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.0508203, td=0.896759, residual=None), tr_half_width=0.00016,
+            better_pair=RoundedPair(tr=0.0508203, td=0.896759, residual=None),
+            candidates=1081, admissible=989, next_tr=(0.0523772, 0.052421, 0.0524464),
+            windows=((0.050542, 0.051014), (0.052089, 0.052614), (0.053954, 0.054064)),
+        ),
+    ),
+    (
+        "shell box, parts", 0.37, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.0924649, td=0.37, residual=None), tr_half_width=8.6e-05,
+            better_pair=RoundedPair(tr=0.093506, td=0.36901, residual=None),
+            candidates=286, admissible=280, next_tr=(0.093506, 0.0940106, 0.0973571),
+            windows=((0.091005, 0.10943), (0.10991, 0.1309), (0.13182, 0.17525)),
+        ),
+    ),
+    (
+        "planar box, glstat", 0.37, {},
+        FrozenAnswer(
+            basis="modal", recommended=RoundedPair(tr=0.123654, td=0.37, residual=0.623), tr_half_width=0.00043,
+            better_pair=RoundedPair(tr=0.123654, td=0.37, residual=0.623),
+            candidates=6, admissible=6, next_tr=(0.170694, 0.222715, 0.278342),
+            windows=(),
+        ),
+    ),
+    (
+        "planar box, matsum", 0.37, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.0970304, td=0.37, residual=None), tr_half_width=0.00016,
+            better_pair=RoundedPair(tr=0.0970304, td=0.37, residual=None),
+            candidates=35, admissible=31, next_tr=(0.099, 0.100551, 0.123),
+            windows=((0.086, 0.37),),
+        ),
+    ),
+    (
+        "chain", 0.13505, {},
+        FrozenAnswer(
+            basis="parts", recommended=RoundedPair(tr=0.0808313, td=0.13505, residual=0.065), tr_half_width=9.9e-05,
+            better_pair=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066),
+            candidates=24, admissible=4, next_tr=(0.0790052, 0.134987, 0.135004),
+            windows=(),
+        ),
+    ),
+    (
+        "chain", (0.1, 0.2), {},
+        FrozenAnswer(
+            basis="parts", recommended=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066), tr_half_width=9.9e-05,
+            better_pair=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066),
+            candidates=22, admissible=2, next_tr=(0.0790052, 0.0457062, 0.0260541),
+            windows=(),
+        ),
+    ),
+    (
+        "oscillator", 0.064, {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.0128856, td=0.064, residual=0.957), tr_half_width=1.9e-05,
+            better_pair=RoundedPair(tr=0.0135875, td=0.068753, residual=0.0),
+            candidates=10, admissible=4, next_tr=(0.0247256, 0.0383106, 0.0495077),
+            windows=(),
+        ),
+    ),
+    (
+        "oscillator S2", 0.055, {},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.00762042, td=0.055, residual=0.394), tr_half_width=1.2e-06,
+            better_pair=RoundedPair(tr=0.00763041, td=0.0559095, residual=0.0),
+            candidates=14, admissible=6, next_tr=(0.014814, 0.0228, 0.0295477),
+            windows=(),
+        ),
+    ),
+    (
+        "load L1", 0.084, {"after": 0.021},
+        FrozenAnswer(
+            basis="oscillator", recommended=RoundedPair(tr=0.023572, td=0.084, residual=0.886), tr_half_width=5.4e-07,
+            better_pair=RoundedPair(tr=0.0241592, td=0.0793252, residual=0.0),
+            candidates=11, admissible=5, next_tr=(0.0351485, 0.0491028, 0.0597998),
+            windows=(),
+        ),
+    ),
+    (
+        "car", 0.1464, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.0385932, td=0.1464, residual=None), tr_half_width=1.6e-05,
+            better_pair=RoundedPair(tr=0.0386669, td=0.146717, residual=None),
+            candidates=404, admissible=288, next_tr=(0.0387039, 0.0388894, 0.0394147),
+            windows=((0.03851, 0.1464),),
+        ),
+    ),
+    (
+        "falling box", 0.414, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0.344005, td=0.414, residual=None), tr_half_width=0.0001,
+            better_pair=RoundedPair(tr=0.344005, td=0.414006, residual=None),
+            candidates=116, admissible=87, next_tr=(0.353181, 0.353204, 0.353231),
+            windows=((0.3396, 0.33981), (0.34153, 0.34913)),
+        ),
+    ),
+    (
+        "falling box", 0.27, {},
+        FrozenAnswer(
+            basis="energy", recommended=RoundedPair(tr=0, td=0.27, residual=None), tr_half_width=2.4e-05,
+            better_pair=RoundedPair(tr=0, td=0.270007, residual=None),
+            candidates=1, admissible=1, next_tr=(),
+            windows=((0, 0.27),),
+        ),
+    ),
 ]
 # fmt: on
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "td", "asked", "old"), OLD)
+@pytest.mark.parametrize(("name", "td", "arguments", "expected"), FROZEN)
 def test_an_old_answer_is_given_again(
-    name: str, td: float | tuple[float, float], asked: dict[str, float | bool], old: str
+    name: str,
+    td: float | tuple[float, float],
+    arguments: dict[str, float | bool],
+    expected: FrozenAnswer,
 ) -> None:
-    assert digest(answer(name, td, **asked)) == old
+    assert summarize(suggest_for(name, td, **arguments)) == expected

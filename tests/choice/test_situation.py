@@ -1,4 +1,4 @@
-"""A record seen from one td: what is found in it, which model of the vibration counts, what stays the same."""
+"""A record seen from one td: its contents, the model of its vibration, and what other td do not change."""
 
 from dataclasses import replace
 
@@ -16,31 +16,34 @@ from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.counted_fits import CountedFits
-from tests.energies import of, rollover, sure
+from tests.energies import make_energy_history, read_rollover, require
 from tests.reading import read
 
 PLAIN = Settings()
 
 
 def test_the_basis_is_the_best_that_can_be_relied_on() -> None:
-    assert examine(paper.history(), paper.TD, PLAIN).basis == "oscillator"
-    assert examine(paper.history(), paper.TD, Settings(replay=False)).basis == "energy"
-    assert examine(chain.history(), chain.TD_LATE, PLAIN).basis == "parts"
+    assert examine(paper.make_history(), paper.TD, PLAIN).basis == "oscillator"
+    assert (
+        examine(paper.make_history(), paper.TD, Settings(replay=False)).basis
+        == "energy"
+    )
+    assert examine(chain.read_chain_history(), chain.TD_LATE, PLAIN).basis == "parts"
 
 
 @pytest.mark.slow
 def test_every_model_answers_alike() -> None:
     for situation in (
-        examine(paper.history(), paper.TD, PLAIN),
-        examine(chain.history(), chain.TD_LATE, PLAIN),
-        examine(rollover(), 0.37, PLAIN),
+        examine(paper.make_history(), paper.TD, PLAIN),
+        examine(chain.read_chain_history(), chain.TD_LATE, PLAIN),
+        examine(read_rollover(), 0.37, PLAIN),
     ):
         vibration = situation.vibration
-        found = vibration.moments(situation.settings.tolerance)
-        times = found.tr
+        moments = vibration.moments(situation.settings.tolerance)
+        times = moments.tr
         measured = vibration.measured(times)
         compared = measures.compared(measured)
-        assert compared.size == len(found) == vibration.reach(found).size > 0
+        assert compared.size == len(moments) == vibration.reach(moments).size > 0
         assert np.all(times < situation.td)
         assert (
             (vibration.kinetic_share is None)
@@ -58,10 +61,10 @@ def test_every_model_answers_alike() -> None:
 
 
 def test_from_another_td_the_same_evidence_is_seen() -> None:
-    situation = examine(paper.history(), paper.TD, PLAIN)
-    there = situation.at(paper.BETTER_TD)
-    assert there.evidence is situation.evidence
-    assert there.kinetic_share == pytest.approx(0.0, abs=1e-9)
+    situation = examine(paper.make_history(), paper.TD, PLAIN)
+    situation_there = situation.at(paper.BETTER_TD)
+    assert situation_there.evidence is situation.evidence
+    assert situation_there.kinetic_share == pytest.approx(0.0, abs=1e-9)
     assert situation.at(paper.TD) is situation
 
 
@@ -69,26 +72,26 @@ def test_from_another_td_the_same_evidence_is_seen() -> None:
 def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
     order: tuple[float, float],
 ) -> None:
-    """Behind the flight, at 0.42, it is the same flight that is nearest, but nothing flies."""
+    """At 0.42, after the flight, the nearest flight is the same, but nothing flies."""
     history = read(
         ["sample_data/rollover_box.matsum"], Selection(parts=("all",))
     ).history
     fits, settings = Fits(), Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
-    seen = {td: examine(history, td, settings, fits) for td in order}
-    assert len({situation.flight[:2] for situation in seen.values()}) == 1
+    situations = {td: examine(history, td, settings, fits) for td in order}
+    assert len({situation.flight[:2] for situation in situations.values()}) == 1
     open_ = {
         td: situation.bodies.unknown
-        for td, situation in seen.items()
+        for td, situation in situations.items()
         if situation.bodies
     }
     assert open_ == {0.42: settings.bodies, 0.3: ()}
 
 
 def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
-    wrong = to_mode(replace(paper.OSCILLATOR, stiffness=500e3), 6.0)
-    answer = suggest(paper.history(), paper.TD, Settings(oscillator=wrong))
+    wrong_mode = to_mode(replace(paper.OSCILLATOR, stiffness=500e3), 6.0)
+    answer = suggest(paper.make_history(), paper.TD, Settings(oscillator=wrong_mode))
     assert answer.situation.basis == "energy"
-    assert "the given oscillator does not describe the record" in sure(
+    assert "the given oscillator does not describe the record" in require(
         answer.situation.vibration.unknown
     )
     assert (
@@ -104,29 +107,33 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("history", "td"), [(paper.history(), paper.TD), (chain.history(), chain.TD_LATE)]
+    ("history", "td"),
+    [
+        (paper.make_history(), paper.TD),
+        (chain.read_chain_history(), chain.TD_LATE),
+    ],
 )
 def test_what_was_found_with_another_end_of_the_load_changes_nothing(
     history: History, td: float
 ) -> None:
-    """A plan keeps what it finds for all flights, and only one of them has the end of the load that was given."""
+    """A plan remembers results for all flights, and only one flight has the given end of the load."""
     fits, fresh = Fits(), suggest(history, td, PLAIN).candidates[:]
-    other = suggest_at(examine(history, td, Settings(after=0.6 * td), fits)).candidates[
-        :
-    ]
-    assert other != fresh
+    other_candidates = suggest_at(
+        examine(history, td, Settings(after=0.6 * td), fits)
+    ).candidates[:]
+    assert other_candidates != fresh
     assert suggest_at(examine(history, td, PLAIN, fits)).candidates[:] == fresh
 
 
-def one_mode() -> History:
-    """A load until 0.1, then one mode with white noise."""
+def make_one_mode() -> History:
+    """Return a load until 0.1, then one mode with white noise."""
     time = np.linspace(0.0, 1.0, 601)
     energy = np.sin(2 * np.pi * 6.3 * time) ** 2
     energy = (
         np.where(time < 0.1, 3 * np.sin(np.pi * time / 0.1) ** 2, 0.0)
         + np.exp(-time) * energy
     )
-    return of(
+    return make_energy_history(
         energy + 0.003 * np.random.default_rng(3).standard_normal(time.size), time
     )
 
@@ -135,11 +142,11 @@ def one_mode() -> History:
 def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> (
     None
 ):
-    history, fits = one_mode(), CountedFits()
+    history, fits = make_one_mode(), CountedFits()
     first = examine(history, 0.6, PLAIN, fits, quick=True)
-    before = fits.made
+    fits_made = fits.made
     quick = examine(history, 0.8, PLAIN, fits, quick=True)
-    assert fits.made == before
+    assert fits.made == fits_made
     assert quick.sees_as(first)
     anew = examine(history, 0.8, PLAIN)
     assert (quick.basis, quick.flight) == (anew.basis, anew.flight)
@@ -151,10 +158,12 @@ def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_an
 
 
 def test_a_quick_look_refuses_what_a_full_one_does_without_its_misfit() -> None:
-    noise = of(np.random.default_rng(3).random(200), np.linspace(0.0, 1.0, 200))
+    noise = make_energy_history(
+        np.random.default_rng(3).random(200), np.linspace(0.0, 1.0, 200)
+    )
     quick, full = (
         examine(noise, 0.9, Settings(after=0.5), quick=quick) for quick in (True, False)
     )
     assert (quick.basis, quick.flight) == (full.basis, full.flight)
-    assert sure(full.evidence.fit).misfit
-    assert sure(quick.evidence.fit).misfit is None
+    assert require(full.evidence.fit).misfit
+    assert require(quick.evidence.fit).misfit is None

@@ -1,4 +1,4 @@
-"""What many runs have in common: the spread, the agreement, one tr for all or why none, and which stand out."""
+"""Many runs compared: spread, agreement, one tr for all or the reason against it, and outliers."""
 
 import os
 from dataclasses import replace
@@ -27,27 +27,27 @@ from d2rpick.choice.study import (
 from d2rpick.histories.opening import Selection
 from tests import variants
 from tests.command import BOX, GLSTAT
-from tests.computed import stored
-from tests.energies import sure
+from tests.computed import locate_stored
+from tests.energies import require
 from tests.reading import read_history
 
 ASKED = Question(variants.TD, Settings())
 
 
-def row(
+def make_study_row(
     source: str,
     *windows: tuple[float, float],
     tr: float = 2.0,
     width: float = 0.1,
-    **other: object,
+    **other_fields: object,
 ) -> StudyRow:
-    """A run with windows of acceptable tr, all alike, its error a straight line from 0 at 0 to 1 at td = 10."""
+    """Return a run with these windows of acceptable tr; its error falls linearly from 0 at 0 to 1 at td = 10."""
     acceptable = np.array(windows, float).reshape(-1, 2)
-    made = StudyRow(
+    study_row = StudyRow(
         source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
         td=10.0, acceptable=acceptable, alike=acceptable, profile=np.array([[0.0, 10.0], [0.0, 1.0]]),
     )  # fmt: skip
-    return replace(made, **other)  # type: ignore[arg-type]
+    return replace(study_row, **other_fields)  # type: ignore[arg-type]
 
 
 # One run.
@@ -55,17 +55,17 @@ def row(
 
 def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
     name = variants.write(tmp_path / "run.csv")
-    found = ask(ASKED, name)
-    assert (found.status, found.message, found.basis, found.warnings) == (
+    run_row = ask(ASKED, name)
+    assert (run_row.status, run_row.message, run_row.basis, run_row.warnings) == (
         "ok",
         None,
         "oscillator",
         (),
     )
-    assert found.tr == pytest.approx(0.0135866683619825, rel=1e-6)
-    assert sure(found.tr_low) < 0.0135866683619825 < (found.tr_high or 0)
-    assert found.energy_td == pytest.approx(6.05508394485761, rel=1e-6)
-    assert found.files == (
+    assert run_row.tr == pytest.approx(0.0135866683619825, rel=1e-6)
+    assert require(run_row.tr_low) < 0.0135866683619825 < (run_row.tr_high or 0)
+    assert run_row.energy_td == pytest.approx(6.05508394485761, rel=1e-6)
+    assert run_row.files == (
         (
             str(tmp_path / "run.csv"),
             Path(name).stat().st_size,
@@ -75,7 +75,7 @@ def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "status", "said"),
+    ("content", "status", "message"),
     [
         (None, "unreadable", "no such file"),
         ("", "unreadable", "the file is empty"),
@@ -90,26 +90,28 @@ def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_with_a_run_is_said_in_its_row(
-    tmp_path: Path, content: str | None, status: str, said: str
+    tmp_path: Path, content: str | None, status: str, message: str
 ) -> None:
     file = tmp_path / "run.csv"
     if content is not None:
         file.write_text(content)
-    found = ask(ASKED, str(file))
-    assert (found.status, found.tr) == (status, None)
-    assert said in (found.message or "")
+    run_row = ask(ASKED, str(file))
+    assert (run_row.status, run_row.tr) == (status, None)
+    assert message in (run_row.message or "")
 
 
 def test_a_process_that_did_not_answer_is_a_row() -> None:
-    found = failed("run", MemoryError())
-    assert (found.source, found.status) == ("run", "failed")
+    failed_row = failed("run", MemoryError())
+    assert (failed_row.source, failed_row.status) == ("run", "failed")
     assert (
-        found.message
+        failed_row.message
         == "run: there is not enough memory; give it more, or name fewer files"
     )
-    found = failed("run", KeyError("time"))
-    assert (found.source, found.status) == ("run", "internal-error")
-    assert found.message == "run: internal error, please report it (KeyError: 'time')"
+    failed_row = failed("run", KeyError("time"))
+    assert (failed_row.source, failed_row.status) == ("run", "internal-error")
+    assert (
+        failed_row.message == "run: internal error, please report it (KeyError: 'time')"
+    )
 
 
 def test_another_version_gives_no_answer() -> None:
@@ -123,10 +125,10 @@ def test_another_version_gives_no_answer() -> None:
 def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
     tmp_path: Path,
 ) -> None:
-    names = variants.variants(tmp_path)
+    names = variants.write_variants(tmp_path)
     answer = summarise(variants.TD, [ask(ASKED, name) for name in names])
     for name in names:
-        for tr in (sure(answer.common.tr), *sure(answer.common.window)):
+        for tr in (require(answer.common.tr), *require(answer.common.window)):
             assert verify(read_history([name]), tr, variants.TD, Settings()).verified
     assert answer.spread is not None
     assert answer.spread.min < answer.spread.median < answer.spread.max
@@ -141,34 +143,42 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
 def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(
     energies: tuple[str, ...],
 ) -> None:
-    name = stored("chain_ref.csv.gz")
+    name = locate_stored("chain_ref.csv.gz")
     question = Question(0.238, Settings(), Selection(energy=energies))
-    found = ask(question, name)
-    answer = summarise(0.238, [found, found])
+    run_row = ask(question, name)
+    answer = summarise(0.238, [run_row, run_row])
     history = read_history([name], question.selection)
-    assert verify(history, sure(answer.common.tr), 0.238, Settings()).verified
+    assert verify(history, require(answer.common.tr), 0.238, Settings()).verified
 
 
 def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
     tmp_path: Path,
 ) -> None:
-    found = ask(ASKED, variants.write(tmp_path / "run.csv"))
-    one, two = summarise(variants.TD, [found]), summarise(variants.TD, [found, found])
-    assert one.agree is two.agree is True
-    assert one.common._replace(errors=2 * one.common.errors) == two.common
-    assert one.common.tr == found.tr
-    assert sure(one.common.errors[0]) == pytest.approx(found.residual, abs=1e-3)
+    run_row = ask(ASKED, variants.write(tmp_path / "run.csv"))
+    single_study, two = (
+        summarise(variants.TD, [run_row]),
+        summarise(variants.TD, [run_row, run_row]),
+    )
+    assert single_study.agree is two.agree is True
+    assert (
+        single_study.common._replace(errors=2 * single_study.common.errors)
+        == two.common
+    )
+    assert single_study.common.tr == run_row.tr
+    assert require(single_study.common.errors[0]) == pytest.approx(
+        run_row.residual, abs=1e-3
+    )
 
 
 @given(st.lists(st.floats(1.95, 2.05), min_size=1, max_size=7))
 def test_runs_that_agree_have_their_own_tr_in_common(times: list[float]) -> None:
-    """Times of which none differs from another by more than it may be off."""
-    rows = [row(str(i), (1, 3), tr=tr) for i, tr in enumerate(times)]
-    found = summarise(10.0, rows).common
-    assert found.tr == pytest.approx(float(np.median(times)))
-    assert found.keeps_tolerance
+    """No two times differ by more than their uncertainty."""
+    rows = [make_study_row(str(i), (1, 3), tr=tr) for i, tr in enumerate(times)]
+    common_tr = summarise(10.0, rows).common
+    assert common_tr.tr == pytest.approx(float(np.median(times)))
+    assert common_tr.keeps_tolerance
     without = replace(
-        row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None
+        make_study_row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None
     )
     assert summarise(10.0, [*rows, without]).common.tr == 1.0
 
@@ -180,14 +190,17 @@ def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
         variants.write(tmp_path / "late.csv", end=0.1),
     )
     rows = [ask(ASKED, name) for name in (*whole, short, late)]
-    assert [one.record_end for one in rows] == pytest.approx([0.15] * 3 + [0.06, 0.1])
-    assert [one.status for one in rows] == [OK] * 3 + ["out-of-range", OK]
-    told = {
+    assert [run_row.record_end for run_row in rows] == pytest.approx(
+        [0.15] * 3 + [0.06, 0.1]
+    )
+    assert [run_row.status for run_row in rows] == [OK] * 3 + ["out-of-range", OK]
+    messages = {
         caution.code: caution.message
         for caution in summarise(variants.TD, rows).cautions
     }
     assert (
-        told["cut-runs"] == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
+        messages["cut-runs"]
+        == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
     )
     assert cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[
         0
@@ -202,7 +215,7 @@ def test_runs_agree_when_their_intervals_have_a_time_in_common(
     intervals: list[tuple[float, float]],
 ) -> None:
     rows = [
-        row(str(i), (0, 3), tr=tr, width=width)
+        make_study_row(str(i), (0, 3), tr=tr, width=width)
         for i, (tr, width) in enumerate(intervals)
     ]
     pairwise = all(abs(a - b) <= v + w for a, v in intervals for b, w in intervals)
@@ -219,20 +232,20 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
     None
 ):
     rows = [
-        row("a", (1, 2)),
-        row("b", (1.5, 3)),
-        row("c", (5, 6), (1.6, 1.7)),
-        row("d", (8, 9)),
-        row("e"),
+        make_study_row("a", (1, 2)),
+        make_study_row("b", (1.5, 3)),
+        make_study_row("c", (5, 6), (1.6, 1.7)),
+        make_study_row("d", (8, 9)),
+        make_study_row("e"),
     ]
-    found = summarise(10.0, rows).common
-    assert (found.tr, found.window) == (None, None)
+    common_tr = summarise(10.0, rows).common
+    assert (common_tr.tr, common_tr.window) == (None, None)
     assert (
-        found.reason
+        common_tr.reason
         == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
     )
     assert (
-        summarise(10.0, [row("e")]).common.reason
+        summarise(10.0, [make_study_row("e")]).common.reason
         == "no tr is acceptable in the run that was judged"
     )
     assert (
@@ -242,7 +255,7 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
 
 
 def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
-    answer = summarise(10.0, [row("a", (1, 2)), failed("bad", OSError())])
+    answer = summarise(10.0, [make_study_row("a", (1, 2)), failed("bad", OSError())])
     assert answer.common.tr == 2.0
     assert list(answer.common.errors) == [pytest.approx(0.2), None]
     assert answer.objection
@@ -250,7 +263,7 @@ def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
     assert (caution.code, "bad" in caution.message) == ("runs-left-out", True)
 
 
-def alike(
+def make_equal_rows(
     *windows: tuple[float, float],
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.array(windows, float).reshape(-1, 2)
@@ -260,30 +273,36 @@ def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run(
     None
 ):
     rows = [
-        row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))),
-        row("b", (0, 6), tr=3.0, alike=alike((1.45, 5))),
+        make_study_row("a", (1, 4), alike=make_equal_rows((1.2, 1.4), (1.5, 3))),
+        make_study_row("b", (0, 6), tr=3.0, alike=make_equal_rows((1.45, 5))),
     ]
-    found = summarise(10.0, rows).common
-    assert (found.tr, found.window, found.keeps_tolerance) == (1.5, (1.0, 4.0), True)
-    assert found.errors == pytest.approx([0.15] * 2)
+    common_tr = summarise(10.0, rows).common
+    assert (common_tr.tr, common_tr.window, common_tr.keeps_tolerance) == (
+        1.5,
+        (1.0, 4.0),
+        True,
+    )
+    assert common_tr.errors == pytest.approx([0.15] * 2)
 
 
 def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> (
     None
 ):
-    """One error falls from 0.2 to 0, the other grows from 0 to 0.2: both are least in the middle."""
+    """One error falls from 0.2 to 0, the other grows from 0 to 0.2; the larger one is least in the middle."""
     falling, growing = (
         np.array([[1.0, 3.0], [0.2, 0.0]]),
         np.array([[1.0, 3.0], [0.0, 0.2]]),
     )
     rows = [
-        row("a", (1, 3), tr=3.0, profile=falling, alike=alike((2.5, 3))),
-        row(
+        make_study_row(
+            "a", (1, 3), tr=3.0, profile=falling, alike=make_equal_rows((2.5, 3))
+        ),
+        make_study_row(
             "b",
             (1, 3),
             tr=1.0,
             profile=np.insert(growing, 1, [2.0, 0.1], axis=1),
-            alike=alike((1, 1.5)),
+            alike=make_equal_rows((1, 1.5)),
         ),
     ]
     answer = summarise(10.0, rows)
@@ -301,9 +320,9 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
 @given(
     st.lists(
         st.tuples(st.floats(0, 5), st.floats(0.1, 4), st.floats(0, 1), st.floats(0, 1)).map(
-            lambda one: row(
+            lambda one: make_study_row(
                 "r", (one[0], one[0] + one[1]),
-                alike=alike(tuple(sorted(one[0] + share * one[1] for share in one[2:]))),  # type: ignore[arg-type]
+                alike=make_equal_rows(tuple(sorted(one[0] + share * one[1] for share in one[2:]))),  # type: ignore[arg-type]
             )
         ),
         min_size=1,
@@ -311,55 +330,60 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
     )
 )  # fmt: skip
 def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[StudyRow]) -> None:
-    found = summarise(10.0, rows).common
-    if found.tr is None:
-        assert max(one.acceptable[0, 0] for one in rows) > min(
-            one.acceptable[0, 1] for one in rows
+    common_tr = summarise(10.0, rows).common
+    if common_tr.tr is None:
+        assert max(run_row.acceptable[0, 0] for run_row in rows) > min(
+            run_row.acceptable[0, 1] for run_row in rows
         )
         return
-    for one in rows:
-        for windows in (one.acceptable, *[one.alike] * bool(found.keeps_tolerance)):
-            assert windows[0, 0] <= found.tr <= windows[0, 1]
+    for run_row in rows:
+        for windows in (
+            run_row.acceptable,
+            *[run_row.alike] * bool(common_tr.keeps_tolerance),
+        ):
+            assert windows[0, 0] <= common_tr.tr <= windows[0, 1]
 
 
 def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None:
-    names = variants.variants(tmp_path)
+    names = variants.write_variants(tmp_path)
     for question in (
         ASKED,
         replace(ASKED, settings=Settings(replay=False, after=0.01)),
     ):
         answer = summarise(variants.TD, [ask(question, name) for name in names])
-        tr = sure(answer.common.tr)
+        tr = require(answer.common.tr)
         for name, error in zip(names, answer.common.errors, strict=True):
-            own = verify(
+            verdict = verify(
                 read_history([name]), tr, variants.TD, question.settings
             ).candidate.error
-            assert error == pytest.approx(own, abs=1e-3)
+            assert error == pytest.approx(verdict, abs=1e-3)
 
 
 def test_each_run_chooses_its_own_td_in_a_window(tmp_path: Path) -> None:
-    names = variants.variants(tmp_path)
+    names = variants.write_variants(tmp_path)
     window = (0.06, 0.07)
     rows = [ask(Question(window, Settings()), name) for name in names]
     answer = summarise(window, rows)
     assert (answer.td, answer.td_window) == (None, window)
-    times = [found.td for found in rows if found.td is not None]
+    times = [run_row.td for run_row in rows if run_row.td is not None]
     assert len(set(times)) == len(names)
     assert all(window[0] <= td <= window[1] for td in times)
     for name, td in zip(names, times, strict=True):
         assert verify(
-            read_history([name]), sure(answer.common.tr), td, Settings()
+            read_history([name]), require(answer.common.tr), td, Settings()
         ).verified
 
 
 def test_different_bases_and_units_are_told() -> None:
     rows = [
-        row("a", (1, 2)),
-        row("b", (1, 2), basis="energy", warnings=("energy-only",)),
-        row("c", time_unit="ms"),
+        make_study_row("a", (1, 2)),
+        make_study_row("b", (1, 2), basis="energy", warnings=("energy-only",)),
+        make_study_row("c", time_unit="ms"),
     ]
-    told = {caution.code: caution.message for caution in summarise(10.0, rows).cautions}
-    assert told == {
+    messages = {
+        caution.code: caution.message for caution in summarise(10.0, rows).cautions
+    }
+    assert messages == {
         "mixed-units": "the times of the runs have different units, td has only one: not named in 2 runs, ms in 1 run",
         "mixed-bases": "the basis of the choice differs between the runs: oscillator in 2 runs, energy in 1 run",
         "energy-only": "in 1 of 3 runs: b",
@@ -369,9 +393,13 @@ def test_different_bases_and_units_are_told() -> None:
 @given(st.floats(1e-6, 1e3), st.floats(0, 1))
 def test_the_shortest_number_lies_between(low: float, share: float) -> None:
     high = low * (1 + share)
-    found = fewest_digits(low, high)
-    assert low <= found <= high
-    assert len(repr(found)) <= len(repr(low)) or share < 1e-3 or len(repr(found)) <= 7
+    shortest = fewest_digits(low, high)
+    assert low <= shortest <= high
+    assert (
+        len(repr(shortest)) <= len(repr(low))
+        or share < 1e-3
+        or len(repr(shortest)) <= 7
+    )
 
 
 # Names.
@@ -380,14 +408,16 @@ def test_the_shortest_number_lies_between(low: float, share: float) -> None:
 def test_a_folder_of_folders_of_runs_says_how_to_name_them(tmp_path: Path) -> None:
     for name in ("a", "b"):
         (tmp_path / "var" / name).mkdir(parents=True)
-    asked = replace(ASKED, td=0.064)
-    assert sure(ask(asked, str(tmp_path / "var")).message).endswith("give the file")
+    asked_question = replace(ASKED, td=0.064)
+    assert require(ask(asked_question, str(tmp_path / "var")).message).endswith(
+        "give the file"
+    )
     for name in ("a", "b"):
         (tmp_path / "var" / name / "glstat").write_bytes(Path(GLSTAT).read_bytes())
-    said = sure(ask(asked, str(tmp_path / "var")).message)
-    assert said.endswith(f"or all to study as '{tmp_path / 'var'}/*'")
-    names = find_runs([said.split("'")[1]])
-    assert [ask(asked, name).status for name in names] == [OK, OK]
+    message = require(ask(asked_question, str(tmp_path / "var")).message)
+    assert message.endswith(f"or all to study as '{tmp_path / 'var'}/*'")
+    names = find_runs([message.split("'")[1]])
+    assert [ask(asked_question, name).status for name in names] == [OK, OK]
 
 
 @pytest.mark.usefixtures("here")
@@ -406,33 +436,42 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays() -> N
 
 @pytest.mark.slow
 def test_files_of_all_formats_are_rows_of_one_study() -> None:
-    """One ends before td."""
+    """One of the files ends before td."""
     samples = sorted(str(path) for path in Path(BOX).parent.iterdir() if path.is_file())
     sources = [
         *samples,
         *(
-            stored(name)
+            locate_stored(name)
             for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz")
         ),
     ]
     rows = [ask(Question(0.05, Settings()), source) for source in sources]
     answer = summarise(0.05, rows)
-    assert [found.source for found in answer.runs] == sources
-    assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}
-    assert all((found.message is None) == (found.status == OK) for found in rows)
+    assert [result_row.source for result_row in answer.runs] == sources
+    assert {"ok", "unreadable", "out-of-range"} <= {
+        result_row.status for result_row in rows
+    }
+    assert all(
+        (result_row.message is None) == (result_row.status == OK) for result_row in rows
+    )
 
 
-def chosen(name: str, tr: float | None = None, status: str = OK) -> StudyRow:
+def make_chosen_row(name: str, tr: float | None = None, status: str = OK) -> StudyRow:
     return StudyRow(name, status, tr=tr)
 
 
 def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
-    near = [chosen(f"run{i}", 1.0 + i / 1000) for i in range(20)]
-    far, farther = chosen("far", 1.1), chosen("farther", 0.5)
-    none, lost = chosen("none", None, NONE), chosen("x", None, UNREADABLE)
+    near = [make_chosen_row(f"run{i}", 1.0 + i / 1000) for i in range(20)]
+    far, farther = make_chosen_row("far", 1.1), make_chosen_row("farther", 0.5)
+    none, lost = (
+        make_chosen_row("none", None, NONE),
+        make_chosen_row("x", None, UNREADABLE),
+    )
     assert outliers([far, *near, lost, none, farther]) == (none, farther, far)
     assert outliers(near) == ()
     assert outliers([none]) == (none,)
     assert outliers([]) == ()
-    other = chosen("other", 2.1)  # equal times let any other stand out
-    assert outliers([*(chosen("same", 2.0) for _ in range(9)), other]) == (other,)
+    other_row = make_chosen_row("other", 2.1)  # equal times let any other stand out
+    assert outliers([*(make_chosen_row("same", 2.0) for _ in range(9)), other_row]) == (
+        other_row,
+    )

@@ -1,4 +1,4 @@
-"""When the parts of a question were rigid, and when only others were."""
+"""When the parts of a question were rigid, and when only other parts were."""
 
 from pathlib import Path
 
@@ -14,19 +14,21 @@ from d2rpick.histories.opening import Selection
 TIME = np.linspace(0, 1, 501)
 
 
-def column(energy: Samples, kinetic: Samples, title: str) -> matsum.PartColumns:
+def make_column(energy: Samples, kinetic: Samples, title: str) -> matsum.PartColumns:
     return matsum.PartColumns(title, energy, kinetic, 0 * TIME, 0 * TIME + 3)
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[str]:
-    """Three bodies: of one a rigid body has the kinetic energy for a while, one goes on, one never matters."""
-    off = (TIME > 0.299) & (TIME < 0.701)
+    """Write three bodies: the kinetic energy of the first is a rigid body's for a while, the others are controls."""
+    is_off = (TIME > 0.299) & (TIME < 0.701)
     swing, moves = 5 + np.sin(40 * TIME), 100 + np.cos(40 * TIME)
     parts = (
-        column(np.where(off, swing[150], swing), np.where(off, 0.0, moves), "engine"),
-        column(3 + np.cos(31 * TIME), moves, "car"),
-        column(1e-9 * swing, moves, "dust"),
+        make_column(
+            np.where(is_off, swing[150], swing), np.where(is_off, 0.0, moves), "engine"
+        ),
+        make_column(3 + np.cos(31 * TIME), moves, "car"),
+        make_column(1e-9 * swing, moves, "dust"),
     )
     lines = {
         "time": TIME,
@@ -42,7 +44,7 @@ def files(tmp_path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("asked", "done"),
+    ("arguments", "done"),
     [
         ((), False),
         (("engine",), True),
@@ -52,15 +54,15 @@ def files(tmp_path: Path) -> list[str]:
     ],
 )
 def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
-    files: list[str], asked: tuple[str, ...], done: bool | None
+    files: list[str], arguments: tuple[str, ...], done: bool | None
 ) -> None:
-    reference = read(files, Selection(parts=asked))
+    reference = read(files, Selection(parts=arguments))
     history, windows, cautions = switched_history(reference, ())
     assert [time for window in windows for time in window] == pytest.approx(
         [0.3, 0.7] * bool(done)
     )
-    said = {None: [], True: ["rigid-times"], False: ["partly-rigid"]}[done]
-    assert [one.code for one in cautions] == said
+    codes_expected = {None: [], True: ["rigid-times"], False: ["partly-rigid"]}[done]
+    assert [caution.code for caution in cautions] == codes_expected
     if done is False:
         assert "these parts were rigid: engine; others deform" in cautions[0].message
     # where a rigid body has taken momenta over, those of the parts tell no flight

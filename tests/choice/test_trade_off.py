@@ -1,4 +1,4 @@
-"""Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
+"""A trade-off gives every td the same answer as ``suggest``, and marks exactly the Pareto-optimal offers."""
 
 from itertools import pairwise
 
@@ -16,42 +16,49 @@ from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
-from tests.energies import of, reference, sure
+from tests.energies import make_energy_history, make_reference, require
 from tests.reading import read
 
 SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
 
 
 def check(
-    found: TradeOff, history: History, asked: Settings, offers: list[Offer]
+    exploration: TradeOff,
+    history: History,
+    settings_asked: Settings,
+    offers: list[Offer],
 ) -> None:
-    """Hold offers against what ``suggest`` says of their td, asked for it alone."""
-    for one in offers:
-        alone = suggest_at(examine(history, one.td, asked, Fits()))
-        assert one.best == alone.chosen
-        assert (one.basis, one.energy_td, one.kinetic_share) == (
+    """Compare offers with the answers of ``suggest`` for each single td."""
+    for offer in offers:
+        alone = suggest_at(examine(history, offer.td, settings_asked, Fits()))
+        assert offer.best == alone.chosen
+        assert (offer.basis, offer.energy_td, offer.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
         )  # fmt: skip
-        assert one.answer.windows == alone.windows
-        assert one.answer.expected == alone.expected
-        assert one.quality == alone.quality
-        assert one.answer.why_none == "; ".join(
+        assert offer.answer.windows == alone.windows
+        assert offer.answer.expected == alone.expected
+        assert offer.quality == alone.quality
+        assert offer.answer.why_none == "; ".join(
             it.message for it in alone.cautions if it.code == "no-candidate"
         )
-    assert all(low.td < high.td for low, high in pairwise(found.offers))
-    unbeaten(found)
+    assert all(low.td < high.td for low, high in pairwise(exploration.offers))
+    check_unbeaten(exploration)
 
 
-def unbeaten(found: TradeOff) -> None:
-    """Hold the marks against every other offer."""
-    for known in (True, False):
+def check_unbeaten(exploration: TradeOff) -> None:
+    """Compare the Pareto marks with all other offers."""
+    for is_rigid_time_known in (True, False):
         pairs = [
-            (one.unbeaten, round(one.error, 3), round_as_read(one.best.rigid_time))
-            for one in found.offers
-            if one.best
-            and one.error is not None
-            and not one.best.same_swing
-            and (one.basis != "energy") == known
+            (
+                offer.unbeaten,
+                round(offer.error, 3),
+                round_as_read(offer.best.rigid_time),
+            )
+            for offer in exploration.offers
+            if offer.best
+            and offer.error is not None
+            and not offer.best.same_swing
+            and (offer.basis != "energy") == is_rigid_time_known
         ]
         for marked, error, rigid in pairs:
             beaten = any(
@@ -63,29 +70,37 @@ def unbeaten(found: TradeOff) -> None:
 
 @pytest.mark.parametrize("name", SAMPLES)
 def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> None:
-    known = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
-    found = explore_of(known, Settings(), steps=4)
-    low, high = found.td_window
+    run = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
+    exploration = explore_of(run, Settings(), steps=4)
+    low, high = exploration.td_window
     cells = np.searchsorted(
-        np.linspace(low, high, 5)[1:], [one.td - 1e-12 for one in found.offers]
+        np.linspace(low, high, 5)[1:],
+        [offer.td - 1e-12 for offer in exploration.offers],
     )
     assert set(cells.tolist()) == set(range(4))
-    assert sum(one.recommended for one in found.offers) == 1
-    check(found, known.history, Settings(), [*found.offers][:: len(found.offers) // 2])
+    assert sum(offer.recommended for offer in exploration.offers) == 1
+    check(
+        exploration,
+        run.history,
+        Settings(),
+        [*exploration.offers][:: len(exploration.offers) // 2],
+    )
 
 
 def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None:
-    """An offer holds none of them: they are looked for again."""
-    known = read(["sample_data/energy.csv"])
-    found = explore_of(known, Settings(), (0.001, 0.07), steps=10)
-    without = [one for one in found.offers if one.pair is None]
-    assert any("the nearest, tr = " in one.answer.why_none for one in without)
-    check(found, known.history, Settings(), without)
+    """An offer does not keep its candidates: they must be found again."""
+    run = read(["sample_data/energy.csv"])
+    exploration = explore_of(run, Settings(), (0.001, 0.07), steps=10)
+    without = [offer_row for offer_row in exploration.offers if offer_row.pair is None]
+    assert any(
+        "the nearest, tr = " in offer_row.answer.why_none for offer_row in without
+    )
+    check(exploration, run.history, Settings(), without)
 
 
 @st.composite
 def histories(draw: st.DrawFn) -> History:
-    """Energy of some modes after a load that may ring, with or without noise, damping and a contact at the end."""
+    """Draw the energy of some modes after a load, with or without noise, damping, ringing and a final contact."""
     states = draw(st.integers(60, 250))
     time = np.linspace(0.0, 1.0, states)
     energy = np.zeros(states)
@@ -101,100 +116,127 @@ def histories(draw: st.DrawFn) -> History:
     energy[time > draw(st.floats(0.8, 1.2))] += draw(st.floats(0.0, 5.0))
     noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
     share = draw(st.sampled_from([0.0, 0.003, 0.1]))
-    return of(energy + share * noise, time)
+    return make_energy_history(energy + share * noise, time)
 
 
 @pytest.mark.parametrize(
     "seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))]
 )
 def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> None:
-    """Of forty modes, for whose td an oscillator is not sought everywhere."""
+    """For forty modes, the oscillator is not tried at every td."""
     rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
     energy = sum(
         rng.uniform(0.3, 1) * np.sin(2 * np.pi * cycles * time + rng.uniform(0, 3)) ** 2
         for cycles in rng.uniform(6, 30, 40)
     )
     energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
-    found = explore_of(reference(of(energy, time)), Settings(), None, steps=40)
+    exploration = explore_of(
+        make_reference(make_energy_history(energy, time)), Settings(), None, steps=40
+    )
     assert (
-        sure(found.recommended).basis,
-        found.suggestion.situation.flight.source,
+        require(exploration.recommended).basis,
+        exploration.suggestion.situation.flight.source,
     ) == ("energy", "energy")
-    assert sure(found.recommended).unbeaten
+    assert require(exploration.recommended).unbeaten
 
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
-    """From peak to peak of one oscillator the rigid time is the same, but for its last digits."""
-    found = explore_of(read(["sample_data/energy.csv"]), Settings(), None, steps=20)
-    unbeaten(found)
-    peaks = [one for one in found.offers if one.peak and one.best]
+    """From peak to peak of one oscillator the rigid time is the same, except for its last digits."""
+    exploration = explore_of(
+        read(["sample_data/energy.csv"]), Settings(), None, steps=20
+    )
+    check_unbeaten(exploration)
+    peaks = [
+        offer_row
+        for offer_row in exploration.offers
+        if offer_row.peak and offer_row.best
+    ]
     rigid_times = [
-        round_as_read(one.best.rigid_time) for one in peaks if one.best is not None
+        round_as_read(offer_row.best.rigid_time)
+        for offer_row in peaks
+        if offer_row.best is not None
     ]
     alike = [
-        one
-        for one, rigid_time in zip(peaks, rigid_times, strict=True)
+        offer_row
+        for offer_row, rigid_time in zip(peaks, rigid_times, strict=True)
         if rigid_time == rigid_times[-1]
     ]
     assert len(alike) > 1
-    assert {one.unbeaten for one in alike} == {True}
+    assert {offer_row.unbeaten for offer_row in alike} == {True}
 
 
 @pytest.mark.slow
 @settings(max_examples=2, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
-    history: History, td: float, after: float | None
+    history: History, td: float, load_end: float | None
 ) -> None:
-    asked = Settings(after=after)
-    found = explore_of(
-        reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6
+    settings_asked = Settings(after=load_end)
+    exploration = explore_of(
+        make_reference(history), settings_asked, (td - 0.15, td + 0.15), td=td, steps=6
     )
-    assert sure(found.asked).td == td
-    check(found, history, asked, [sure(found.asked), *found.offers[::6]])
+    assert require(exploration.asked).td == td
+    check(
+        exploration,
+        history,
+        settings_asked,
+        [require(exploration.asked), *exploration.offers[::6]],
+    )
 
 
 @pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(histories(), st.floats(0.5, 0.9), st.floats(0.1, 0.45), st.booleans())
 def test_candidates_before_the_flight_never_change_what_is_best(
-    history: History, td: float, after: float, replay: bool
+    history: History, td: float, load_end: float, replay: bool
 ) -> None:
-    situation = examine(history, td, Settings(after=after, replay=replay))
-    every, flying = (
-        next(candidates_at([situation], in_flight=one)) for one in (False, True)
+    situation = examine(history, td, Settings(after=load_end, replay=replay))
+    all_candidates, flying = (
+        next(candidates_at([situation], in_flight=in_flight))
+        for in_flight in (False, True)
     )
-    assert flying.chosen == every.chosen
+    assert flying.chosen == all_candidates.chosen
     if situation.basis == "energy":
-        assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
+        assert sorted(flying.tr) == sorted(
+            all_candidates.tr[all_candidates.tr >= load_end]
+        )
 
 
 def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
-    """The energy alone shows another flight to each td; that of the window's start was shown."""
+    """The energy alone shows another flight for each td; the flight of the start of the range must not be shown."""
     time = np.linspace(0.0, 1.0, 2001)
     energy = (
         np.exp(-6 * time) * np.sin(250 * time) ** 2
         + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
     )
-    history = of(energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time)
-    asked = Settings(replay=False)
-    alone = suggest(history, 0.37, asked).situation.flight
+    history = make_energy_history(
+        energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time
+    )
+    settings_asked = Settings(replay=False)
+    alone = suggest(history, 0.37, settings_asked).situation.flight
     assert alone.source == "energy"
-    found = explore_of(reference(history), asked, (0.27, 1.0), td=0.37, steps=4)
-    assert found.situation.flight == alone
+    exploration = explore_of(
+        make_reference(history), settings_asked, (0.27, 1.0), td=0.37, steps=4
+    )
+    assert exploration.situation.flight == alone
     assert (
-        explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight
+        explore_of(
+            make_reference(history), settings_asked, (0.27, 1.0), steps=4
+        ).situation.flight
         != alone
     )
 
 
 @pytest.mark.slow
 def test_the_basis_is_that_of_the_recommended_pair() -> None:
-    """The first td of the flight has a single state before it, which is no reason why a basis is refused."""
+    """The first td of the flight has only one state before it, which must not make a basis unusable."""
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
-    found = explore_of(reference, Settings(), steps=20)
-    refused = [of.situation.vibration.unknown for of in (found, found.suggestion)]
-    assert all("deviates systematically" in sure(why) for why in refused)
+    exploration = explore_of(reference, Settings(), steps=20)
+    refused = [
+        answer_part.situation.vibration.unknown
+        for answer_part in (exploration, exploration.suggestion)
+    ]
+    assert all("deviates systematically" in require(why) for why in refused)
 
 
 @pytest.mark.slow
@@ -209,28 +251,33 @@ def test_the_basis_is_that_of_the_recommended_pair() -> None:
 def test_no_offer_beats_the_one_that_is_recommended(
     file: str, selection: Selection, window: tuple[float, float] | None, steps: int
 ) -> None:
-    asked = Settings(replay=file == "energy.csv")
-    found = explore_of(
-        read([f"sample_data/{file}"], selection), asked, window, steps=steps
+    settings_asked = Settings(replay=file == "energy.csv")
+    exploration = explore_of(
+        read([f"sample_data/{file}"], selection), settings_asked, window, steps=steps
     )
-    assert found.recommended is not None
-    assert found.recommended.unbeaten
+    assert exploration.recommended is not None
+    assert exploration.recommended.unbeaten
     if file == "rollover.csv":
-        alone = suggest_of(read([f"sample_data/{file}"], selection), window, asked)
-        assert (found.recommended.tr, found.recommended.td) == sure(alone.recommended)[
-            :2
-        ]
+        alone = suggest_of(
+            read([f"sample_data/{file}"], selection), window, settings_asked
+        )
+        assert (exploration.recommended.tr, exploration.recommended.td) == require(
+            alone.recommended
+        )[:2]
 
 
 @pytest.mark.slow
 def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
-    """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
+    """Plastic energy with a vibration of 1e-4 of it: about half of the vibration is kinetic, on both sides of td."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
-    found = explore_of(reference(of(energy, time)), Settings(after=0.1, replay=False))
+    exploration = explore_of(
+        make_reference(make_energy_history(energy, time)),
+        Settings(after=0.1, replay=False),
+    )
     grades = {
-        one.quality.grade
-        for one in found.offers
-        if one.quality and one.best and not one.best.same_swing
+        offer.quality.grade
+        for offer in exploration.offers
+        if offer.quality and offer.best and not offer.best.same_swing
     }
     assert grades == {"poor"}  # nothing tells the deformation

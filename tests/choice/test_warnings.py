@@ -1,4 +1,4 @@
-"""More energy than the reference has never comes back: where the estimate says so, the pair is refused."""
+"""A pair is refused if its estimate returns more energy than the reference ever has."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from d2rpick.choice.trade_off import offers_of
 from d2rpick.choice.warnings import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.rules.judgement import find_faults
-from tests.energies import of, sure
+from tests.energies import make_energy_history, require
 
 TIME = np.linspace(0, 1, 2001)
 # Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.
@@ -22,27 +22,31 @@ ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(
 )
 
 
-def situation_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
-    """See the record from a td in a flight from 0.1 of which no end is known."""
-    found = examine(of(energy, TIME), td, Settings(after=0.1, replay=False))
+def examine_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
+    """Return the situation at a td in a flight that begins at 0.1 and has no known end."""
+    situation = examine(
+        make_energy_history(energy, TIME), td, Settings(after=0.1, replay=False)
+    )
     return replace(
-        found, flight=found.flight._replace(start=0.1, end=None, refusal=None)
+        situation, flight=situation.flight._replace(start=0.1, end=None, refusal=None)
     )
 
 
 def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_it() -> (
     None
 ):
-    situation = situation_at(0.95)
+    situation = examine_at(0.95)
     assert expectation(situation, situation.energy_td).ratio > 2  # type: ignore[union-attr, operator]
     answer = suggest_at(situation, with_better=False)
     assert answer.recommended is None
-    (why,) = (one.message for one in answer.cautions if one.code == "no-candidate")
+    (why,) = (
+        remark.message for remark in answer.cautions if remark.code == "no-candidate"
+    )
     assert "times that of the reference, more than 1.2 times" in why
     crossing = next(
-        one
-        for one in answer.candidates
-        if one.level_error == pytest.approx(0, abs=1e-6)
+        remark
+        for remark in answer.candidates
+        if remark.level_error == pytest.approx(0, abs=1e-6)
     )
     verdict = verify_at(situation, crossing.tr)
     assert not verdict.verified
@@ -54,20 +58,20 @@ def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_
 
 
 def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
-    """A td on the highest peak: of the levels within the tolerance the higher ones give back too much."""
+    """At a td on the highest peak, the higher levels within the tolerance return too much energy."""
     energy = 0.1 + np.sin(61 * TIME) ** 2 * (1 + 0.9 * np.sin(4.4 * TIME + 0.4))
     peak = TIME[np.argmax(energy * (TIME < 0.6))]
-    situation = situation_at(float(peak), energy)
+    situation = examine_at(float(peak), energy)
     candidates = suggest_at(situation, with_better=False).candidates
     windows = acceptable_windows(situation, candidates, None)
     grid = np.linspace(0.1, float(windows[-1, 1]), 3000)
-    kept = judge(situation, grid.tolist()).kept
+    judged = judge(situation, grid.tolist()).kept
     levels = situation.vibration.whole.energies(grid)
-    assert kept.any()
-    assert levels[kept].max() <= most_energy(situation)
-    within = np.abs(np.sqrt(levels / situation.energy_td) - 1) <= 0.2
-    assert (kept == (within & (levels <= most_energy(situation)))).all()
-    found = sure(expectation(situation, most_energy(situation)))
-    assert found.ratio == pytest.approx(MOST_KEPT)
+    assert judged.any()
+    assert levels[judged].max() <= most_energy(situation)
+    is_within_limit = np.abs(np.sqrt(levels / situation.energy_td) - 1) <= 0.2
+    assert (judged == (is_within_limit & (levels <= most_energy(situation)))).all()
+    expected_energy = require(expectation(situation, most_energy(situation)))
+    assert expected_energy.ratio == pytest.approx(MOST_KEPT)
     inside = (windows[:, :1] <= grid) & (grid <= windows[:, 1:])
-    assert (inside.any(axis=0) == kept).mean() > 0.999
+    assert (inside.any(axis=0) == judged).mean() > 0.999

@@ -1,4 +1,4 @@
-"""Windows: margins against computed landings; what lies inside verifies, what lies outside does not."""
+"""Windows of acceptable tr: margins compared with computed landings; times inside verify, times outside do not."""
 
 import csv
 from collections.abc import Iterator
@@ -35,19 +35,19 @@ from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode
 from tests import chain
 from tests.command import ROLLOVER
-from tests.computed import results
-from tests.energies import of, sure
+from tests.computed import locate_results
+from tests.energies import make_energy_history, require
 from tests.paper import OMEGA_2
-from tests.reading import read_history, solved
-from tests.records import ENERGY, MODE, TIME, energy_of, noisy
+from tests.reading import read_history, read_solved
+from tests.records import ENERGY, MODE, TIME, add_noise, sum_energies
 
 positive = st.floats(0.1, 10.0)
 
 
-def flying_oscillator(
+def make_flying_oscillator(
     omega: float, amplitude: float, speed: float, mass: float, periods: int = 20
 ) -> tuple[History, Flight]:
-    """A body that falls with a vibration of the velocity ``amplitude * omega`` in it, and its flight."""
+    """Return a falling body that vibrates with a velocity of ``amplitude * omega``, and its flight."""
     time = np.linspace(0.0, 2 * np.pi * periods / omega, 4001)
     internal = mass * (omega * amplitude * np.sin(omega * time)) ** 2 / 2
     velocity = speed * (0.5 + 0.5 * time / time[-1])
@@ -66,8 +66,10 @@ def flying_oscillator(
 def test_the_landing_moves_by_the_amplitude_over_the_speed(
     omega: float, amplitude: float, speed: float, mass: float
 ) -> None:
-    """Half of the vibration energy is kinetic in the mean: the amplitude counts with 1 over the root of 2."""
-    history, flight = flying_oscillator(omega, amplitude * speed / omega, speed, mass)
+    """On average half of the vibration energy is kinetic, so the amplitude counts with a factor of 1/sqrt(2)."""
+    history, flight = make_flying_oscillator(
+        omega, amplitude * speed / omega, speed, mass
+    )
     expected = amplitude * speed / omega / speed / np.sqrt(2)
     assert estimate_spread_of_vibration(history, flight) == pytest.approx(
         expected, rel=0.05
@@ -75,26 +77,26 @@ def test_the_landing_moves_by_the_amplitude_over_the_speed(
 
 
 def test_the_larger_of_share_and_spread_counts() -> None:
-    history, flight = flying_oscillator(10.0, 1e-4, 1.0, 2.0)
+    history, flight = make_flying_oscillator(10.0, 1e-4, 1.0, 2.0)
     assert compute_margin(history, flight)[:2] == (
-        SHARE * sure(flight.end),
+        SHARE * require(flight.end),
         "flight",
     )
-    history, flight = flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
-    found = compute_margin(history, flight)
-    assert (found.source, found.time) == ("landing", found.spread)
+    history, flight = make_flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
+    margin_found = compute_margin(history, flight)
+    assert (margin_found.source, margin_found.time) == ("landing", margin_found.spread)
     assert compute_margin(history, flight, 0.25)[:2] == (0.25, "given")
 
 
 def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
-    history, flight = flying_oscillator(10.0, 1.0, 1.0, 2.0)
+    history, flight = make_flying_oscillator(10.0, 1.0, 1.0, 2.0)
     assert compute_margin(history, flight._replace(end=None)) == (
         0.0,
         "no-contact",
         None,
         None,
     )
-    bare = of(history.energy, history.time)
+    bare = make_energy_history(history.energy, history.time)
     assert compute_margin(bare, flight) == (
         SHARE * history.time[-1],
         "flight",
@@ -105,20 +107,22 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
 
 @given(st.floats(0.001, 0.05), positive)
 def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closing_speed(
-    place: float, speed: float
+    drift: float, speed: float
 ) -> None:
-    history, flight = flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
-    spread = sure(estimate_spread_of_vibration(history, flight))
-    assert estimate_landing_spread(history, flight, place) == pytest.approx(
-        spread + place / speed, rel=1e-6
+    history, flight = make_flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
+    spread = require(estimate_spread_of_vibration(history, flight))
+    assert estimate_landing_spread(history, flight, drift) == pytest.approx(
+        spread + drift / speed, rel=1e-6
     )
     assert estimate_landing_spread(history, flight, None) == spread
-    kept = compute_margin(history, flight, place=place)
-    assert kept.time == max(SHARE * sure(flight.end), sure(kept.spread))
+    margin_kept = compute_margin(history, flight, place=drift)
+    assert margin_kept.time == max(
+        SHARE * require(flight.end), require(margin_kept.spread)
+    )
 
 
-def touching(force: float) -> tuple[History, Flight]:
-    """A body of 2 that vibrates, is pushed by 2000, flies from 0.1 to 0.6 and is then touched with so much force."""
+def make_touched_body(force: float) -> tuple[History, Flight]:
+    """Return a vibrating body of mass 2, pushed by 2000, that flies from 0.1 to 0.6 and then meets this force."""
     time = np.linspace(0.0, 1.0, 2001)
     push = np.where(time < 0.1, 2000.0, np.where(time > 0.6, force, 0.0))
     momentum = np.zeros((time.size, 1, 3))
@@ -129,7 +133,7 @@ def touching(force: float) -> tuple[History, Flight]:
     internal = 0.01 * np.sin(60 * time) ** 2
     kinetic = (momentum[:, 0] ** 2).sum(axis=1) / 4 + 0.01 - internal
     whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
-    history = of(internal, time)
+    history = make_energy_history(internal, time)
     evidence = Given((whole,), Balance(time, internal=internal, kinetic=kinetic))
     return replace(history, evidence=evidence), Flight(
         0.1, 0.6, "momentum", gravity=9.81
@@ -142,7 +146,7 @@ def touching(force: float) -> tuple[History, Flight]:
 def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     force: float, grazed: bool
 ) -> None:
-    history, flight = touching(force)
+    history, flight = make_touched_body(force)
     margin = compute_margin(history, flight, place=0.02)
     assert is_grazing(history, flight, 0.02) is grazed
     assert (margin.source == "grazing") is grazed
@@ -151,9 +155,9 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
         assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
 
 
-def tapped(impulse: float, length: float) -> tuple[History, Flight]:
-    """The body of `touching`, whose contact from 0.6 on lasts for ``length`` and takes so much momentum."""
-    history, flight = touching(0.0)
+def make_tapped_body(impulse: float, length: float) -> tuple[History, Flight]:
+    """Return the body of `make_touched_body` with a contact of this length and impulse from 0.6 on."""
+    history, flight = make_touched_body(0.0)
     (momenta,) = history.momenta
     pushed = np.clip((momenta.time - 0.6) / length, 0.0, 1.0) * impulse
     values = momenta.values.copy()
@@ -176,7 +180,7 @@ def tapped(impulse: float, length: float) -> tuple[History, Flight]:
 def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
     impulse: float, length: float, grazed: bool
 ) -> None:
-    history, flight = tapped(impulse, length)
+    history, flight = make_tapped_body(impulse, length)
     assert not is_grazing(history, flight, 0.02)
     assert changes_momentum_little(history, flight) is grazed
     margin = compute_margin(history, flight, place=0.02)
@@ -187,7 +191,7 @@ def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
 def test_a_contact_that_is_not_over_in_the_record_is_not_taken_for_a_grazing_one() -> (
     None
 ):
-    history, flight = tapped(0.5, 10.0)
+    history, flight = make_tapped_body(0.5, 10.0)
     assert not changes_momentum_little(history, flight)
 
 
@@ -195,7 +199,7 @@ def test_a_contact_that_is_not_over_in_the_record_is_not_taken_for_a_grazing_one
 def test_no_landing_of_the_computed_car_and_box_is_taken_for_a_grazing_one(
     name: str, since: float
 ) -> None:
-    history = solved(name).history
+    history = read_solved(name).history
     landing = [
         flight
         for flight in flights_of(history, Settings())
@@ -207,8 +211,8 @@ def test_no_landing_of_the_computed_car_and_box_is_taken_for_a_grazing_one(
 
 
 def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() -> None:
-    """It touches the block at 28 ms with a hundredth of the momentum towards it, and then hits it."""
-    history = solved("carT01.gz").history
+    """It touches the block at 28 ms with 1 % of the momentum towards it, and then hits it."""
+    history = read_solved("carT01.gz").history
     flight = next(
         flight
         for flight in flights_of(history, Settings())
@@ -218,62 +222,65 @@ def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() 
 
 
 def test_a_grazing_contact_without_gravity_leaves_no_td() -> None:
-    history, flight = touching(0.5)
+    history, flight = make_touched_body(0.5)
     assert (
         compute_margin(history, flight._replace(gravity=0.0), place=0.02).time == np.inf
     )
 
 
 def test_where_no_force_is_known_no_contact_grazes() -> None:
-    history, flight = touching(0.5)
-    assert not is_grazing(of(history.energy, history.time), flight, 0.02)
+    history, flight = make_touched_body(0.5)
+    assert not is_grazing(
+        make_energy_history(history.energy, history.time), flight, 0.02
+    )
     assert not is_grazing(
         history, flight._replace(end=0.99), 0.02
     )  # the record ends too early
 
 
 def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
-    history, _ = touching(0.5)
+    history, _ = make_touched_body(0.5)
     answer = suggest(history, 0.59, Settings())
-    told = {one.code: one.message for one in answer.cautions}
-    assert "stays below 1 % of the largest one" in told["grazing-contact"]
+    messages = {caution.code: caution.message for caution in answer.cautions}
+    assert "stays below 1 % of the largest one" in messages["grazing-contact"]
     assert "grazing-contact" not in {
-        one.code for one in suggest(touching(3000.0)[0], 0.59, Settings()).cautions
+        caution.code
+        for caution in suggest(make_touched_body(3000.0)[0], 0.59, Settings()).cautions
     }
 
 
-def landings(name: str, column: str) -> Iterator[tuple[str, float]]:
-    """Name of each computed run, and a number of it."""
-    with results(name).open() as file:
+def read_landings(name: str, column: str) -> Iterator[tuple[str, float]]:
+    """Yield the name of each computed run, and a number from its row."""
+    with locate_results(name).open() as file:
         yield from (
             (row["run"], float(row[column] or "nan")) for row in csv.DictReader(file)
         )
 
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
-    """All that were switched in the flight and back before the contact."""
-    history = solved("carT01.gz").history
+    """For all runs that were switched in the flight and switched back before the contact."""
+    history = read_solved("carT01.gz").history
     flight = flights_of(history, Settings())[-1]
     margin = compute_margin(history, flight)
     starts, ends = (
-        dict(landings("car_runs.csv", "tr_s")),
-        dict(landings("car_runs.csv", "td_s")),
+        dict(read_landings("car_runs.csv", "tr_s")),
+        dict(read_landings("car_runs.csv", "td_s")),
     )
-    kept = [
+    landed_names = [
         name
         for name in starts
         if starts[name] > (flight.start or 0) and ends[name] < 0.15
     ]
     moved = [
         abs(landing - 0.15041)
-        for name, landing in landings("car_runs.csv", "landing_s")
-        if name in kept
+        for name, landing in read_landings("car_runs.csv", "landing_s")
+        if name in landed_names
     ]
     assert len(moved) > 15
     assert max(moved) == pytest.approx(1.1e-3, abs=1e-4)
     assert max(moved) < margin.time
-    assert sure(margin.spread) == pytest.approx(1.25e-3, abs=1e-5)
-    assert max(moved) < sure(margin.spread)  # by the formula alone, too
+    assert require(margin.spread) == pytest.approx(1.25e-3, abs=1e-5)
+    assert max(moved) < require(margin.spread)  # by the formula alone, too
 
 
 @pytest.mark.parametrize(
@@ -283,38 +290,43 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
 def test_the_landings_of_the_switched_box_lie_within_the_margin(
     run: str, column: str, end: float
 ) -> None:
-    history = solved("drop2T01.gz").history
+    history = read_solved("drop2T01.gz").history
     (flight,) = (
-        one
-        for one in flights_of(history, Settings())
-        if one.end == pytest.approx(end, abs=1e-3)
+        flight_row
+        for flight_row in flights_of(history, Settings())
+        if flight_row.end == pytest.approx(end, abs=1e-3)
     )
-    moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
+    moved = abs(dict(read_landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < compute_margin(history, flight).time
 
 
 TD = 0.064
-PAPER = of(ENERGY, TIME)
+PAPER = make_energy_history(ENERGY, TIME)
 
 
-def windows_of(answer: Suggestion) -> Samples:
-    own = answer.recommended
+def find_windows_of(answer: Suggestion) -> Samples:
+    best = answer.recommended
     return acceptable_windows(
-        answer.situation, answer.candidates, own.tr if own else None
+        answer.situation, answer.candidates, best.tr if best else None
     )
 
 
-def holds(windows: Samples, times: Samples) -> Samples:
-    """Whether each time lies in a window."""
-    at = times[:, np.newaxis]
-    return np.asarray(np.any((windows[:, 0] <= at) & (at <= windows[:, 1]), axis=1))
+def are_in_windows(windows: Samples, times: Samples) -> Samples:
+    """Return for each time if it lies in a window."""
+    column_of_times = times[:, np.newaxis]
+    return np.asarray(
+        np.any(
+            (windows[:, 0] <= column_of_times) & (column_of_times <= windows[:, 1]),
+            axis=1,
+        )
+    )
 
 
 def check(answer: Suggestion, seed: int) -> None:
-    """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
+    """Compare the windows with ``verify`` at their ends, inside, and at random times."""
     situation = answer.situation
     history = situation.history
-    windows = windows_of(answer)
+    windows = find_windows_of(answer)
     assert np.all(windows[:, 0] <= windows[:, 1])
     assert np.all(windows[1:, 0] > windows[:-1, 1])
     rng = np.random.default_rng(seed)
@@ -332,7 +344,7 @@ def check(answer: Suggestion, seed: int) -> None:
         np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1)
         > 1e-5 * history.step
     ]
-    assert [verify_at(situation, t).admissible for t in clear] == holds(
+    assert [verify_at(situation, t).admissible for t in clear] == are_in_windows(
         windows, clear
     ).tolist()
     # the errors in the windows are those of ``verify``; where nothing vibrates there are none
@@ -346,18 +358,18 @@ def check(answer: Suggestion, seed: int) -> None:
 @given(
     omega=st.floats(150, 400), alpha=st.floats(0, 60), phase=st.floats(0, np.pi), td=st.floats(0.04, 0.14),
     tolerance=st.floats(0.001, 1.0), plastic=st.sampled_from([0.0, 3.0]), preload=st.sampled_from([0.0, 2.0]),
-    after=st.none() | st.floats(0.0, 0.03), limit=st.none() | st.floats(0.1, 1.5), seed=st.integers(0, 2**16),
+    load_end=st.none() | st.floats(0.0, 0.03), limit=st.none() | st.floats(0.1, 1.5), seed=st.integers(0, 2**16),
 )  # fmt: skip
 def test_windows_of_an_oscillator_hold_what_verifies(
     omega: float, alpha: float, phase: float, td: float, tolerance: float, plastic: float, preload: float,
-    after: float | None, limit: float | None, seed: int,
+    load_end: float | None, limit: float | None, seed: int,
 ) -> None:  # fmt: skip
     mode = Mode(
         omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload
     )
-    history = of(mode.energy(TIME[::3]), TIME[::3])
+    history = make_energy_history(mode.energy(TIME[::3]), TIME[::3])
     answer = suggest(
-        history, td, Settings(tolerance=tolerance, after=after, max_residual=limit)
+        history, td, Settings(tolerance=tolerance, after=load_end, max_residual=limit)
     )
     check(answer, seed)
 
@@ -366,7 +378,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
     energy=[0, 1, 0, -1, 1],
     share=1.0,
     tolerance=1.0,
-    after=0.0,
+    load_end=0.0,
     seed=60,
     uneven=False,
     margin=0.0,
@@ -374,28 +386,28 @@ def test_windows_of_an_oscillator_hold_what_verifies(
 @settings(max_examples=12)
 @given(
     energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
-    tolerance=st.floats(0.01, 1.0), after=st.none() | st.floats(0.0, 0.5), seed=st.integers(0, 2**16),
+    tolerance=st.floats(0.01, 1.0), load_end=st.none() | st.floats(0.0, 0.5), seed=st.integers(0, 2**16),
     uneven=st.booleans(), margin=st.sampled_from([0.0, 0.07]),
 )  # fmt: skip
 def test_windows_of_any_energy_hold_what_verifies(
     energy: list[float],
     share: float,
     tolerance: float,
-    after: float | None,
+    load_end: float | None,
     seed: int,
     uneven: bool,
     margin: float,
 ) -> None:
     time = np.linspace(0, 1, len(energy)) ** (1.5 if uneven else 1.0)
-    history = of(np.array(energy), time)
-    asked = Settings(
+    history = make_energy_history(np.array(energy), time)
+    settings_asked = Settings(
         tolerance=tolerance,
-        after=after and after * time[-2],
+        after=load_end and load_end * time[-2],
         margin=margin,
         replay=False,
     )
-    assume(share > float(asked.after or 0))
-    check(suggest(history, share, asked), seed)
+    assume(share > float(settings_asked.after or 0))
+    check(suggest(history, share, settings_asked), seed)
 
 
 @pytest.mark.slow
@@ -403,13 +415,13 @@ def test_windows_of_any_energy_hold_what_verifies(
 def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(
     tolerance: float,
 ) -> None:
-    record = of(noisy(ENERGY, 0.002, 5), TIME)
+    record = make_energy_history(add_noise(ENERGY, 0.002, 5), TIME)
     rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
     for history, td in ((record, TD), (rollover, 0.37)):
         answer = suggest(
             history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5)
         )
-        assert len(windows_of(answer))
+        assert len(find_windows_of(answer))
         check(answer, 1)
 
 
@@ -418,20 +430,22 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(
 def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
     two = (Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0))
     time = np.linspace(0.0, 0.3, 3001)
-    modes = suggest(of(energy_of(two, time), time), td, Settings(tolerance=0.4))
+    modes = suggest(
+        make_energy_history(sum_energies(two, time), time), td, Settings(tolerance=0.4)
+    )
     assert modes.situation.basis == "modal"
     check(modes, 1)
-    parts = suggest(chain.history(), td, Settings())
+    parts = suggest(chain.read_chain_history(), td, Settings())
     assert parts.situation.basis == "parts"
     check(parts, 1)
-    assert len(windows_of(parts))
+    assert len(find_windows_of(parts))
 
 
 def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> (
     None
 ):
     answer = suggest(PAPER, TD, Settings())
-    windows = windows_of(answer)
+    windows = find_windows_of(answer)
     acceptable = np.array(sorted(c.tr for c in answer.candidates if c.admissible))
     assert len(windows) == len(acceptable)
     assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
@@ -439,64 +453,77 @@ def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_s
 
 def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     answer = suggest(PAPER, TD, Settings())
-    assert windows_of(answer)[-1, 1] < TD - 0.01
+    assert find_windows_of(answer)[-1, 1] < TD - 0.01
     late = suggest(PAPER, 0.068, Settings(after=0.0655))
     assert late.recommended is None
-    assert not windows_of(late).size
-    flat = of(1 + 1e-3 * np.cos(np.arange(50) * 2.0), np.linspace(0, 1, 50))
+    assert not find_windows_of(late).size
+    flat = make_energy_history(
+        1 + 1e-3 * np.cos(np.arange(50) * 2.0), np.linspace(0, 1, 50)
+    )
     quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
     assert quiet.recommended
-    (window,) = windows_of(quiet)
+    (window,) = find_windows_of(quiet)
     assert window.tolist() == [0.1, np.nextafter(0.9, 0)]
-    (kept,) = clear_of_td(quiet.situation, windows_of(quiet))
-    assert kept == pytest.approx([0.1, 0.9 - 1 / 49])
+    (clear_window,) = clear_of_td(quiet.situation, find_windows_of(quiet))
+    assert clear_window == pytest.approx([0.1, 0.9 - 1 / 49])
     assert not clear_of_td(quiet.situation, np.array([[0.881, 0.899]])).size
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "settings_asked",
     [
         Settings(max_kinetic_share=0.5),  # 0.917 there
         Settings(max_residual=0.9),
         Settings(tolerance=0.0, replay=False),
     ],
 )
-def test_where_nothing_verifies_there_is_no_window(asked: Settings) -> None:
-    assert not windows_of(suggest(PAPER, TD, asked)).size
+def test_where_nothing_verifies_there_is_no_window(settings_asked: Settings) -> None:
+    assert not find_windows_of(suggest(PAPER, TD, settings_asked)).size
 
 
 def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> (
     None
 ):
-    """On the level alone the level error grows by 0.05."""
-    for history, asked in (
+    """By the level alone, the level error grows by 0.05."""
+    for history, settings_asked in (
         (PAPER, Settings()),
         (PAPER, Settings(replay=False, after=0.005)),
     ):
-        answer = suggest(history, TD, asked)
-        best = sure(answer.chosen)
+        answer = suggest(history, TD, settings_asked)
+        best = require(answer.chosen)
         windows = alike_windows(
-            answer.situation, answer.candidates, best, windows_of(answer)
+            answer.situation, answer.candidates, best, find_windows_of(answer)
         )
-        (around,) = (one for one in windows.tolist() if one[0] <= best.tr <= one[1])
+        (around,) = (
+            pair_time
+            for pair_time in windows.tolist()
+            if pair_time[0] <= best.tr <= pair_time[1]
+        )
         if best.timing_tolerance is not None:
             assert min(abs(end - best.tr) for end in around) == pytest.approx(
                 best.timing_tolerance, rel=1e-3
             )
-        ends = [verify(history, end, TD, asked).candidate for end in windows.ravel()]
+        ends = [
+            verify(history, end, TD, settings_asked).candidate
+            for end in windows.ravel()
+        ]
         errors = [
-            one.level_error if one.lock_in_error is None else one.lock_in_error
-            for one in (best, *ends)
+            pair_time.level_error
+            if pair_time.lock_in_error is None
+            else pair_time.lock_in_error
+            for pair_time in (best, *ends)
         ]
         assert errors[1:] == pytest.approx(
-            [sure(errors[0]) + 0.05] * len(ends), abs=1e-6
+            [require(errors[0]) + 0.05] * len(ends), abs=1e-6
         )
 
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:
     time = np.linspace(0, 0.15, 10_001)
-    answer = suggest(of(MODE.energy(time), time), 0.0687534, Settings())
-    windows = windows_of(answer)
+    answer = suggest(
+        make_energy_history(MODE.energy(time), time), 0.0687534, Settings()
+    )
+    windows = find_windows_of(answer)
     profile = error_profile(answer.situation, answer.candidates, windows)
     assert profile.shape[1] < 20 * len(windows)
     assert np.all(np.diff(profile[0]) > 0)
@@ -508,17 +535,21 @@ def test_a_profile_is_short_where_the_error_is_smooth() -> None:
 
 @pytest.mark.slow
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
-    other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
-    histories = [PAPER, of(other.energy(TIME), TIME)]
-    both = common_windows(
-        [windows_of(suggest(history, 0.0687534, Settings())) for history in histories]
+    second_mode = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
+    histories = [PAPER, make_energy_history(second_mode.energy(TIME), TIME)]
+    shared_windows = common_windows(
+        [
+            find_windows_of(suggest(history, 0.0687534, Settings()))
+            for history in histories
+        ]
     )
     times = np.linspace(0.01, 0.06, 400)
-    seen = [examine(history, 0.0687534, Settings()) for history in histories]
+    situations = [examine(history, 0.0687534, Settings()) for history in histories]
     expected = [
-        all(verify_at(situation, t).admissible for situation in seen) for t in times
+        all(verify_at(situation, t).admissible for situation in situations)
+        for t in times
     ]
-    assert holds(both, times).tolist() == expected
+    assert are_in_windows(shared_windows, times).tolist() == expected
     assert any(expected)
 
 
@@ -533,7 +564,7 @@ def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
 ) -> None:
     stretches, counts = coverage(runs)
     times = np.arange(0, 12.5, 0.25)
-    expected = np.sum([holds(windows, times) for windows in runs], axis=0)
+    expected = np.sum([are_in_windows(windows, times) for windows in runs], axis=0)
     held = (stretches[:, 0] <= times[:, np.newaxis]) & (
         times[:, np.newaxis] <= stretches[:, 1]
     )
@@ -541,7 +572,9 @@ def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
         expected
     )
     shared = common_windows(runs)
-    assert holds(shared, times).tolist() == [count == len(runs) for count in expected]
+    assert are_in_windows(shared, times).tolist() == [
+        count == len(runs) for count in expected
+    ]
     assert np.all(shared[:, 0] <= shared[:, 1])
 
 
@@ -550,6 +583,6 @@ def test_a_suggestion_gives_its_windows_on_any_basis() -> None:
         answer = suggest(PAPER, 0.0687534, Settings(replay=replay, after=0.005))
         windows = answer.acceptable_windows
         assert any(
-            start <= sure(answer.recommended).tr <= end for start, end in windows
+            start <= require(answer.recommended).tr <= end for start, end in windows
         )
         assert all(start < end for start, end in windows)

@@ -10,7 +10,7 @@ from click.testing import Result
 from d2rpick.report.formats import FORMATS
 from d2rpick.rules import RULES
 from tests import paper
-from tests.command import BOX, ENERGY, GLSTAT, answer, refused, run
+from tests.command import BOX, ENERGY, GLSTAT, read_refusal, run, run_json
 
 GOOD = ("--tr", "0.0135867", "--td", "0.0687534")
 OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")
@@ -19,16 +19,19 @@ OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")
 pytestmark = pytest.mark.usefixtures("here", "by_level")
 
 
-def pasted(result: Result) -> list[tuple[int, float, float]]:
-    """Windows that the check sees in a printed card; it must find nothing else."""
+def check_pasted(result: Result) -> list[tuple[int, float, float]]:
+    """Return the windows that check finds in a printed card; it must find no problems."""
     Path("card.k").write_text(result.stdout)
-    found = answer("check", "card.k")
-    assert found["findings"] == []
-    return [(window["part"], window["tr"], window["td"]) for window in found["windows"]]
+    check_report = run_json("check", "card.k")
+    assert check_report["findings"] == []
+    return [
+        (window["part"], window["tr"], window["td"])
+        for window in check_report["windows"]
+    ]
 
 
-def comments(text: str) -> str:
-    """All comments of a card in one line."""
+def join_comments(text: str) -> str:
+    """Join all comments of a card in one line."""
     return " ".join(
         line.lstrip("$# ") for line in text.split("\n") if line.startswith(("$ ", "# "))
     )
@@ -40,7 +43,7 @@ def comments(text: str) -> str:
 def test_the_card_is_what_the_check_reads() -> None:
     result = run("card", *GOOD, "--part", "12,14-16", "--part", "11", "--merge", "11")
     assert (result.exit_code, result.stderr) == (0, "")
-    assert pasted(result) == [
+    assert check_pasted(result) == [
         (part, 0.0135867, 0.0687534) for part in (11, 12, 14, 15, 16)
     ]
     assert "        12        11      PART\n" in result.stdout
@@ -59,7 +62,7 @@ def test_options_of_the_card() -> None:
 def test_the_times_are_judged_as_they_are_printed() -> None:
     good = run("card", *GOOD, "--part", "1", "--history", ENERGY)
     assert good.exit_code == 0
-    assert f"Judged by {ENERGY}, internal_energy: use. The flight is" in comments(
+    assert f"Judged by {ENERGY}, internal_energy: use. The flight is" in join_comments(
         good.stdout
     )
     alone = run(
@@ -75,18 +78,20 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
         "--history",
         BOX,
     )
-    assert ": use with care. How the deformations at tr and td lie" in comments(
+    assert ": use with care. How the deformations at tr and td lie" in join_comments(
         alone.stdout
     )
     bad = run("card", *OPPOSITE, "--part", "1", "--history", ENERGY)
     assert bad.exit_code == 1
-    assert ": DO NOT USE. Opposite sign of the deformation." in comments(bad.stdout)
-    assert "poor-td: 92%" in comments(bad.stdout)
+    assert ": DO NOT USE. Opposite sign of the deformation." in join_comments(
+        bad.stdout
+    )
+    assert "poor-td: 92%" in join_comments(bad.stdout)
     assert (
         "warning: not-verified: the times as printed: do not use: opposite sign"
         in bad.stderr
     )
-    assert pasted(bad) == [(1, 0.0122659, 0.064)]
+    assert check_pasted(bad) == [(1, 0.0122659, 0.064)]
     assert (
         run(
             "card", *OPPOSITE, "--part", "1", "--history", ENERGY, "--exit-zero"
@@ -107,8 +112,8 @@ def test_a_rounded_time_is_told_and_judged() -> None:
         "card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY
     )
     assert "note: tr is printed as .01288528, " in result.stderr
-    assert pasted(result) == [(1, 0.01288528, 0.064)]
-    assert ": DO NOT USE. The vibration after td is wrong by 96%" in comments(
+    assert check_pasted(result) == [(1, 0.01288528, 0.064)]
+    assert ": DO NOT USE. The vibration after td is wrong by 96%" in join_comments(
         result.stdout
     )
     assert result.exit_code == 1
@@ -129,11 +134,11 @@ def test_parts_are_those_of_the_history() -> None:
         "ls-dyna",
     )
     box = next(
-        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+        part["id"] for part in run_json("info", BOX)["parts"] if part["title"] == "box"
     )
-    assert pasted(result) == [(box, 0.0886, 0.37)]
-    assert "internal energy of box" in comments(result.stdout)
-    assert "no part 77" in refused(
+    assert check_pasted(result) == [(box, 0.0886, 0.37)]
+    assert "internal energy of box" in join_comments(result.stdout)
+    assert "no part 77" in read_refusal(
         "card", "--tr", "0.0886", "--td", "0.37", "--part", "77", "--history", BOX
     )
 
@@ -151,7 +156,7 @@ def test_the_card_has_no_colour_codes() -> None:
 def test_the_card_goes_to_a_file() -> None:
     result = run("card", *GOOD, "--part", "1", "-o", "card.k")
     assert (result.exit_code, result.stdout) == (0, "")
-    assert answer("check", "card.k")["findings"] == []
+    assert run_json("check", "card.k")["findings"] == []
     assert run("card", *GOOD, "--part", "1", "-o", "card.k").exit_code == 2
 
 
@@ -205,19 +210,21 @@ def test_engine_files_of_radioss() -> None:
     judged = run("card", *args, "--history", ENERGY)
     assert judged.exit_code == 0
     assert "                0.15\n" in judged.stdout
-    assert ": use. The flight" in comments(judged.stdout)
+    assert ": use. The flight" in join_comments(judged.stdout)
 
 
 @pytest.mark.parametrize("solver", ["ls-dyna --part 1", "radioss --node 1 --end 0.2"])
 def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
-    told = comments(run("card", "--solver", *shlex.split(solver), *GOOD).stdout)
-    for what in (
+    comment_text = join_comments(
+        run("card", "--solver", *shlex.split(solver), *GOOD).stdout
+    )
+    for phrase in (
         "first step at or after",
         "co-rotating",
         "vibration is lost",
         "a switched run",
     ):
-        assert what in told
+        assert phrase in comment_text
 
 
 # suggest -f card.
@@ -225,7 +232,7 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
 
 def test_suggest_prints_the_card_of_its_pair() -> None:
     args = ("suggest", "--td", "0.37", "--part", "box", BOX)
-    pair = answer(*args)["recommended"]
+    pair = run_json(*args)["recommended"]
     result = run(
         *args,
         "-f",
@@ -241,14 +248,14 @@ def test_suggest_prints_the_card_of_its_pair() -> None:
         "3",
     )
     assert result.exit_code == 0
-    ((part, tr, td),) = pasted(result)
+    ((part, tr, td),) = check_pasted(result)
     assert tr == pytest.approx(pair["tr"], abs=1e-8)
     assert re.findall(r"^ +([78]) ", result.stdout, flags=re.MULTILINE) == ["7", "8"]
     assert f"{part:10d}         3      PART" in result.stdout
     assert "    1.0e-5         1         0" in result.stdout
     assert td == 0.37
     assert f"--part {part} " not in result.stdout
-    assert ": use with care. " in comments(result.stdout)
+    assert ": use with care. " in join_comments(result.stdout)
 
 
 def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:
@@ -260,7 +267,7 @@ def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:
         "2",
         "3",
     ]
-    assert "a card for Radioss needs --node" in refused(*args)
+    assert "a card for Radioss needs --node" in read_refusal(*args)
     lead = run(*args, "--node", "1001", "--merge", "3")
     assert "--merge is an option of --solver ls-dyna" in lead.stderr
     card = (
@@ -285,8 +292,8 @@ def test_parts_that_the_history_does_not_have_are_refused_in_every_form(
 ) -> None:
     for history in (GLSTAT, ENERGY):
         refused = [
-            run("suggest", "--td", "0.064", "--part", "11", history, "-f", one)
-            for one in ("table", form)
+            run("suggest", "--td", "0.064", "--part", "11", history, "-f", form_name)
+            for form_name in ("table", form)
         ]
         assert [(result.exit_code, result.stdout) for result in refused] == [
             (2, "")
@@ -299,18 +306,20 @@ def test_parts_that_the_history_does_not_have_are_refused_in_every_form(
 
 
 def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
-    asked = ("card", *GOOD, "--part", "101-130", "--history", ENERGY, "-o")
+    arguments = ("card", *GOOD, "--part", "101-130", "--history", ENERGY, "-o")
     assert (
-        run(*asked, "alone.k").exit_code
-        == run(*asked, "merged.k", "--merge", "101").exit_code
+        run(*arguments, "alone.k").exit_code
+        == run(*arguments, "merged.k", "--merge", "101").exit_code
         == 0
     )
-    assert "level is that of the whole model" in comments(Path("alone.k").read_text())
-    assert "whole model" not in comments(run("card", *GOOD, "--part", "1").stdout)
+    assert "level is that of the whole model" in join_comments(
+        Path("alone.k").read_text()
+    )
+    assert "whole model" not in join_comments(run("card", *GOOD, "--part", "1").stdout)
     for card in ("alone.k", "merged.k"):
         assert Path(card).read_text().count("PSET") == 2
         assert sorted(
-            window["part"] for window in answer("check", card)["windows"]
+            window["part"] for window in run_json("check", card)["windows"]
         ) == [*range(101, 131)]
     assert "       902       101      PSET" in Path("merged.k").read_text()
 
@@ -323,11 +332,11 @@ def test_options_of_a_card_belong_to_a_card() -> None:
 
 
 def test_several_windows_are_one_card() -> None:
-    asked = [(0.02, 0.09), (0.2, 0.3), (0.5, 0.75)]
-    pairs = [text for tr, td in asked for text in ("--tr", str(tr), "--td", str(td))]
+    windows = [(0.02, 0.09), (0.2, 0.3), (0.5, 0.75)]
+    pairs = [text for tr, td in windows for text in ("--tr", str(tr), "--td", str(td))]
     result = run("card", *pairs, "--part", "11")
-    assert [(tr, td) for _, tr, td in pasted(result)] == asked
-    Path("switches.txt").write_text("".join(f"{tr} {td}\n" for tr, td in asked))
+    assert [(tr, td) for _, tr, td in check_pasted(result)] == windows
+    Path("switches.txt").write_text("".join(f"{tr} {td}\n" for tr, td in windows))
     assert (
         run("card", "--windows", "switches.txt", "--part", "11").stdout == result.stdout
     )
@@ -346,9 +355,9 @@ def test_several_windows_are_one_card() -> None:
     assert judged.exit_code == 2  # 0.3 lies outside the record
     two = ("--tr", "0.0135867", "--td", "0.0687534", "--tr", "0.0939", "--td", "0.119")
     assert (
-        comments(run("card", *two, "--part", "1", "--history", ENERGY).stdout).count(
-            "Judged by"
-        )
+        join_comments(
+            run("card", *two, "--part", "1", "--history", ENERGY).stdout
+        ).count("Judged by")
         == 2
     )
 
@@ -362,11 +371,11 @@ def test_suggest_without_a_pair_prints_no_card() -> None:
 
 
 def test_suggest_needs_the_parts_for_a_card() -> None:
-    said = refused("suggest", "--td", "0.064", "-f", "card", ENERGY)
-    assert "-f card needs --part" in said
+    message = read_refusal("suggest", "--td", "0.064", "-f", "card", ENERGY)
+    assert "-f card needs --part" in message
     assert (
         "where the history has no parts: d2rpick card --tr T --td T --part IDS --history FILE"
-        in said
+        in message
     )
 
 
@@ -399,11 +408,13 @@ def test_a_rule_is_explained_with_its_examples(name: str) -> None:
 
 def test_an_example_that_is_judged_by_a_history_says_how_to_run_it() -> None:
     text = run("rule", "D2R204").stdout
-    made = text.split("history of\n")[1].split("\nchecked")[0].replace("\\\n", "")
+    example_command = (
+        text.split("history of\n")[1].split("\nchecked")[0].replace("\\\n", "")
+    )
     assert (
         "checked by d2rpick check main.k --history energy.csv --after 0.03:\n" in text
     )
-    assert run(*shlex.split(made)[1:]).exit_code == 0
+    assert run(*shlex.split(example_command)[1:]).exit_code == 0
     assert Path("energy.csv").is_file()
 
 
@@ -412,5 +423,5 @@ def test_the_beginning_of_an_id_gives_all_of_them_and_near_misses_are_named() ->
         r"^(D2R\d+) \(", run("rule", "D2R3").stdout, flags=re.MULTILINE
     ) == [f"D2R30{number}" for number in range(1, 8)]
     assert re.fullmatch(
-        r"no rule 'D2R1O5', .* did you mean D2R1\d5\?", refused("rule", "D2R1O5")
+        r"no rule 'D2R1O5', .* did you mean D2R1\d5\?", read_refusal("rule", "D2R1O5")
     )

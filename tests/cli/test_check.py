@@ -1,4 +1,4 @@
-"""The command ``check`` as a CI job sees it: exit codes, formats, configuration, several decks, histories."""
+"""The command ``check`` in a CI job: exit codes, formats, configuration, several decks, histories."""
 
 import json
 import os
@@ -15,8 +15,13 @@ import pytest
 import d2rpick as d2
 from d2rpick.rules import RULES
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, write_automatic_card
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, refused, run
-from tests.json_schemas import check_by_schema, checked, junit_is_valid, sarif_is_valid
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, read_refusal, run, run_json
+from tests.json_schemas import (
+    check_by_schema,
+    check_junit,
+    check_sarif,
+    run_json_checked,
+)
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
 LATE = HEAD + PARTS + THERE + write_automatic_card(2, "0.5", deformable=["1"]) + END
@@ -33,9 +38,9 @@ def place(name: str, deck: str) -> str:
     return name
 
 
-def deck_of(tr: float, td: float, part: int = 1) -> str:
-    """A deck with one window; the times are printed with all their digits."""
-    there = (
+def write_deck(tr: float, td: float, part: int = 1) -> str:
+    """Return a deck with one window; the times are printed with all digits."""
+    rigid_card = (
         "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n"
         f"{2 * part - 1:20d}{0:20d}{tr!r:>20}\n"
     )
@@ -43,21 +48,21 @@ def deck_of(tr: float, td: float, part: int = 1) -> str:
     counts = [
         f"{'':80}{d2r:20d}{r2d:20d}\n{part:20d}\n" for d2r, r2d in ((1, 0), (0, 1))
     ]
-    return there + counts[0] + back + counts[1]
+    return rigid_card + counts[0] + back + counts[1]
 
 
-def rules(found: dict[str, Any]) -> list[str]:
-    return [finding["rule"] for finding in found["findings"]]
+def list_rules(check_report: dict[str, Any]) -> list[str]:
+    return [finding["rule"] for finding in check_report["findings"]]
 
 
-def valid(form: str, text: str) -> None:
-    """Hold an output against the schema of its format."""
+def check_output(form: str, text: str) -> None:
+    """Validate an output by the schema of its format."""
     if form == "json":
         check_by_schema(json.loads(text))
     elif form == "sarif":
-        sarif_is_valid(text)
+        check_sarif(text)
     elif form == "junit":
-        junit_is_valid(text)
+        check_junit(text)
 
 
 # The job it is for.
@@ -76,15 +81,22 @@ def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
 
 
 def test_json_says_where_and_by_what() -> None:
-    found = checked("check", DECK, "--history", ENERGY)
-    assert rules(found) == ["D2R202", "D2R203"]
-    assert found["history"] == [ENERGY]
-    assert found["summary"] == {"errors": 1, "warnings": 1, "infos": 0, "decks": 1}
-    assert [(w["part"], w["tr"], w["td"], w["line"]) for w in found["windows"]] == [
+    check_report = run_json_checked("check", DECK, "--history", ENERGY)
+    assert list_rules(check_report) == ["D2R202", "D2R203"]
+    assert check_report["history"] == [ENERGY]
+    assert check_report["summary"] == {
+        "errors": 1,
+        "warnings": 1,
+        "infos": 0,
+        "decks": 1,
+    }
+    assert [
+        (w["part"], w["tr"], w["td"], w["line"]) for w in check_report["windows"]
+    ] == [
         (11, 0.0135867, 0.0687534, 25),
         (12, 0.012265914, 0.064, 41),
     ]
-    assert answer("check", DECK)["history"] is None
+    assert run_json("check", DECK)["history"] is None
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -109,15 +121,17 @@ def test_the_exit_code_is_the_same_in_every_format(
 ) -> None:
     result = run("check", place("main.k", deck), "-f", form, *options)
     assert (result.exit_code, result.stderr) == (code, "")
-    valid(form, result.stdout)
+    check_output(form, result.stdout)
 
 
 def test_paths_are_relative_to_the_working_folder(tmp_path: Path) -> None:
     place("runs/a/main.k", LATE)
     for name in ("runs/a/main.k", str(tmp_path / "runs/a/main.k")):
-        found = answer("check", name)
-        assert found["decks"] == ["runs/a/main.k"]
-        assert {finding["file"] for finding in found["findings"]} == {"runs/a/main.k"}
+        check_report = run_json("check", name)
+        assert check_report["decks"] == ["runs/a/main.k"]
+        assert {finding["file"] for finding in check_report["findings"]} == {
+            "runs/a/main.k"
+        }
         assert (
             "::error file=runs/a/main.k,line="
             in run("check", "-f", "github", name).stdout
@@ -134,12 +148,14 @@ def test_a_deck_without_switching_cards_says_so() -> None:
 
 def test_findings_of_one_deck_do_not_hide_those_of_another() -> None:
     decks = [place("a.k", LATE), place("b.k", GOOD), place("c.k", LATE)]
-    found = answer("check", *decks)
-    assert [(finding["deck"], finding["rule"]) for finding in found["findings"]] == [
+    check_report = run_json("check", *decks)
+    assert [
+        (finding["deck"], finding["rule"]) for finding in check_report["findings"]
+    ] == [
         ("a.k", "D2R101"),
         ("c.k", "D2R101"),
     ]
-    assert found["summary"]["decks"] == 3
+    assert check_report["summary"]["decks"] == 3
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -153,7 +169,7 @@ def test_a_deck_that_cannot_be_read_does_not_hide_the_others(form: str) -> None:
     )
     assert "D2R111" in result.stdout
     assert "absent.k" in result.stdout or form == "table"
-    valid(form, result.stdout)
+    check_output(form, result.stdout)
     assert run("check", "absent.k", "a.k", "-f", form, "--exit-zero").exit_code == 0
 
 
@@ -164,7 +180,9 @@ def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
     ).iter("error")
     assert "absent.k" in error.attrib["message"]
     (sarif,) = json.loads(run("check", "absent.k", "a.k", "-f", "sarif").stdout)["runs"]
-    assert [one["executionSuccessful"] for one in sarif["invocations"]] == [False]
+    assert [
+        invocation["executionSuccessful"] for invocation in sarif["invocations"]
+    ] == [False]
     assert run("check", "absent.k", "a.k").stdout.endswith(
         "in 1 deck, 1 not checked; times not judged: no --history\n"
     )
@@ -176,7 +194,7 @@ def test_no_readable_deck_is_no_answer(form: str) -> None:
     result = run("check", "absent.k", "run.rad", "-f", form, "--exit-zero")
     assert result.exit_code == 2
     assert ("absent.k" in result.stdout) == (form != "table")
-    valid(form, result.stdout)
+    check_output(form, result.stdout)
     assert [line.split(": ")[1] for line in result.stderr.splitlines()] == [
         "absent.k",
         "run.rad",
@@ -189,14 +207,14 @@ def test_standard_input_is_a_deck(form: str) -> None:
     result = run("check", "-", "-f", form, stdin=card.stdout_bytes)
     assert (result.exit_code, result.stderr) == (0, "")
     assert form == "junit" or "D2R306" in result.stdout
-    valid(form, result.stdout)
+    check_output(form, result.stdout)
     assert run("check", "-", stdin=LATE.encode()).exit_code == 1
     assert run("check", "-", stdin=b"").exit_code == 2
 
 
 def test_includes_of_standard_input_are_looked_for_here() -> None:
     place("inner.k", THERE)
-    found = json.loads(
+    document = json.loads(
         run(
             "check",
             "-",
@@ -205,7 +223,7 @@ def test_includes_of_standard_input_are_looked_for_here() -> None:
             stdin=f"{HEAD}{PARTS}*INCLUDE\ninner.k\n".encode(),
         ).stdout
     )
-    assert [window["file"] for window in found["windows"]] == ["inner.k"]
+    assert [window["file"] for window in document["windows"]] == ["inner.k"]
 
 
 def test_a_folder_stands_for_its_main_decks() -> None:
@@ -214,21 +232,21 @@ def test_a_folder_stands_for_its_main_decks() -> None:
     place("runs/b/other.key", "$ a title\n" + LATE)
     place("runs/notes.txt", "nothing")
     place("runs/.git/main.k", LATE)
-    assert answer("check", "runs")["decks"] == ["runs/a/main.k", "runs/b/other.key"]
-    assert answer("check", "runs", "runs/a/main.k")["summary"]["decks"] == 2
+    assert run_json("check", "runs")["decks"] == ["runs/a/main.k", "runs/b/other.key"]
+    assert run_json("check", "runs", "runs/a/main.k")["summary"]["decks"] == 2
     Path("empty").mkdir()
-    assert "no main deck in this folder" in refused("check", "empty")
+    assert "no main deck in this folder" in read_refusal("check", "empty")
     assert run("check", "empty", "runs/b/other.key").exit_code == 1
 
 
 def test_ndjson_is_a_line_for_each_deck() -> None:
     decks = [place("a.k", LATE), place("b.k", GOOD)]
     lines = run("check", *decks, "-f", "ndjson").stdout.splitlines()
-    found = [json.loads(line) for line in lines]
-    assert [one["decks"] for one in found] == [["a.k"], ["b.k"]]
-    assert [one["summary"]["errors"] for one in found] == [1, 0]
+    documents = [json.loads(line) for line in lines]
+    assert [document["decks"] for document in documents] == [["a.k"], ["b.k"]]
+    assert [document["summary"]["errors"] for document in documents] == [1, 0]
     for line in lines:
-        valid("json", line)
+        check_output("json", line)
 
 
 RUN_EXAMPLE = RULES["D2R401"].passing[0]
@@ -243,29 +261,31 @@ def place_run(folder: str = ".") -> list[str]:
 @pytest.mark.parametrize("chosen", [slice(None), slice(0, 1), slice(2, 3)])
 def test_the_files_of_a_radioss_run_are_one_deck(chosen: slice) -> None:
     files = place_run()
-    found = answer("check", *files[chosen])
-    assert len(found["decks"]) == 1
-    assert found["findings"] == []
-    assert [(w["part"], w["tr"], w["td"]) for w in found["windows"]] == [
+    check_report = run_json("check", *files[chosen])
+    assert len(check_report["decks"]) == 1
+    assert check_report["findings"] == []
+    assert [(w["part"], w["tr"], w["td"]) for w in check_report["windows"]] == [
         (1, 0.02, 0.09)
     ]
-    check_by_schema(found)
+    check_by_schema(check_report)
 
 
 def test_a_radioss_run_is_judged_by_a_history_and_found_in_a_folder() -> None:
     place_run("runs")
-    found = answer("check", "runs", "--history", ENERGY)
-    assert found["decks"] == ["runs/box_0000.rad"]
-    assert set(rules(found)) <= {"D2R201", "D2R202", "D2R203"}
-    assert {"D2R201", "D2R202"} & set(rules(found))
+    check_report = run_json("check", "runs", "--history", ENERGY)
+    assert check_report["decks"] == ["runs/box_0000.rad"]
+    assert set(list_rules(check_report)) <= {"D2R201", "D2R202", "D2R203"}
+    assert {"D2R201", "D2R202"} & set(list_rules(check_report))
 
 
 def test_printed_engine_files_pass() -> None:
     pairs = ("--tr", "0.02", "--td", "0.09", "--tr", "0.2", "--td", "0.3")
     card = run("card", "--solver", "radioss", *pairs, "--node", "1808", "--end", "0.4")
-    found = json.loads(run("check", "-", "-f", "json", stdin=card.stdout_bytes).stdout)
-    assert found["findings"] == []
-    assert [(w["node"], w["tr"], w["td"]) for w in found["windows"]] == [
+    document = json.loads(
+        run("check", "-", "-f", "json", stdin=card.stdout_bytes).stdout
+    )
+    assert document["findings"] == []
+    assert [(w["node"], w["tr"], w["td"]) for w in document["windows"]] == [
         (1808, 0.02, 0.09),
         (1808, 0.2, 0.3),
     ]
@@ -279,24 +299,26 @@ def test_options_and_configuration_select_rules() -> None:
         "runs/main.k",
         HEAD + PARTS + THERE + write_automatic_card(1, "0.5", rigid=["1"]) + END,
     )
-    every = {"D2R004", "D2R101", "D2R104"}
-    assert set(rules(answer("check", deck))) == every
-    assert set(rules(answer("check", deck, "--select", "D2R0,D2R101"))) == {
+    all_rules = {"D2R004", "D2R101", "D2R104"}
+    assert set(list_rules(run_json("check", deck))) == all_rules
+    assert set(list_rules(run_json("check", deck, "--select", "D2R0,D2R101"))) == {
         "D2R004",
         "D2R101",
     }
     assert set(
-        rules(answer("check", deck, "--select", "D2R1", "--ignore", "d2r104"))
+        list_rules(run_json("check", deck, "--select", "D2R1", "--ignore", "d2r104"))
     ) == {"D2R101"}
     Path("pyproject.toml").write_text('[tool.d2rpick]\nignore = ["D2R004"]\n')
-    assert set(rules(answer("check", deck))) == every - {"D2R004"}
-    assert set(rules(answer("check", deck, "--ignore", "D2R104"))) == every - {"D2R104"}
+    assert set(list_rules(run_json("check", deck))) == all_rules - {"D2R004"}
+    assert set(
+        list_rules(run_json("check", deck, "--ignore", "D2R104"))
+    ) == all_rules - {"D2R104"}
     Path("runs/d2rpick.toml").write_text(
         'severity = {D2R104 = "error"}\nselect = ["D2R104"]\n'
     )
-    found = answer("check", deck)
+    check_report = run_json("check", deck)
     assert [
-        (finding["rule"], finding["severity"]) for finding in found["findings"]
+        (finding["rule"], finding["severity"]) for finding in check_report["findings"]
     ] == [("D2R104", "error")]
     assert run("check", deck).exit_code == 1
 
@@ -304,7 +326,7 @@ def test_options_and_configuration_select_rules() -> None:
 def test_each_deck_goes_by_the_configuration_nearest_to_it() -> None:
     decks = [place("a/main.k", LATE), place("b/main.k", LATE)]
     Path("a/d2rpick.toml").write_text('ignore = ["D2R101"]\n')
-    assert [finding["deck"] for finding in answer("check", *decks)["findings"]] == [
+    assert [finding["deck"] for finding in run_json("check", *decks)["findings"]] == [
         "b/main.k"
     ]
 
@@ -317,13 +339,15 @@ def test_a_comment_silences_a_rule_of_the_history_too() -> None:
         )
         assert card
         text = f"{head}$ d2rpick: ignore {rule}\n{card}{tail}"
-    assert rules(answer("check", place("main.k", text), "--history", ENERGY)) == []
+    assert (
+        list_rules(run_json("check", place("main.k", text), "--history", ENERGY)) == []
+    )
 
 
 def test_a_wrong_configuration_names_its_file() -> None:
     place("main.k", GOOD)
     Path("d2rpick.toml").write_text('select = ["D2R10l"]\n')
-    assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in refused(
+    assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in read_refusal(
         "check", "main.k", "--select", "D2R1"
     )
 
@@ -333,18 +357,18 @@ def test_a_broken_configuration_does_not_hide_other_decks() -> None:
     Path("a/d2rpick.toml").write_text("select = [\n")
     result = run("check", *decks, "-f", "json")
     assert result.exit_code == 1
-    assert rules(json.loads(result.stdout)) == ["D2R101"]
+    assert list_rules(json.loads(result.stdout)) == ["D2R101"]
     assert "a/d2rpick.toml" in result.stderr
 
 
-def failing_on(text: str, error: Exception) -> Callable[[str], dict[str, Any]]:
-    """A reader of TOML that nobody foresaw."""
-    read = tomllib.loads
+def make_failing_reader(text: str, error: Exception) -> Callable[[str], dict[str, Any]]:
+    """Return a TOML reader that raises an unforeseen error."""
+    read_settings = tomllib.loads
 
     def loads(content: str) -> dict[str, Any]:
         if text in content:
             raise error
-        return read(content)
+        return read_settings(content)
 
     return loads
 
@@ -364,25 +388,27 @@ def test_an_unforeseen_error_is_the_line_of_its_deck(
 ) -> None:
     decks = [place("a/main.k", LATE), place("b/main.k", GOOD), place("c/main.k", LATE)]
     Path("b/d2rpick.toml").write_text("# bad")
-    monkeypatch.setattr(tomllib, "loads", failing_on("# bad", error))
+    monkeypatch.setattr(tomllib, "loads", make_failing_reader("# bad", error))
     result = run("check", *decks, "-f", form, "--exit-zero")
     assert result.exit_code == 2
-    told = f"b/main.k: internal error, please report it ({type(error).__name__}: odd)"
-    assert result.stderr == f"d2rpick: {told}; --debug shows where\n"
+    message = (
+        f"b/main.k: internal error, please report it ({type(error).__name__}: odd)"
+    )
+    assert result.stderr == f"d2rpick: {message}; --debug shows where\n"
     assert result.stdout.count("is after") == 2 or result.stdout.count("D2R101") >= 2
-    assert told in result.stdout or form == "table"
-    valid(form, result.stdout)
+    assert message in result.stdout or form == "table"
+    check_output(form, result.stdout)
     if form == "json":
-        assert [one["code"] for one in json.loads(result.stdout)["warnings"]] == [
-            "internal-error"
-        ]
+        assert [
+            warning["code"] for warning in json.loads(result.stdout)["warnings"]
+        ] == ["internal-error"]
     assert "Traceback" in run("check", *decks, "--debug").stderr
 
 
 def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:
     place("main.k", LATE)
     Path("link.k").symlink_to("main.k")
-    assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")[
+    assert run_json("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")[
         "decks"
     ] == ["main.k"]
 
@@ -392,9 +418,15 @@ def test_python_takes_decks_as_the_command_line_does() -> None:
         place("runs/a.k", LATE),
         place("runs/b.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END),
     ]
-    found = d2.check(["runs", f"./{decks[0]}"])
-    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
-    assert (found.decks, found.passed, [one.code for one in found.warnings]) == (
+    check_report = d2.check(["runs", f"./{decks[0]}"])
+    assert check_report.to_dict() == run_json(*check_report.command) | {
+        "command": list(check_report.command)
+    }
+    assert (
+        check_report.decks,
+        check_report.passed,
+        [warning.code for warning in check_report.warnings],
+    ) == (
         (*decks,),
         False,
         ["unknown-rule"],
@@ -416,22 +448,22 @@ def test_the_result_never_replaces_what_a_deck_leads_to(name: str) -> None:
     place("main.k", HEAD + PARTS + "*INCLUDE\ninner.k\n" + END)
     place("inner.k", THERE)
     place("d2rpick.toml", 'ignore = ["D2R104"]\n')
-    before = Path(name).read_bytes()
-    assert "is an input" in refused(
+    content_before = Path(name).read_bytes()
+    assert "is an input" in read_refusal(
         "check", "main.k", "-o", name, "--overwrite", "--select", "D2R1"
     )
-    assert Path(name).read_bytes() == before
+    assert Path(name).read_bytes() == content_before
 
 
 def test_the_result_never_replaces_an_input() -> None:
     place("main.k", GOOD)
     Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
     for name in ("main.k", "energy.csv"):
-        assert "is an input" in refused(
+        assert "is an input" in read_refusal(
             "check", "main.k", "--history", "energy.csv", "-o", name, "--overwrite"
         )
     assert run("check", "main.k", "-o", "report.xml", "-f", "junit").stdout == ""
-    junit_is_valid(Path("report.xml").read_text())
+    check_junit(Path("report.xml").read_text())
 
 
 # Judged by a history.
@@ -441,39 +473,41 @@ TIMES = np.linspace(0.001, 0.149, 12).tolist()
 
 
 @pytest.mark.parametrize(
-    ("td", "asked"),
+    ("td", "arguments"),
     [
         (0.0687534, {}),
         (0.064, {"after": 0.02}),
         (0.1, {"margin": 0.005, "tolerance": 0.5}),
     ],
 )
-def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -> None:
+def test_the_check_objects_where_verify_does(
+    td: float, arguments: dict[str, Any]
+) -> None:
     times = [time for time in [*TIMES, 0.0135867, 0.0128853, 0.0247264] if time < td]
-    windows = [deck_of(tr, td, part) for part, tr in enumerate(times, start=1)]
+    windows = [write_deck(tr, td, part) for part, tr in enumerate(times, start=1)]
     run, deck = d2.read(ENERGY), place("main.k", "".join(windows))
-    findings = d2.check(deck, history=run, **asked).to_dict()["findings"]
+    findings = d2.check(deck, history=run, **arguments).to_dict()["findings"]
     for part, tr in enumerate(times, start=1):
-        told = {
-            one["rule"]: one["severity"]
-            for one in findings
-            if one["message"].startswith(f"part {part}: ")
+        severities_by_rule = {
+            finding["rule"]: finding["severity"]
+            for finding in findings
+            if finding["message"].startswith(f"part {part}: ")
         }
-        judged = d2.verify(run, tr, td, **asked).to_dict()
-        assert ("error" in told.values()) != judged["verified"], (
+        judged = d2.verify(run, tr, td, **arguments).to_dict()
+        assert ("error" in severities_by_rule.values()) != judged["verified"], (
             tr,
             td,
             judged["reasons"],
-            told,
+            severities_by_rule,
         )
         assert (judged["kinetic_share"] > 0.5) == (
-            {"D2R203", "D2R209"} & {*told} != set()
+            {"D2R203", "D2R209"} & {*severities_by_rule} != set()
         )
-        assert ("D2R209" in told) <= (judged["verdict"] == "do not use")
-        assert ("D2R202" in told) == any(
+        assert ("D2R209" in severities_by_rule) <= (judged["verdict"] == "do not use")
+        assert ("D2R202" in severities_by_rule) == any(
             "opposite sign" in reason for reason in judged["reasons"]
         )
-        assert ("D2R204" in told) == any(
+        assert ("D2R204" in severities_by_rule) == any(
             "end of the load" in reason for reason in judged["reasons"]
         )
 
@@ -484,19 +518,21 @@ def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(
     tr: float,
 ) -> None:
     parts = {
-        str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]
+        str(part["id"]): part["energy_max"] for part in run_json("info", BOX)["parts"]
     }
-    both = write_automatic_card(1, str(tr), rigid=[*parts]) + write_automatic_card(
-        2, "0.37", deformable=[*parts]
-    )
-    found = answer("check", place("main.k", both), "--history", BOX)["findings"]
+    both_cards = write_automatic_card(
+        1, str(tr), rigid=[*parts]
+    ) + write_automatic_card(2, "0.37", deformable=[*parts])
+    check_report = run_json("check", place("main.k", both_cards), "--history", BOX)[
+        "findings"
+    ]
     objections = [
-        finding["message"] for finding in found if finding["severity"] == "error"
+        finding["message"] for finding in check_report if finding["severity"] == "error"
     ]
     chosen = [text for part in parts for text in ("--part", part)]
     assert (
         bool(objections)
-        != answer("verify", "--tr", str(tr), "--td", "0.37", *chosen, BOX)["verified"]
+        != run_json("verify", "--tr", str(tr), "--td", "0.37", *chosen, BOX)["verified"]
     )
     assert {message.partition(":")[0] for message in objections} <= {"parts 1-3"}
     assert 0.0 in parts.values()
@@ -509,47 +545,58 @@ def test_parts_with_windows_of_their_own_are_judged_apart() -> None:
     cards += write_automatic_card(3, "0.15", rigid=["2"]) + write_automatic_card(
         4, "0.36", deformable=["2"]
     )
-    found = answer("check", place("main.k", cards), "--history", BOX)["findings"]
+    check_report = run_json("check", place("main.k", cards), "--history", BOX)[
+        "findings"
+    ]
     for part, tr, td in (("1", "0.05", "0.37"), ("2", "0.15", "0.36")):
         blamed = [
             f
-            for f in found
+            for f in check_report
             if f["severity"] == "error" and f["message"].startswith(f"part {part}:")
         ]
         assert (
             bool(blamed)
-            != answer("verify", "--tr", tr, "--td", td, "--part", part, BOX)["verified"]
+            != run_json("verify", "--tr", tr, "--td", td, "--part", part, BOX)[
+                "verified"
+            ]
         )
 
 
 def test_what_verify_warns_of_is_told_for_each_part() -> None:
     box = next(
-        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+        part["id"] for part in run_json("info", BOX)["parts"] if part["title"] == "box"
     )
     cut = place("cut.matsum", Path(MATSUM).read_text()[:-40])
-    found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", cut)
-    (told,) = (
-        w["message"] for w in found["warnings"] if w["code"] == "truncated-input"
+    check_report = run_json(
+        "check", place("main.k", write_deck(0.15, 0.37, box)), "--history", cut
     )
-    assert told.startswith(f"part {box}: the input ends within a state")
+    (message,) = (
+        w["message"] for w in check_report["warnings"] if w["code"] == "truncated-input"
+    )
+    assert message.startswith(f"part {box}: the input ends within a state")
 
 
 def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:
-    found = answer("check", place("main.k", deck_of(0.1, 0.37, 77)), "--history", BOX)
-    assert rules(found) == ["D2R205"]
+    check_report = run_json(
+        "check", place("main.k", write_deck(0.1, 0.37, 77)), "--history", BOX
+    )
+    assert list_rules(check_report) == ["D2R205"]
     assert (
-        "part 77: not in the history, which has part" in found["findings"][0]["message"]
+        "part 77: not in the history, which has part"
+        in check_report["findings"][0]["message"]
     )
 
 
 def test_parts_of_one_card_with_the_same_fault_are_one_finding() -> None:
-    both = write_automatic_card(1, ".0122659", rigid=["1", "2"]) + write_automatic_card(
-        2, "0.064", deformable=["1", "2"]
+    both_cards = write_automatic_card(
+        1, ".0122659", rigid=["1", "2"]
+    ) + write_automatic_card(2, "0.064", deformable=["1", "2"])
+    check_report = run_json(
+        "check", place("main.k", HEAD + PARTS + both_cards + END), "--history", ENERGY
     )
-    found = answer(
-        "check", place("main.k", HEAD + PARTS + both + END), "--history", ENERGY
-    )
-    assert [(f["rule"], f["message"].split(":")[0]) for f in found["findings"]] == [
+    assert [
+        (f["rule"], f["message"].split(":")[0]) for f in check_report["findings"]
+    ] == [
         ("D2R202", "parts 1, 2"),
         ("D2R203", "parts 1, 2"),
     ]
@@ -560,62 +607,72 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     time = np.linspace(0, 1, 60)
     rising = "\n".join(f"{t:.6f},{1 + t**2:.6f}" for t in time)
     Path("rising.csv").write_text(f"time,internal_energy\n{rising}\n")
-    place("main.k", deck_of(0.5, 0.55))
-    found = answer("check", "main.k", "--history", "rising.csv")
-    (message,) = (f["message"] for f in found["findings"] if f["rule"] == "D2R204")
+    place("main.k", write_deck(0.5, 0.55))
+    check_report = run_json("check", "main.k", "--history", "rising.csv")
+    (message,) = (
+        f["message"] for f in check_report["findings"] if f["rule"] == "D2R204"
+    )
     assert (
         "nothing in the history shows when the load is over; give that time as `after`"
         in message
     )
-    assert "D2R204" not in rules(
-        answer("check", "main.k", "--history", "rising.csv", "--after", "0.2")
+    assert "D2R204" not in list_rules(
+        run_json("check", "main.k", "--history", "rising.csv", "--after", "0.2")
     )
 
 
 def test_a_history_without_energy_is_an_objection() -> None:
     rows = "\n".join(f"{t:.3f},0" for t in np.linspace(0, 1, 400))
     Path("flat.csv").write_text(f"time,internal_energy\n{rows}\n")
-    found = answer(
+    check_report = run_json(
         "check",
-        place("main.k", deck_of(0.5, 0.55)),
+        place("main.k", write_deck(0.5, 0.55)),
         "--history",
         "flat.csv",
         "--after",
         "0.1",
     )
-    assert [f["message"] for f in found["findings"] if f["rule"] == "D2R201"]
+    assert [f["message"] for f in check_report["findings"] if f["rule"] == "D2R201"]
 
 
 def test_td_after_the_next_contact_is_named_at_td() -> None:
     box = next(
-        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+        part["id"] for part in run_json("info", BOX)["parts"] if part["title"] == "box"
     )
-    deck = place("main.k", deck_of(0.2, 0.37, box))
+    deck = place("main.k", write_deck(0.2, 0.37, box))
     for margin, expected in (("0.005", []), ("0.03", [("D2R204", 7)])):
-        found = answer("check", deck, "--history", BOX, "--margin", margin)["findings"]
+        check_report = run_json("check", deck, "--history", BOX, "--margin", margin)[
+            "findings"
+        ]
         assert [
             (f["rule"], f["line"])
-            for f in found
+            for f in check_report
             if "after the end of the flight" in f["message"]
         ] == expected
 
 
 def test_a_part_set_that_cannot_be_resolved_is_judged_by_the_whole_model() -> None:
-    there = write_automatic_card(1, "0.2", rigid=["         5         0      PSET"])
+    rigid_card = write_automatic_card(
+        1, "0.2", rigid=["         5         0      PSET"]
+    )
     back = write_automatic_card(2, "0.37", deformable=["         5      PSET"])
-    found = answer("check", place("main.k", there + back), "--history", BOX)
-    assert "judged-by-whole" in {warning["code"] for warning in found["warnings"]}
+    check_report = run_json(
+        "check", place("main.k", rigid_card + back), "--history", BOX
+    )
+    assert "judged-by-whole" in {
+        warning["code"] for warning in check_report["warnings"]
+    }
 
 
 def test_windows_that_are_none_are_left_to_other_rules() -> None:
     swapped = write_automatic_card(1, "0.09", rigid=["1"]) + write_automatic_card(
         2, "0.02", deformable=["1"]
     )
-    assert rules(
-        answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)
+    assert list_rules(
+        run_json("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)
     ) == ["D2R102"]
-    assert rules(
-        answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)
+    assert list_rules(
+        run_json("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)
     ) == ["D2R104"]
 
 
@@ -630,12 +687,12 @@ def test_windows_that_are_none_are_left_to_other_rules() -> None:
 def test_tr_is_judged_whatever_becomes_of_td(
     tr: str, options: tuple[str, ...], objections: set[str]
 ) -> None:
-    there, back = (
+    rigid_card, back = (
         write_automatic_card(1, tr, rigid=["1"]),
         write_automatic_card(2, "0.01", deformable=["1"]),
     )
-    for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
-        found = answer(
+    for deck, rule_expected in ((rigid_card, "D2R104"), (rigid_card + back, "D2R102")):
+        check_report = run_json(
             "check",
             place("main.k", PARTS + deck),
             "--history",
@@ -644,7 +701,7 @@ def test_tr_is_judged_whatever_becomes_of_td(
             "D2R1,D2R2",
             *options,
         )
-        assert set(rules(found)) - {other} == objections
+        assert set(list_rules(check_report)) - {rule_expected} == objections
 
 
 def test_what_the_readers_left_out_is_noted() -> None:
@@ -662,13 +719,13 @@ def test_a_name_that_is_no_text_does_not_break_a_report() -> None:
     for form in FORMATS:
         result = run("check", name, "-f", form)
         assert result.exit_code == 1
-        valid(form, result.stdout)
+        check_output(form, result.stdout)
 
 
 def test_the_history_is_named_relative_to_the_working_folder(tmp_path: Path) -> None:
     Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
-    found = answer("check", DECK, "--history", str(tmp_path / "energy.csv"))
-    assert found["history"] == ["energy.csv"]
+    check_report = run_json("check", DECK, "--history", str(tmp_path / "energy.csv"))
+    assert check_report["history"] == ["energy.csv"]
 
 
 def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) -> None:
@@ -677,26 +734,28 @@ def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) ->
     lines = run(
         "check", str(deck), "--history", BOX, "--tolerance", "0.001"
     ).stdout.splitlines()
-    (found,) = [line for line in lines if "D2R201" in line]
-    assert "the energy of the 2 parts that are switched together is" in found
+    (finding_line,) = [line for line in lines if "D2R201" in line]
+    assert "the energy of the 2 parts that are switched together is" in finding_line
 
 
 def test_a_check_without_a_history_says_that_it_has_judged_no_times() -> None:
-    told = "; times not judged: no --history"
-    assert run("check", DECK).stdout.splitlines()[-1].endswith(told)
-    assert told not in run("check", DECK, "--history", GLSTAT).stdout
+    message = "; times not judged: no --history"
+    assert run("check", DECK).stdout.splitlines()[-1].endswith(message)
+    assert message not in run("check", DECK, "--history", GLSTAT).stdout
     place("none.k", HEAD + END)
-    assert told not in run("check", "none.k").stdout
+    assert message not in run("check", "none.k").stdout
 
 
 def test_findings_are_rows_of_csv_and_markdown_too() -> None:
-    found = answer("check", DECK, "--history", GLSTAT)["findings"]
+    check_report = run_json("check", DECK, "--history", GLSTAT)["findings"]
     csv, markdown = (
         run("check", DECK, "--history", GLSTAT, "-f", form).stdout
         for form in ("csv", "markdown")
     )
     assert [row["rule"] for row in DictReader(csv.splitlines())] == [
-        one["rule"] for one in found
+        finding_row["rule"] for finding_row in check_report
     ]
     rows = [line.split(" | ") for line in markdown.splitlines() if "D2R" in line]
-    assert [row[0].strip("| ") for row in rows] == [one["rule"] for one in found]
+    assert [row[0].strip("| ") for row in rows] == [
+        finding_row["rule"] for finding_row in check_report
+    ]

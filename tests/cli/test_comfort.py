@@ -1,4 +1,4 @@
-"""What makes the command line easy to live with: settings, versions, completion, near misses, a manual page."""
+"""Comfort of the command line: settings, versions, completion, near misses, a manual page."""
 
 import json
 import re
@@ -21,9 +21,9 @@ from tests.command import (
     ROLLOVER,
     ROOT,
     TIME_LIMIT,
-    answer,
     put,
     run,
+    run_json,
 )
 
 
@@ -32,11 +32,11 @@ def test_settings_are_shown_with_their_sources_and_nothing_is_done(
 ) -> None:
     monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.001")
     target = tmp_path / "out.json"
-    shown = run(
+    result = run(
         "suggest", "--td", "0.064", "-o", str(target), "--show-settings", ENERGY
     )
-    assert shown.exit_code == 0
-    lines = shown.stdout.splitlines()
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
     assert "td = 0.064  # command line" in lines
     assert "margin = 0.001  # environment, D2RPICK_SUGGEST_MARGIN" in lines
     assert "tolerance = 0.2  # default" in lines
@@ -52,18 +52,18 @@ def test_every_command_shows_its_settings(command: str) -> None:
         "extract": ("x", "-o", "y.csv"), "study": ("--td", "1", "x"), "drive": ("x", "-o", "y"),
         "first": ("x", "-o", "y"),
     }  # fmt: skip
-    shown = run(command, *required.get(command, ("x",)), "--show-settings")
-    assert shown.exit_code == 0, shown.stderr
-    assert re.search(r"^[\w-]+ = .+  # default$", shown.stdout, re.MULTILINE)
+    result = run(command, *required.get(command, ("x",)), "--show-settings")
+    assert result.exit_code == 0, result.stderr
+    assert re.search(r"^[\w-]+ = .+  # default$", result.stdout, re.MULTILINE)
 
 
 def test_the_version_names_the_libraries() -> None:
-    shown = run("--version").stdout.splitlines()
-    assert shown[0] == f"d2rpick, version {__version__}"
-    assert shown[1].startswith(
+    result = run("--version").stdout.splitlines()
+    assert result[0] == f"d2rpick, version {__version__}"
+    assert result[1].startswith(
         f"Python {sys.version_info.major}.{sys.version_info.minor}"
     )
-    assert [line.split()[0] for line in shown[2:]] == [
+    assert [line.split()[0] for line in result[2:]] == [
         "click",
         "numpy",
         "scipy",
@@ -74,22 +74,22 @@ def test_the_version_names_the_libraries() -> None:
 
 
 def test_verbose_says_what_was_read() -> None:
-    told = run("suggest", "--td", "0.0687534", "-v", "-f", "value", ENERGY)
-    assert re.fullmatch(r"read \S+energy\.csv in \d+\.\d\d s\n", told.stderr)
+    result = run("suggest", "--td", "0.0687534", "-v", "-f", "value", ENERGY)
+    assert re.fullmatch(r"read \S+energy\.csv in \d+\.\d\d s\n", result.stderr)
     assert (
-        told.stdout
+        result.stdout
         == run("suggest", "--td", "0.0687534", "-q", "-f", "value", ENERGY).stdout
     )
 
 
 def complete(*args: str) -> list[str]:
-    """Values that the shell offers for the last word."""
+    """Return the values that the shell offers for the last word."""
     from click.shell_completion import ShellComplete
 
-    found = ShellComplete(d2rpick, {}, "d2rpick", "_D2RPICK_COMPLETE").get_completions(
-        list(args[:-1]), args[-1]
-    )
-    return [one.value for one in found]
+    completions = ShellComplete(
+        d2rpick, {}, "d2rpick", "_D2RPICK_COMPLETE"
+    ).get_completions(list(args[:-1]), args[-1])
+    return [completion.value for completion in completions]
 
 
 def test_parts_are_completed_from_the_history_that_was_typed() -> None:
@@ -120,11 +120,11 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
     assert complete("suggest", "absent", "--energy", "") == []
     (offered,) = complete("suggest", GLSTAT, "--energy", "int")
     assert offered == "internal_energy"  # one word for the shell, and yet the channel
-    one, other = (
-        answer("suggest", "--td", "0.064", "--energy", name, GLSTAT)
+    by_short_name, by_long_name = (
+        run_json("suggest", "--td", "0.064", "--energy", name, GLSTAT)
         for name in (offered, "internal energy")
     )
-    assert one["recommended"] == other["recommended"]
+    assert by_short_name["recommended"] == by_long_name["recommended"]
 
 
 def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
@@ -134,7 +134,7 @@ def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
 
 @pytest.fixture
 def in_ms(tmp_path: Path) -> str:
-    """The record of the oscillator with its times in ms, which no header names."""
+    """Write the record of the oscillator with times in ms and no unit in the header."""
     rows = [line.split(",") for line in Path(ENERGY).read_text().splitlines()[1:]]
     lines = [
         "time,internal_energy",
@@ -144,7 +144,7 @@ def in_ms(tmp_path: Path) -> str:
 
 
 @pytest.mark.parametrize(
-    ("args", "told"),
+    ("args", "message"),
     [
         (("suggest", "--td", "0.064"), "--td 64,"),
         (("suggest", "--td", "64", "--after", "0.013"), "--after 13,"),
@@ -171,13 +171,13 @@ def in_ms(tmp_path: Path) -> str:
     ],
 )
 def test_a_time_in_s_is_not_taken_for_one_in_ms(
-    in_ms: str, args: tuple[str, ...], told: str
+    in_ms: str, args: tuple[str, ...], message: str
 ) -> None:
     result = run(*args, in_ms)
     assert result.exit_code == 2
     assert (
         "within the first ten states of the record, 0 to 150; was it meant in s? Then give "
-        + told
+        + message
         in result.stderr
     )
 
@@ -190,9 +190,9 @@ def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
     ):
         assert run(*args, in_ms).exit_code in (0, 1)
     assert run("suggest", "--td", "0.4", in_ms).exit_code in (0, 1)
-    named = Path(in_ms).read_text().replace("time,", "time [s],")
+    named_table = Path(in_ms).read_text().replace("time,", "time [s],")
     Path(in_ms).write_text(
-        named
+        named_table
     )  # there is no larger unit that a time would be given in
     assert run("suggest", "--td", "0.064", in_ms).exit_code in (0, 1)
 
@@ -208,10 +208,10 @@ def test_a_deck_in_s_is_not_judged_by_a_history_in_ms(in_ms: str) -> None:
 def test_ndjson_is_the_json_in_one_line() -> None:
     line = run("suggest", "--td", "0.064", "-q", "-f", "ndjson", ENERGY).stdout
     assert line.count("\n") == 1
-    whole = answer("suggest", "--td", "0.064", ENERGY)
-    found = json.loads(line)
-    assert found.pop("command") != whole.pop("command")
-    assert found == whole
+    whole = run_json("suggest", "--td", "0.064", ENERGY)
+    document = json.loads(line)
+    assert document.pop("command") != whole.pop("command")
+    assert document == whole
 
 
 @pytest.mark.parametrize(
@@ -229,9 +229,9 @@ def test_a_pair_may_be_asked_to_be_good(
     args: tuple[str, ...], wanted: str, code: int
 ) -> None:
     plain = run(*args, "-q", "-f", "csv", "--min-quality", "poor", ENERGY)
-    asked = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
-    assert (plain.exit_code, asked.exit_code) == (0, code)
-    assert asked.stdout == plain.stdout
+    result = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
+    assert (plain.exit_code, result.exit_code) == (0, code)
+    assert result.stdout == plain.stdout
     if args[0] == "verify" and wanted == "fair":  # by default
         assert run(*args, "-q", ENERGY).exit_code == code
     assert (
@@ -242,11 +242,11 @@ def test_a_pair_may_be_asked_to_be_good(
 
 
 def test_the_number_is_the_first_line_whatever_its_quality() -> None:
-    found = run(
+    result = run(
         "suggest", "--td", "0.064", "-q", "-f", "value", "--min-quality", "fair", ENERGY
     )
-    assert found.exit_code == 1
-    assert float(found.stdout.splitlines()[0]) == pytest.approx(0.0128853, abs=1e-7)
+    assert result.exit_code == 1
+    assert float(result.stdout.splitlines()[0]) == pytest.approx(0.0128853, abs=1e-7)
 
 
 @pytest.mark.slow
@@ -287,15 +287,15 @@ def test_the_manual_holds_every_command_and_option() -> None:
 
 @pytest.mark.skipif(not shutil.which("groff"), reason="groff is not installed")
 def test_the_manual_is_roff_without_warnings() -> None:
-    shown = subprocess.run(
+    manual_page = subprocess.run(
         ["groff", "-man", "-ww", "-Tutf8"],
         input=manual(),
         capture_output=True,
         text=True,
         check=True,
     )
-    assert not shown.stderr
-    assert "d2rpick" in shown.stdout
+    assert not manual_page.stderr
+    assert "d2rpick" in manual_page.stdout
 
 
 ASKED = ("suggest", "--td", "0.064", ENERGY)
@@ -303,15 +303,15 @@ ASKED = ("suggest", "--td", "0.064", ENERGY)
 
 @pytest.fixture
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file that counts in the working folder, which lies below that of the file."""
+    """Change to a folder, and return the path of the settings file in its parent folder, which applies there."""
     inner = tmp_path / "inner"
     inner.mkdir()
     monkeypatch.chdir(inner)
     return tmp_path / "pyproject.toml"
 
 
-def shown(*args: str) -> dict[str, str]:
-    """The settings that are not the default, with their values and sources."""
+def read_settings_in_use(*args: str) -> dict[str, str]:
+    """Return the settings that differ from the defaults, with their values and sources."""
     lines = run(*args, "--show-settings").stdout.splitlines()
     return dict(
         line.split(" = ", 1) for line in lines if not line.endswith("# default")
@@ -324,15 +324,15 @@ def test_the_command_line_counts_before_the_environment_and_that_before_the_sett
     settings.write_text(
         "[tool.d2rpick]\nmargin = 0.001\nmax-residual = 0.3\n[tool.d2rpick.suggest]\nmargin = 0.002\n"
     )
-    assert shown(*ASKED)["margin"] == f"0.002  # settings, {settings}"
+    assert read_settings_in_use(*ASKED)["margin"] == f"0.002  # settings, {settings}"
     assert (
-        shown("verify", "--tr", "0.01", *ASKED[1:])["margin"]
+        read_settings_in_use("verify", "--tr", "0.01", *ASKED[1:])["margin"]
         == f"0.001  # settings, {settings}"
     )
     monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.003")
-    found = shown(*ASKED, "--max-residual", "0.4")
-    assert found["margin"] == "0.003  # environment, D2RPICK_SUGGEST_MARGIN"
-    assert found["max-residual"] == "0.4  # command line"
+    shown_settings = read_settings_in_use(*ASKED, "--max-residual", "0.4")
+    assert shown_settings["margin"] == "0.003  # environment, D2RPICK_SUGGEST_MARGIN"
+    assert shown_settings["max-residual"] == "0.4  # command line"
 
 
 def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_without_them(
@@ -341,15 +341,15 @@ def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_with
     settings.write_text(
         "[tool.d2rpick]\nmargin = 0.001\nenergy = 'internal_energy'\nno-verify = true\n"
     )
-    told = run(*ASKED)
+    result = run(*ASKED)
     words = "--energy internal_energy --margin 0.001 --no-verify"
-    assert told.stderr.startswith(f"note: {words} by {settings}\n")
+    assert result.stderr.startswith(f"note: {words} by {settings}\n")
     assert not run(*ASKED, "-q").stderr
-    found = json.loads(run(*ASKED, "-q", "-f", "json").stdout)
-    assert found["command"][-5:] == words.split()
+    document = json.loads(run(*ASKED, "-q", "-f", "json").stdout)
+    assert document["command"][-5:] == words.split()
     settings.unlink()
-    again = json.loads(run(*found["command"]).stdout)
-    assert again["candidates"] == found["candidates"]
+    again = json.loads(run(*document["command"]).stdout)
+    assert again["candidates"] == document["candidates"]
 
 
 def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_to(
@@ -358,18 +358,22 @@ def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_t
     settings.write_text(
         "[tool.d2rpick]\nno-verify = true\nweights = 'site.json'\nstep-ratio = 4\nnode = 7\nafter = 0.01\n"
     )
-    assert {"fit-window", "after"} == {*shown(*ASKED, "--fit-window", "0", "0.1")} - {
+    assert {"fit-window", "after"} == {
+        *read_settings_in_use(*ASKED, "--fit-window", "0", "0.1")
+    } - {
         "td",
         "history",
     }
     assert {"no-verify", "after", "weights", "step-ratio", "deck"} == {
-        *shown(*ASKED, "--deck", DECK),
+        *read_settings_in_use(*ASKED, "--deck", DECK),
     } - {"td", "history"}
     assert (
-        "../site.json" in shown(*ASKED, "--deck", DECK)["weights"]
+        "../site.json" in read_settings_in_use(*ASKED, "--deck", DECK)["weights"]
     )  # files lie where the settings do
     assert run("check", DECK).exit_code == 0  # without a history nothing is judged
-    assert "node" in shown("card", "--solver", "radioss", "--tr", "1", "--td", "2")
+    assert "node" in read_settings_in_use(
+        "card", "--solver", "radioss", "--tr", "1", "--td", "2"
+    )
 
 
 def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(
@@ -378,11 +382,13 @@ def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(
     settings.write_text(
         "[tool.d2rpick]\nstiffness = 1\nmass = 1\nbeta = 2\nalpha = 0\nv0 = 1\n"
     )
-    given = {*shown(*ASKED)} - {"td", "history"}
-    assert given == {"stiffness", "mass", "beta", "alpha", "v0"}
+    settings_in_use = {*read_settings_in_use(*ASKED)} - {"td", "history"}
+    assert settings_in_use == {"stiffness", "mass", "beta", "alpha", "v0"}
     for option in (("--no-verify",), ("--fit-window", "0", "0.1")):
-        assert not given & {*shown(*ASKED, *option)}
-    assert given - {*shown(*ASKED, "--frame-mass", "2")} == {"beta"}
+        assert not settings_in_use & {*read_settings_in_use(*ASKED, *option)}
+    assert settings_in_use - {*read_settings_in_use(*ASKED, "--frame-mass", "2")} == {
+        "beta"
+    }
 
 
 def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(
@@ -427,4 +433,4 @@ def test_python_asks_without_settings(settings: Path) -> None:
     import d2rpick
 
     assert d2rpick.suggest(d2rpick.read(ENERGY), td=0.064).basis == "oscillator"
-    assert answer(*ASKED)["basis"] == "energy"
+    assert run_json(*ASKED)["basis"] == "energy"

@@ -1,4 +1,4 @@
-"""What the commands and their options do, seen from outside."""
+"""The effects of the commands and their options for a user."""
 
 import os
 import shlex
@@ -24,9 +24,9 @@ from tests.command import (
     ROLLOVER,
     ROOT,
     TIME_LIMIT,
-    answer,
+    join_wrapped_lines,
     run,
-    unwrapped,
+    run_json,
 )
 from tests.reading import read_history
 
@@ -38,17 +38,17 @@ BY_VIBRATION = dict.fromkeys(("D2RPICK_SUGGEST_NO_VERIFY", "D2RPICK_VERIFY_NO_VE
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
 
-def program(*args: str, **options: Any) -> CompletedProcess[str]:
-    """Run ``python -m d2rpick`` as a process of its own."""
+def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
+    """Run ``python -m d2rpick`` as a separate process."""
     command = [sys.executable, "-m", "d2rpick", *args]
-    given = {
+    popen_options = {
         "capture_output": True,
         "text": True,
         "cwd": ROOT,
         "timeout": TIME_LIMIT,
         **options,
     }
-    return subprocess.run(command, check=False, **given)
+    return subprocess.run(command, check=False, **popen_options)
 
 
 # What the tool is for.
@@ -58,17 +58,17 @@ def program(*args: str, **options: Any) -> CompletedProcess[str]:
 def test_the_published_record_gets_the_published_answer(
     source: str, digits: float
 ) -> None:
-    found = answer(*SUGGEST, source)
-    assert found["basis"] == "oscillator"
-    assert found["recommended"] == {
+    document = run_json(*SUGGEST, source)
+    assert document["basis"] == "oscillator"
+    assert document["recommended"] == {
         "tr": pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=digits),
         "td": 0.064,
     }
-    assert found["kinetic_share"] == pytest.approx(paper.KINETIC_SHARE, rel=digits)
-    assert found["better_td"]["td"] == pytest.approx(paper.BETTER_TD, rel=digits)
-    assert found["better_td"]["tr"] == pytest.approx(paper.BETTER_TR, rel=digits)
-    assert found["better_td"]["residual"] == pytest.approx(0, abs=10 * digits)
-    assert [(w["code"], "92%" in w["message"]) for w in found["warnings"]] == [
+    assert document["kinetic_share"] == pytest.approx(paper.KINETIC_SHARE, rel=digits)
+    assert document["better_td"]["td"] == pytest.approx(paper.BETTER_TD, rel=digits)
+    assert document["better_td"]["tr"] == pytest.approx(paper.BETTER_TR, rel=digits)
+    assert document["better_td"]["residual"] == pytest.approx(0, abs=10 * digits)
+    assert [(w["code"], "92%" in w["message"]) for w in document["warnings"]] == [
         ("poor-td", True)
     ]
 
@@ -77,7 +77,7 @@ def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
     pair = ("verify", "--tr", "0.0128853", "--td", "0.064")
     poor = run(*pair, ENERGY)
     assert poor.exit_code == 1
-    text = unwrapped(poor.stdout)
+    text = join_wrapped_lines(poor.stdout)
     assert text.startswith(
         "do not use tr = 0.0128853, td = 0.064 why the vibration after td is wrong by 96%, since 92% of"
     )
@@ -88,7 +88,7 @@ def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
     assert run(*pair, "--min-quality", "poor", ENERGY).exit_code == 0
     alone = run(*pair, "--no-verify", ENERGY)
     assert alone.exit_code == 1
-    assert unwrapped(alone.stdout).startswith(
+    assert join_wrapped_lines(alone.stdout).startswith(
         "do not use tr = 0.0128853, td = 0.064 why how the deformations at tr and td lie to each other is unknown"
     )
 
@@ -99,7 +99,7 @@ def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_do
     good = run("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY)
     assert good.exit_code == 0
     assert good.stdout.startswith("use     tr = 0.0135867, td = 0.0687534\nwhy     ")
-    bad = answer("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
+    bad = run_json("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
     assert (bad["verified"], bad["tr_ok"], bad["sign_match"]) == (False, False, False)
     assert any("opposite sign" in reason for reason in bad["reasons"])
 
@@ -108,18 +108,24 @@ def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_do
 
 
 def test_an_oscillator_can_be_given_instead_of_identified() -> None:
-    given, identified = answer(*SUGGEST, *OSCILLATOR, ENERGY), answer(*SUGGEST, ENERGY)
-    assert (given["oscillator"]["source"], identified["oscillator"]["source"]) == (
+    document, identified = (
+        run_json(*SUGGEST, *OSCILLATOR, ENERGY),
+        run_json(*SUGGEST, ENERGY),
+    )
+    assert (document["oscillator"]["source"], identified["oscillator"]["source"]) == (
         "given",
         "identified",
     )
-    assert given["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-13)
-    assert given["kinetic_share"] == pytest.approx(
+    assert document["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-13)
+    assert document["kinetic_share"] == pytest.approx(
         identified["kinetic_share"], rel=1e-9
     )
-    times = [[c["tr"] for c in found["candidates"]] for found in (given, identified)]
+    times = [
+        [c["tr"] for c in answer_document["candidates"]]
+        for answer_document in (document, identified)
+    ]
     np.testing.assert_allclose(times[0], times[1], rtol=1e-9)
-    assert [c["acceptable"] for c in given["candidates"]] == [
+    assert [c["acceptable"] for c in document["candidates"]] == [
         c["acceptable"] for c in identified["candidates"]
     ]
 
@@ -129,51 +135,51 @@ def test_beta_is_the_ratio_of_the_masses() -> None:
         "--stiffness 660e3 --mass 31.4 --frame-mass 15.7 --alpha 50 --v0 6"
     )
     assert (
-        answer(*SUGGEST, *by_mass, ENERGY)["candidates"]
-        == answer(*SUGGEST, *OSCILLATOR, ENERGY)["candidates"]
+        run_json(*SUGGEST, *by_mass, ENERGY)["candidates"]
+        == run_json(*SUGGEST, *OSCILLATOR, ENERGY)["candidates"]
     )
 
 
 def test_an_oscillator_that_is_not_that_of_the_record_is_not_relied_on() -> None:
-    found = answer(*SUGGEST, *OSCILLATOR[:-1], "7", ENERGY)
-    assert (found["basis"], found["oscillator"]["describes_record"]) == (
+    document = run_json(*SUGGEST, *OSCILLATOR[:-1], "7", ENERGY)
+    assert (document["basis"], document["oscillator"]["describes_record"]) == (
         "energy",
         False,
     )
-    assert found["oscillator"]["reason"]
+    assert document["oscillator"]["reason"]
 
 
 def test_a_fit_window_gives_the_same_oscillator_from_a_part_of_the_record() -> None:
-    found = answer(*SUGGEST, "--fit-window", "0.02", "0.1", ENERGY)
-    assert found["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-9)
-    assert found["recommended"]["tr"] == pytest.approx(
+    document = run_json(*SUGGEST, "--fit-window", "0.02", "0.1", ENERGY)
+    assert document["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-9)
+    assert document["recommended"]["tr"] == pytest.approx(
         paper.CROSSINGS[2][0] / 1e3, rel=1e-9
     )
 
 
 def test_without_verification_only_the_energy_level_counts() -> None:
-    found = answer(*SUGGEST, "--no-verify", ENERGY)
-    assert (found["basis"], found["oscillator"], found["kinetic_share"]) == (
+    document = run_json(*SUGGEST, "--no-verify", ENERGY)
+    assert (document["basis"], document["oscillator"], document["kinetic_share"]) == (
         "energy",
         None,
         None,
     )
-    assert {c["sign_match"] for c in found["candidates"]} == {None}
+    assert {c["sign_match"] for c in document["candidates"]} == {None}
 
 
 @pytest.mark.parametrize("options", [("--after", "0.02"), ("--margin", "0.02")])
 def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(
     options: tuple[str, str],
 ) -> None:
-    found = answer(*SUGGEST, *options, ENERGY)
-    assert found["recommended"]["tr"] == pytest.approx(
+    document = run_json(*SUGGEST, *options, ENERGY)
+    assert document["recommended"]["tr"] == pytest.approx(
         paper.CROSSINGS[3][0] / 1e3, rel=1e-9
     )
-    early = [c["notes"][0] for c in found["candidates"] if c["tr"] <= 0.02]
+    early = [c["notes"][0] for c in document["candidates"] if c["tr"] <= 0.02]
     assert early
     assert all("before the end of the load" in note for note in early)
     assert (
-        answer("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)[
+        run_json("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)[
             "tr_ok"
         ]
         is False
@@ -181,13 +187,13 @@ def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(
 
 
 def test_after_moves_the_start_of_the_flight_and_says_so() -> None:
-    flight = answer(*SUGGEST, "--after", "0.02", ENERGY)["flight"]
+    flight = run_json(*SUGGEST, "--after", "0.02", ENERGY)["flight"]
     assert (flight["start"], flight["source"]) == (0.02, "given")
 
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.05, 0.2])
 def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
-    candidates = answer(*ROLLING, "--no-verify", "--tolerance", str(tolerance))[
+    candidates = run_json(*ROLLING, "--no-verify", "--tolerance", str(tolerance))[
         "candidates"
     ]
     assert max(c["level_error"] for c in candidates if c["acceptable"]) <= tolerance
@@ -206,28 +212,28 @@ def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
 def test_a_limit_turns_a_poor_pair_into_an_objection(
     limit: tuple[str, str], measure: str
 ) -> None:
-    found = answer(*SUGGEST, *limit, ENERGY)
-    assert found["recommended"] is None
-    assert found["better_td"] is not None
+    document = run_json(*SUGGEST, *limit, ENERGY)
+    assert document["recommended"] is None
+    assert document["better_td"] is not None
     assert any(
         measure in w["message"] and w["code"] == "no-candidate"
-        for w in found["warnings"]
+        for w in document["warnings"]
     )
-    judged = answer("verify", "--tr", "0.0128853", "--td", "0.064", *limit, ENERGY)
+    judged = run_json("verify", "--tr", "0.0128853", "--td", "0.064", *limit, ENERGY)
     assert (judged["verified"], judged["tr_ok"]) == (False, True)
     assert any(measure in reason for reason in judged["reasons"])
-    assert answer(*SUGGEST, limit[0], "0.99", ENERGY)["recommended"] is not None
+    assert run_json(*SUGGEST, limit[0], "0.99", ENERGY)["recommended"] is not None
 
 
 def test_limit_shortens_the_table_but_not_json_and_csv() -> None:
-    shown = run(*SUGGEST, "-v", "--limit", "2", ENERGY).stdout
-    *rows, more = shown.partition(" verdict\n")[2].splitlines()
+    result = run(*SUGGEST, "-v", "--limit", "2", ENERGY).stdout
+    *rows, last_line = result.partition(" verdict\n")[2].splitlines()
     ranks = [
         row.lstrip("* ").split()[0] for row in rows if row.lstrip("* ")[0].isdigit()
     ]
     assert ranks == ["1", "2"]
-    assert more == "... and 8 more (--limit)"
-    assert len(answer(*SUGGEST, "--limit", "2", ENERGY)["candidates"]) == 10
+    assert last_line == "... and 8 more (--limit)"
+    assert len(run_json(*SUGGEST, "--limit", "2", ENERGY)["candidates"]) == 10
     assert (
         len(run(*SUGGEST, "--limit", "2", "-f", "csv", ENERGY).stdout.splitlines())
         == 11
@@ -235,14 +241,16 @@ def test_limit_shortens_the_table_but_not_json_and_csv() -> None:
 
 
 def test_columns_are_chosen_by_name_or_number_and_energies_added() -> None:
-    by_name = answer(*SUGGEST, "--time", "time", "--energy", "internal_energy", ENERGY)
-    by_number = answer(*SUGGEST, "--time", "1", "--energy", "6", ENERGY)
+    by_name = run_json(
+        *SUGGEST, "--time", "time", "--energy", "internal_energy", ENERGY
+    )
+    by_number = run_json(*SUGGEST, "--time", "1", "--energy", "6", ENERGY)
     assert by_name["candidates"] == by_number["candidates"]
     assert by_name["history"]["channel"] == "internal_energy"
-    total = answer(*SUGGEST, "--energy", "6", "--energy", "7", ENERGY)
-    both = read_history([ENERGY], Selection(energy=("6", "7")))
+    total = run_json(*SUGGEST, "--energy", "6", "--energy", "7", ENERGY)
+    both_energies = read_history([ENERGY], Selection(energy=("6", "7")))
     assert total["history"]["channel"] == "internal_energy + kinetic_energy"
-    assert total["energy_td"] == pytest.approx(both.energy_at(0.064), rel=1e-6)
+    assert total["energy_td"] == pytest.approx(both_energies.energy_at(0.064), rel=1e-6)
 
 
 # replay.
@@ -256,8 +264,8 @@ def test_a_replayed_history_read_back_has_the_same_answer(
     written = run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", name)
     assert (written.exit_code, written.stdout, written.stderr) == (0, "", "")
     again, sample = (
-        answer(*SUGGEST, name),
-        answer(*SUGGEST, GLSTAT if suffix == "glstat" else ENERGY),
+        run_json(*SUGGEST, name),
+        run_json(*SUGGEST, GLSTAT if suffix == "glstat" else ENERGY),
     )
     assert again["history"]["format"] == suffix
     assert again["recommended"]["tr"] == pytest.approx(
@@ -300,10 +308,10 @@ def test_a_replay_that_starts_in_the_middle_goes_on_as_the_whole_does() -> None:
 
 
 def test_velocity_of_the_frame_has_two_names() -> None:
-    rest = (*OSCILLATOR[:-2], "--t-end", "0.01", "--dt", "1e-3")
+    other_options = (*OSCILLATOR[:-2], "--t-end", "0.01", "--dt", "1e-3")
     assert (
-        run("replay", *rest, "--v0", "6").stdout
-        == run("replay", *rest, "--vz0", "6", "--y0", "0").stdout
+        run("replay", *other_options, "--v0", "6").stdout
+        == run("replay", *other_options, "--vz0", "6", "--y0", "0").stdout
     )
 
 
@@ -333,12 +341,15 @@ def test_the_sample_data_is_what_the_command_beside_it_writes(
     (here / "sample_data").mkdir()
     args = shlex.split(line.replace("energy.csv", name))
     assert run(*args[1:]).exit_code == 0
-    fresh, kept = (
+    fresh, stored_history = (
         read_history([str(folder / "sample_data" / name)]) for folder in (Path(), ROOT)
     )
-    np.testing.assert_allclose(fresh.time, kept.time, rtol=1e-14)
+    np.testing.assert_allclose(fresh.time, stored_history.time, rtol=1e-14)
     np.testing.assert_allclose(
-        fresh.energy, kept.energy, rtol=1e-5 if "glstat" in name else 1e-11, atol=1e-13
+        fresh.energy,
+        stored_history.energy,
+        rtol=1e-5 if "glstat" in name else 1e-11,
+        atol=1e-13,
     )
 
 
@@ -346,7 +357,7 @@ def test_the_sample_data_is_what_the_command_beside_it_writes(
 
 
 def test_the_module_runs_as_a_program() -> None:
-    result = program("--version")
+    result = run_program("--version")
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout.splitlines()[0].split()[-1] == __version__
 
@@ -407,10 +418,12 @@ GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0":
 def test_an_option_overrules_those_in_the_environment_that_it_excludes(
     command: str, args: str, env: dict[str, str]
 ) -> None:
-    named = {f"D2RPICK_{command}_{name}".upper(): value for name, value in env.items()}
+    variables = {
+        f"D2RPICK_{command}_{name}".upper(): value for name, value in env.items()
+    }
     plain, overruled = (
-        run(command, *args.split(), "-f", "csv", ENERGY, env=each)
-        for each in ({}, named)
+        run(command, *args.split(), "-f", "csv", ENERGY, env=environment)
+        for environment in ({}, variables)
     )
     assert overruled.exit_code in (0, 1), overruled.stderr
     assert (overruled.exit_code, overruled.stdout) == (plain.exit_code, plain.stdout)
@@ -419,8 +432,11 @@ def test_an_option_overrules_those_in_the_environment_that_it_excludes(
 def test_options_that_exclude_each_other_are_refused_where_both_come_from_the_environment() -> (
     None
 ):
-    both = {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07", "D2RPICK_SUGGEST_TD": "0.064"}
-    assert run("suggest", ENERGY, env=both).exit_code == 2
+    both_variables = {
+        "D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07",
+        "D2RPICK_SUGGEST_TD": "0.064",
+    }
+    assert run("suggest", ENERGY, env=both_variables).exit_code == 2
 
 
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
@@ -467,8 +483,8 @@ def test_the_shell_completes_the_names_of_files(words: str) -> None:
 # Help.
 
 
-def examples(command: str) -> list[list[str]]:
-    """Arguments of the examples at the end of a command's help."""
+def list_examples(command: str) -> list[list[str]]:
+    """Return the arguments of the examples at the end of a command's help."""
     text = run(*filter(None, [command]), "--help").stdout
     _, end = text.split("\n  Examples:\n")
     lines = end.replace("\\\n", " ").strip("\n").split("\n")
@@ -493,7 +509,7 @@ def test_every_help_ends_with_examples_that_run(
     monkeypatch.setenv("D2RPICK_ROLLOVER_DT", "1e-3")
     monkeypatch.setenv("D2RPICK_ROLLOVER_MESH", "4")
     shutil.copytree(ROOT / "sample_data", "sample_data")
-    calls = examples(command)
+    calls = list_examples(command)
     assert calls
     for call in calls:
         assert call[0] == command or not command
@@ -506,9 +522,11 @@ def test_the_help_names_each_command_in_a_line() -> None:
         run("--help").stdout.split(f"{title}:\n")[1].split("\n\n")[0].split("\n")
         for title in ("Commands", "Experiments")
     )
-    shown = [*work, *experiments]
-    assert shown == [f"  {name:9}  {line}" for name, (_, line) in COMMANDS.items()]
-    assert max(map(len, shown)) <= 80
+    commands_shown = [*work, *experiments]
+    assert commands_shown == [
+        f"  {name:9}  {line}" for name, (_, line) in COMMANDS.items()
+    ]
+    assert max(map(len, commands_shown)) <= 80
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -529,18 +547,20 @@ def test_help_is_the_same_by_its_short_name_and_explains_every_option(
 
 
 def test_the_margin_is_kept_before_a_landing_that_is_given() -> None:
-    """3 % of a flight from 0.086 on; the record itself shows the landing at 0.379."""
+    """The margin is 3 % of a flight that begins at 0.086; the record itself shows the landing at 0.379."""
     landing = 0.36
-    asked = ("--no-verify", "--part", "box", "--landing", str(landing), MATSUM)
-    found = answer("suggest", *asked)
-    last = landing - 0.03 * (landing - found["flight"]["start"])
-    assert found["flight"]["end"] == landing
-    assert last - 0.03 < found["recommended"]["td"] <= last
+    arguments = ("--no-verify", "--part", "box", "--landing", str(landing), MATSUM)
+    suggestion = run_json("suggest", *arguments)
+    last = landing - 0.03 * (landing - suggestion["flight"]["start"])
+    assert suggestion["flight"]["end"] == landing
+    assert last - 0.03 < suggestion["recommended"]["td"] <= last
     assert (
-        answer("plan", "--min-quality", "poor", *asked)["windows"][0]["td"]
-        == found["recommended"]["td"]
+        run_json("plan", "--min-quality", "poor", *arguments)["windows"][0]["td"]
+        == suggestion["recommended"]["td"]
     )
-    at_landing = answer("suggest", "--td", str(landing), *asked)
+    at_landing = run_json("suggest", "--td", str(landing), *arguments)
     assert at_landing["recommended"] is None
     assert at_landing["better_td"]["td"] <= last
-    assert not answer("verify", "--tr", "0.1", "--td", str(landing), *asked)["verified"]
+    assert not run_json("verify", "--tr", "0.1", "--td", str(landing), *arguments)[
+        "verified"
+    ]

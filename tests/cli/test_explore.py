@@ -1,4 +1,4 @@
-"""``explore``: its forms, its schema, and that every td is what ``suggest`` says of it."""
+"""``explore``: its formats, its schema, and answers that agree with ``suggest`` for every td."""
 
 import csv
 import io
@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from tests.command import ENERGY, MATSUM, ROOT, answer, put, run
-from tests.json_schemas import checked
+from tests.command import ENERGY, MATSUM, ROOT, put, run, run_json
+from tests.json_schemas import run_json_checked
 
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
 SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
@@ -34,20 +34,20 @@ SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8")
 def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
     explored: tuple[str, ...], options: tuple[str, ...], source: str
 ) -> None:
-    found = checked("explore", *explored, *options, source)
-    offers = found["offers"]
+    exploration = run_json_checked("explore", *explored, *options, source)
+    offers = exploration["offers"]
     assert (
         offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
     )
     assert all(low["td"] < high["td"] for low, high in pairwise(offers))
-    for one in offers[:: max(1, len(offers) // 3)]:
-        alone = answer("suggest", "--td", repr(one["td"]), *options, source)
+    for offer_row in offers[:: max(1, len(offers) // 3)]:
+        alone = run_json("suggest", "--td", repr(offer_row["td"]), *options, source)
         best = next((c for c in alone["candidates"] if c["recommended"]), None)
-        assert (one["tr"], one["td"]) == (best and best["tr"], alone["td"])
-        assert (one["kinetic_share"], one["energy_td"], one["basis"]) == (
+        assert (offer_row["tr"], offer_row["td"]) == (best and best["tr"], alone["td"])
+        assert (offer_row["kinetic_share"], offer_row["energy_td"], offer_row["basis"]) == (
             alone["kinetic_share"], alone["energy_td"], alone["basis"],
         )  # fmt: skip
-        assert (one["quality"], one["expected"]) == (
+        assert (offer_row["quality"], offer_row["expected"]) == (
             alone["quality"],
             alone["expected"],
         )
@@ -59,30 +59,33 @@ def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
             "rigid_time",
             "run_time_share",
         ):
-            assert one[name] == (best and best[name])
+            assert offer_row[name] == (best and best[name])
 
 
 def test_the_recommended_pair_is_that_of_suggest() -> None:
-    found, chosen = (
-        answer("explore", *WINDOW, ENERGY),
-        answer("suggest", *WINDOW[:3], ENERGY),
+    exploration, chosen = (
+        run_json("explore", *WINDOW, ENERGY),
+        run_json("suggest", *WINDOW[:3], ENERGY),
     )
-    assert found["recommended"] == chosen["recommended"]
-    (marked,) = (one for one in found["offers"] if one["recommended"])
-    assert {"tr": marked["tr"], "td": marked["td"]} == found["recommended"]
+    assert exploration["recommended"] == chosen["recommended"]
+    (marked,) = (offer for offer in exploration["offers"] if offer["recommended"])
+    assert {"tr": marked["tr"], "td": marked["td"]} == exploration["recommended"]
 
 
 def test_the_sentence_says_what_a_step_changes() -> None:
-    found = answer("explore", "--td", "0.064", *WINDOW, ENERGY)
-    assert found["answer"] == (
+    exploration = run_json("explore", "--td", "0.064", *WINDOW, ENERGY)
+    assert exploration["answer"] == (
         "td = 0.064: residual 0.957; 0.0048 later (tr = 0.0135867, td = 0.0687534) cuts the error to 0.000 "
         "and makes the rigid time 7.9% longer"
     )
-    assert (found["start"], found["step"]) == (0.064, found["recommended"]["td"])
-    near = answer("explore", "--td", "0.07", *WINDOW, ENERGY)["answer"]
+    assert (exploration["start"], exploration["step"]) == (
+        0.064,
+        exploration["recommended"]["td"],
+    )
+    near = run_json("explore", "--td", "0.07", *WINDOW, ENERGY)["answer"]
     assert near.startswith("td = 0.07: residual 0.299; 0.001 earlier (")
     assert "costs 1." in near
-    good = answer("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
+    good = run_json("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
     assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
 
 
@@ -94,7 +97,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
     energy = 1 + 0.3 * np.sin(41 * later) ** 2 + 0.2 * np.sin(97 * later) ** 2
     file = tmp_path / "run.csv"
     pd.DataFrame({"time": time, "internal_energy": energy}).to_csv(file, index=False)
-    found = answer(
+    exploration = run_json(
         "explore",
         "--td",
         "0.996",
@@ -105,35 +108,43 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
         "20",
         str(file),
     )
-    (start,) = (one for one in found["offers"] if one["td"] == 0.996)
+    (start,) = (
+        offer_row for offer_row in exploration["offers"] if offer_row["td"] == 0.996
+    )
     halved = [
-        one
-        for one in found["offers"]
-        if one["error"] is not None and one["error"] <= start["error"] / 2
+        offer_row
+        for offer_row in exploration["offers"]
+        if offer_row["error"] is not None and offer_row["error"] <= start["error"] / 2
     ]
     assert halved
-    assert max(one["rigid_time"] for one in halved) < start["rigid_time"] / 2
-    assert found["step"] is None
-    assert found["answer"].endswith(
+    assert (
+        max(offer_row["rigid_time"] for offer_row in halved) < start["rigid_time"] / 2
+    )
+    assert exploration["step"] is None
+    assert exploration["answer"].endswith(
         "; no other td in the window has half of it and keeps half of the rigid time"
     )
 
 
 @pytest.mark.slow
 def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
-    found = answer("explore", *WINDOW, ENERGY)["offers"]
+    exploration = run_json("explore", *WINDOW, ENERGY)["offers"]
     rows = list(
         csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout))
     )
-    assert [float(row["td"]) for row in rows] == [one["td"] for one in found]
+    assert [float(row["td"]) for row in rows] == [
+        offer_row["td"] for offer_row in exploration
+    ]
     assert [float(row["residual"]) for row in rows] == [
-        one["residual"] for one in found
+        offer_row["residual"] for offer_row in exploration
     ]
     frame = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.07), steps=10).to_frame()
-    assert frame["td"].tolist() == [one["td"] for one in found]
-    assert frame["unbeaten"].tolist() == [one["unbeaten"] for one in found]
+    assert frame["td"].tolist() == [offer_row["td"] for offer_row in exploration]
+    assert frame["unbeaten"].tolist() == [
+        offer_row["unbeaten"] for offer_row in exploration
+    ]
     table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout
-    assert f"... and {len(found) - 3} more td" in table
+    assert f"... and {len(exploration) - 3} more td" in table
     assert run("explore", *WINDOW, "-f", "markdown", ENERGY).stdout.startswith(
         "|  | td |"
     )
@@ -168,16 +179,16 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
         "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)),
     )
     assert "give the end of the load as --after" in run("explore", str(ramp)).stderr
-    asked = run("suggest", "--td", "0.5", str(ramp))
+    run_result = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
-    assert (asked.exit_code, result.exit_code) == (1, 1)
+    assert (run_result.exit_code, result.exit_code) == (1, 1)
     assert "give --td" not in result.stderr
     assert "no-candidate" in result.stderr
-    found = json.loads(result.stdout)
-    assert found["td_window"] == [
+    document = json.loads(result.stdout)
+    assert document["td_window"] == [
         0.0,
         1.0,
     ]  # no flight is seen, so that all of the record is explored
-    (one,) = (offer for offer in found["offers"] if offer["td"] == 0.5)
-    assert one["reason"] in " ".join(asked.stdout.split())
-    assert found["recommended"] is None
+    (offer_at_td,) = (offer for offer in document["offers"] if offer["td"] == 0.5)
+    assert offer_at_td["reason"] in " ".join(run_result.stdout.split())
+    assert document["recommended"] is None

@@ -1,4 +1,4 @@
-"""Histories that are written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
+"""Histories written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
 
 import csv
 import io
@@ -19,11 +19,11 @@ from tests.command import (
     OSCILLATOR,
     ROLLOVER,
     ROOT,
-    answer,
+    make_replay_file,
     put,
-    refused,
-    replayed,
+    read_refusal,
     run,
+    run_json,
 )
 from tests.reading import read_history
 
@@ -32,11 +32,11 @@ SUFFIXES = ["csv", "h5", "hdf5"]
 NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
 
 
-def same(one: History, other: History) -> bool:
-    """Whether two histories hold the same numbers, bit for bit."""
+def is_same(first_history: History, second_history: History) -> bool:
+    """Return True if two histories hold the same numbers bit for bit."""
     return (
-        one.time.tobytes() == other.time.tobytes()
-        and one.energy.tobytes() == other.energy.tobytes()
+        first_history.time.tobytes() == second_history.time.tobytes()
+        and first_history.energy.tobytes() == second_history.energy.tobytes()
     )
 
 
@@ -57,7 +57,7 @@ def test_what_is_extracted_reads_back_bit_for_bit(
     again = read_history([str(file)])
     assert again.channel == "internal_energy"
     assert again.format == ("csv" if suffix == "csv" else "hdf5")
-    assert same(again, read_history([source], Selection(energy=energy)))
+    assert is_same(again, read_history([source], Selection(energy=energy)))
 
 
 def test_from_csv_to_hdf5_and_back_the_file_is_the_same(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ QUANTITIES = ("kinetic_energy", "total_energy", "external_work", "contact_energy
 
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The rollover box in every format."""
+    """Write the rollover box in every format; return the file names."""
     folder = tmp_path_factory.mktemp("box")
     files = {suffix: str(folder / f"box.{suffix}") for suffix in BOX}
     for file in files.values():
@@ -136,14 +136,17 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
 ) -> None:
     file = str(tmp_path / f"extracted.{suffix}")
     assert run("extract", *BOX[source], box[source], "-o", file).exit_code == 0
-    asked = ("suggest", "--no-verify", "--td", "0.37")
-    found, expected = answer(*asked, file), answer(*asked, *BOX[source], box[source])
+    arguments = ("suggest", "--no-verify", "--td", "0.37")
+    document, expected = (
+        run_json(*arguments, file),
+        run_json(*arguments, *BOX[source], box[source]),
+    )
     for name in ("start", "end"):
-        assert found["flight"][name] == pytest.approx(
+        assert document["flight"][name] == pytest.approx(
             expected["flight"][name], abs=5.1e-4
         )  # one state
-    assert found["flight"]["source"] == expected["flight"]["source"]
-    assert found["recommended"]["tr"] == pytest.approx(
+    assert document["flight"]["source"] == expected["flight"]["source"]
+    assert document["recommended"]["tr"] == pytest.approx(
         expected["recommended"]["tr"], rel=1e-5
     )
 
@@ -152,7 +155,7 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     "name", ["rollover_box.binout", "rollover_box.glstat", "rolloverT01.gz"]
 )
 def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
-    """Friction that is told apart stays apart, and the energy ratio is the one that the solver wrote."""
+    """Friction energy stays separate, and the energy ratio is the one that the solver wrote."""
     source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
     assert (
         run(
@@ -164,23 +167,26 @@ def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) 
         ).exit_code
         == 0
     )
-    found, expected = answer("info", file)["health"], answer("info", source)["health"]
+    run_info, expected = (
+        run_json("info", file)["health"],
+        run_json("info", source)["health"],
+    )
     for key in ("energy_ratio_min", "energy_ratio_max", "sliding_share"):
-        assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
+        assert run_info[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
 
 
 @pytest.mark.slow
 def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(
     box: dict[str, str],
 ) -> None:
-    asked = ("suggest", "--no-verify", "--td", "0.37")
+    arguments = ("suggest", "--no-verify", "--td", "0.37")
     answers = [
-        answer(*asked, *BOX[form], box[form]) for form in ("csv", "h5", "matsum")
+        run_json(*arguments, *BOX[form], box[form]) for form in ("csv", "h5", "matsum")
     ]
-    assert {one["flight"]["source"] for one in answers} == {"momentum"}
+    assert {box_answer["flight"]["source"] for box_answer in answers} == {"momentum"}
     for name in ("start", "end"):
-        assert np.ptp([one["flight"][name] for one in answers]) < 5.1e-4
-    assert np.ptp([one["recommended"]["tr"] for one in answers]) < 1e-6
+        assert np.ptp([box_answer["flight"][name] for box_answer in answers]) < 5.1e-4
+    assert np.ptp([box_answer["recommended"]["tr"] for box_answer in answers]) < 1e-6
 
 
 @pytest.mark.slow
@@ -190,12 +196,14 @@ def test_quantities_of_the_whole_model_are_extracted_under_one_name(
 ) -> None:
     file = str(tmp_path / f"extracted.{suffix}")
     assert run("extract", box["glstat"], "-o", file).exit_code == 0
-    found, expected = (open_run([name]).databases[0] for name in (file, box["glstat"]))
-    assert {*QUANTITIES, "x_velocity"} <= {*found.quantities}
+    quantities, expected = (
+        open_run([name]).databases[0] for name in (file, box["glstat"])
+    )
+    assert {*QUANTITIES, "x_velocity"} <= {*quantities.quantities}
     for quantity in QUANTITIES:
-        assert found.quantities[quantity] == quantity
+        assert quantities.quantities[quantity] == quantity
         numbers = (
-            found.channel(quantity),
+            quantities.channel(quantity),
             expected.channel(expected.quantities[quantity]),
         )
         np.testing.assert_array_equal(*numbers)
@@ -208,17 +216,17 @@ UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(
 
 def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     file = put(tmp_path / "unusual.csv", UNUSUAL)
-    named = [
+    options = [
         f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)
     ]
-    text = run("extract", *named, "--channel", "kinetic-energy=3", str(file)).stdout
+    text = run("extract", *options, "--channel", "kinetic-energy=3", str(file)).stdout
     assert text.startswith(
         "time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,0.0,1.0,2.0,"
     )
 
 
 @pytest.mark.parametrize(
-    ("given", "reason"),
+    ("given_options", "reason"),
     [
         (("kinetic_energy=E9",), "no column 'E9'; there are: 1 'time', 2 'IE'"),
         (
@@ -230,17 +238,19 @@ def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_a_channel_that_is_none_is_refused(
-    given: tuple[str, ...], reason: str, tmp_path: Path
+    given_options: tuple[str, ...], reason: str, tmp_path: Path
 ) -> None:
     file = put(tmp_path / "unusual.csv", UNUSUAL)
-    assert reason in refused("info", *(f"--channel={one}" for one in given), str(file))
+    assert reason in read_refusal(
+        "info", *(f"--channel={option}" for option in given_options), str(file)
+    )
 
 
 @pytest.mark.slow
 def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(
     tmp_path: Path,
 ) -> None:
-    file = put(tmp_path / "matsum", replayed("matsum"))
+    file = put(tmp_path / "matsum", make_replay_file("matsum"))
     result = run("extract", str(file))
     assert result.stdout.startswith(
         "time,internal_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,"
@@ -263,8 +273,8 @@ def test_the_format_asked_for_comes_before_that_of_the_name(tmp_path: Path) -> N
 def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(
     name: str, tmp_path: Path
 ) -> None:
-    told = refused("extract", "absent.csv", "-o", str(tmp_path / name))
-    assert told.endswith("the suffix names no format; give --write-as: csv, hdf5")
+    message = read_refusal("extract", "absent.csv", "-o", str(tmp_path / name))
+    assert message.endswith("the suffix names no format; give --write-as: csv, hdf5")
     assert not (tmp_path / name).exists()
 
 
@@ -291,22 +301,22 @@ def test_format_of_takes_only_what_can_be_written() -> None:
 def test_a_replayed_hdf5_holds_the_numbers_of_the_csv(tmp_path: Path) -> None:
     names = [str(tmp_path / name) for name in ("motion.csv", "motion.h5")]
     for name, form in zip(names, ("csv", "hdf5"), strict=True):
-        Path(name).write_bytes(replayed(form))
+        Path(name).write_bytes(make_replay_file(form))
     for column in ("internal_energy", "kinetic_energy", "z", "vy"):
-        one, other = (
+        first_history, second_history = (
             read_history([name], Selection(energy=(column,))) for name in names
         )
-        assert same(one, other)
+        assert is_same(first_history, second_history)
 
 
 @pytest.mark.parametrize("switches", [(), ("--tr", "0.0135867", "--td", "0.0687534")])
 def test_a_replayed_matsum_holds_the_motion_to_five_digits(
     switches: tuple[str, ...], tmp_path: Path
 ) -> None:
-    file = put(tmp_path / "matsum", replayed("matsum", *switches))
+    file = put(tmp_path / "matsum", make_replay_file("matsum", *switches))
     opened = open_run([str(file)])
     table = np.genfromtxt(
-        io.BytesIO(replayed("csv", *switches)), delimiter=",", names=True
+        io.BytesIO(make_replay_file("csv", *switches)), delimiter=",", names=True
     )
     ids = [part.id for part in opened.parts]
     frame, suspended, spring = opened.parts
@@ -323,27 +333,27 @@ def test_a_replayed_matsum_holds_the_motion_to_five_digits(
 
 
 def test_suggest_gives_the_same_pair_on_a_replayed_matsum(tmp_path: Path) -> None:
-    file = put(tmp_path / "matsum", replayed("matsum"))
-    found, expected = answer("suggest", "--td", "0.064", "--part", "spring", str(file)), answer(
+    file = put(tmp_path / "matsum", make_replay_file("matsum"))
+    suggestion, expected = run_json("suggest", "--td", "0.064", "--part", "spring", str(file)), run_json(
         "suggest", "--td", "0.064", ENERGY
     )  # fmt: skip
-    assert found["recommended"]["tr"] == pytest.approx(
+    assert suggestion["recommended"]["tr"] == pytest.approx(
         expected["recommended"]["tr"], rel=1e-5
     )
-    assert found["better_td"]["td"] == pytest.approx(
+    assert suggestion["better_td"]["td"] == pytest.approx(
         expected["better_td"]["td"], rel=1e-5
     )
-    assert found["better_td"]["tr"] == pytest.approx(
+    assert suggestion["better_td"]["tr"] == pytest.approx(
         expected["better_td"]["tr"], rel=1e-5
     )
-    flight = found["flight"]
+    flight = suggestion["flight"]
     assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")
     assert [part["title"] for part in flight["parts"]] == [
         "frame",
         "suspended mass",
         "spring",
     ]
-    assert found["history"]["parts"] == [{"id": 3, "title": "spring"}]
+    assert suggestion["history"]["parts"] == [{"id": 3, "title": "spring"}]
 
 
 def test_an_undamped_replay_flies_by_its_constant_momentum(tmp_path: Path) -> None:
@@ -355,5 +365,7 @@ def test_an_undamped_replay_flies_by_its_constant_momentum(tmp_path: Path) -> No
         ).exit_code
         == 0
     )
-    flight = answer("suggest", "--td", "0.064", "--part", "spring", str(file))["flight"]
+    flight = run_json("suggest", "--td", "0.064", "--part", "spring", str(file))[
+        "flight"
+    ]
     assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")

@@ -1,4 +1,4 @@
-"""The command ``follow``: lines, ndjson, exit codes, an end that is quiet."""
+"""The command ``follow``: lines, ndjson, exit codes, and a quiet end."""
 
 import gzip
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from tests.command import BOX, ROOT, run, started
+from tests.command import BOX, ROOT, run, start_program
 
 CAR = str(ROOT / "tests/data/carT01.gz")
 
@@ -37,9 +37,11 @@ def test_once_says_what_there_is_and_whether_it_flies() -> None:
 
 def test_lines_of_json_are_those_of_python() -> None:
     result = run("follow", "-f", "ndjson", "--part", "box", "--for", "0", BOX)
-    found = [json.loads(line) for line in result.stdout.splitlines()]
-    assert found == [one._asdict() for one in d2.follow(BOX, parts="box", lasting=0)]
-    assert {tuple(one) for one in found} == {
+    documents = [json.loads(line) for line in result.stdout.splitlines()]
+    assert documents == [
+        event_row._asdict() for event_row in d2.follow(BOX, parts="box", lasting=0)
+    ]
+    assert {tuple(event_row) for event_row in documents} == {
         ("event", "time", "seen", "message", "wait", "left", "tr")
     }
 
@@ -58,7 +60,7 @@ def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
 def test_an_interrupt_ends_it_with_a_line(tmp_path: Path) -> None:
     data = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(data)
-    with started("follow", "-f", "ndjson", str(tmp_path)) as process:
+    with start_program("follow", "-f", "ndjson", str(tmp_path)) as process:
         assert process.stdout
         json.loads(process.stdout.readline())
         os.kill(process.pid, signal.SIGINT)

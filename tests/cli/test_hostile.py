@@ -1,4 +1,4 @@
-"""Closed streams, full disks, interrupts and damaged files: one line, or the result."""
+"""Closed streams, full disks, interrupts and damaged files: one error line, or the result."""
 
 import gzip
 import io
@@ -22,19 +22,19 @@ from tests.command import (
     INTERRUPTIBLE,
     ROOT,
     TIME_LIMIT,
-    answer,
     put,
-    refused,
+    read_refusal,
     run,
-    started,
+    run_json,
+    start_program,
 )
-from tests.made_binout import binout as made_binout
-from tests.made_t01 import t01, value
-from tests.text_files import glstat_text, matsum_text
+from tests.made_binout import make_binout as made_binout
+from tests.made_t01 import make_t01, make_value
+from tests.text_files import make_glstat_text, make_matsum_text
 
 
-def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
-    """Call the program by a shell, which can close its streams and limit its memory; ``$@`` are the arguments."""
+def run_in_shell(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
+    """Call the program in a shell, which can close streams and limit memory; ``$@`` are the arguments."""
     program = f'd2rpick() {{ "{sys.executable}" -m d2rpick "$@"; }}; {command}'
     return subprocess.run(
         ["bash", "-c", program, "bash", *args], cwd=ROOT, capture_output=True, text=True, check=False,
@@ -42,19 +42,23 @@ def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def one_line(found: subprocess.CompletedProcess[str]) -> str:
-    """Message of a call that could not run."""
-    assert (found.returncode, found.stdout, found.stderr.count("\n")) == (2, "", 1), (
-        found
-    )
-    assert "internal error" not in found.stderr
-    return found.stderr
+def read_one_line(result: subprocess.CompletedProcess[str]) -> str:
+    """Return the message of a call that failed."""
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (
+        2,
+        "",
+        1,
+    ), result
+    assert "internal error" not in result.stderr
+    return result.stderr
 
 
 def test_standard_input_that_is_closed_is_told() -> None:
-    assert "-: standard input is closed" in one_line(child("d2rpick info - <&-"))
-    assert "-: standard input is closed" in one_line(
-        child("d2rpick study --td 1 --from - <&-")
+    assert "-: standard input is closed" in read_one_line(
+        run_in_shell("d2rpick info - <&-")
+    )
+    assert "-: standard input is closed" in read_one_line(
+        run_in_shell("d2rpick study --td 1 --from - <&-")
     )
 
 
@@ -62,21 +66,23 @@ def test_standard_input_that_is_closed_is_told() -> None:
     "args", ["--help", "suggest --td 0.064 -q", "study --td 0.064 -qf ndjson"]
 )
 def test_a_result_that_nobody_can_get_is_no_success(args: str) -> None:
-    for closed, said in (
+    for closed, message in (
         (">&-", "standard output is closed; open it"),
         (">/dev/full", "No space left on device"),
     ):
         if Path("/dev/full").exists() or closed == ">&-":
-            assert said in one_line(child(f'd2rpick {args} "$@" {closed}', ENERGY))
+            assert message in read_one_line(
+                run_in_shell(f'd2rpick {args} "$@" {closed}', ENERGY)
+            )
 
 
 def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(
     tmp_path: Path,
 ) -> None:
-    found = child(
+    process_result = run_in_shell(
         'd2rpick suggest --td 0.064 -qf value "$1" -o "$2" >&-', ENERGY, tmp_path / "tr"
     )
-    assert (found.returncode, found.stderr) == (0, "")
+    assert (process_result.returncode, process_result.stderr) == (0, "")
     assert float((tmp_path / "tr").read_text()) == pytest.approx(0.0128852793630525)
 
 
@@ -87,7 +93,7 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
         "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n"
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
-    with started("info", ENERGY) as process:
+    with start_program("info", ENERGY) as process:
         assert process.communicate() == (b"", b"")
     assert process.returncode == -signal.SIGINT
 
@@ -95,7 +101,7 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
 def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As one does that comes in the end of an object, or while an extension module is imported."""
+    """This happens in a finalizer of an object, or while an extension module is imported."""
     (tmp_path / "click.py").write_text(
         "import os, signal\n"
         "class Swallowing:\n"
@@ -105,7 +111,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
         "raise SystemExit(0)\n"
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
-    with started("info", ENERGY) as process:
+    with start_program("info", ENERGY) as process:
         assert process.communicate() == (b"", b"")
     assert process.returncode == -signal.SIGINT
 
@@ -113,7 +119,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
 def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Python 3.11 raises a RuntimeError for it."""
+    """Python 3.11 raises a RuntimeError in this case."""
     (tmp_path / "numpy.py").write_text(
         "import os, signal\n"
         "class Named:\n"
@@ -123,14 +129,14 @@ def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
         "    value = Named()\n"
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
-    with started("info", ENERGY) as process:
+    with start_program("info", ENERGY) as process:
         assert process.communicate()[1].strip() == b"d2rpick: interrupted"
     assert process.returncode == -signal.SIGINT
 
 
 @pytest.mark.parametrize("command", ["study --td 0.064 --jobs 1", "info"])
 def test_an_interrupt_ends_the_loop_of_a_shell(tmp_path: Path, command: str) -> None:
-    """The pipe is opened by the reader of the run, which then waits in it for the interrupt."""
+    """The reader of the run opens the pipe and then waits in it for the interrupt."""
     pipe = tmp_path / "run.csv"
     os.mkfifo(pipe)
     python = f'"{sys.executable}" -c "{INTERRUPTIBLE}"'
@@ -151,8 +157,8 @@ def test_an_interrupt_ends_the_loop_of_a_shell(tmp_path: Path, command: str) -> 
         pipe.open("wb"),
     ):
         os.killpg(shell.pid, signal.SIGINT)
-        told, errors = shell.communicate(timeout=TIME_LIMIT)
-    assert (shell.returncode, told, errors.strip()) == (
+        shell_output, errors = shell.communicate(timeout=TIME_LIMIT)
+    assert (shell.returncode, shell_output, errors.strip()) == (
         -signal.SIGINT,
         b"",
         b"d2rpick: interrupted",
@@ -180,16 +186,23 @@ def test_a_job_that_ignores_interrupts_goes_on(tmp_path: Path) -> None:
 
 
 def test_a_closed_stderr_loses_no_result() -> None:
-    found = child('d2rpick suggest --td 0.064 -f value "$@" 2>&-', ENERGY)
-    assert found.returncode == 0
-    assert float(found.stdout) == pytest.approx(0.0128852793630525)
+    process_result = run_in_shell(
+        'd2rpick suggest --td 0.064 -f value "$@" 2>&-', ENERGY
+    )
+    assert process_result.returncode == 0
+    assert float(process_result.stdout) == pytest.approx(0.0128852793630525)
 
 
 def test_a_pipe_in_place_of_a_file_is_read_once_and_signed() -> None:
-    piped = child('d2rpick suggest --td 0.064 -f json <(cat "$1")', ENERGY).stdout
+    piped = run_in_shell(
+        'd2rpick suggest --td 0.064 -f json <(cat "$1")', ENERGY
+    ).stdout
     digests = [
-        found["history"]["sha256"]
-        for found in (json.loads(piped), answer("suggest", "--td", "0.064", ENERGY))
+        document["history"]["sha256"]
+        for document in (
+            json.loads(piped),
+            run_json("suggest", "--td", "0.064", ENERGY),
+        )
     ]
     assert digests[0] == digests[1]
 
@@ -197,21 +210,21 @@ def test_a_pipe_in_place_of_a_file_is_read_once_and_signed() -> None:
 @pytest.mark.slow
 def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger"
-    message = one_line(
-        child(
+    message = read_one_line(
+        run_in_shell(
             'ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY
         )
     )
     assert f"{ledger}: cannot be written (File too large); make room" in message
     assert not ledger.exists()
     ledger.symlink_to(os.devnull)
-    assert "not a regular file" in one_line(
-        child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY)
+    assert "not a regular file" in read_one_line(
+        run_in_shell('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY)
     )
 
 
 def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
-    """The size of a file is limited in blocks of 1 kB, which the second row exceeds."""
+    """The file size is limited in blocks of 1 kB, which the second row exceeds."""
     ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
     again.write_bytes(Path(ENERGY).read_bytes())
     assert (
@@ -225,7 +238,9 @@ def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> Non
     study = (
         'ulimit -f "$1"; d2rpick study -q --td 0.064 --jobs 1 --resume "$2" "$3" "$4"'
     )
-    assert "make room" in one_line(child(study, str(blocks), ledger, ENERGY, again))
+    assert "make room" in read_one_line(
+        run_in_shell(study, str(blocks), ledger, ENERGY, again)
+    )
     assert ledger.read_bytes() == first
 
 
@@ -244,22 +259,24 @@ def test_a_study_without_a_finished_run_leaves_no_ledger(
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
     packed = put(tmp_path / "zeros.gz", 17 * gzip.compress(bytes(1 << 24)))
-    message = one_line(
-        child('ulimit -v 260000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed)
+    message = read_one_line(
+        run_in_shell(
+            'ulimit -v 260000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed
+        )
     )
     assert "zeros.gz: its unpacked data do not fit into memory" in message
 
 
-def deep(groups: int) -> bytes:
+def make_deep_file(groups: int) -> bytes:
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
-        place = file.create_group("/".join(["g"] * groups))
-        place["time"], place["internal_energy"] = np.arange(9.0), np.arange(9.0) ** 2
+        group = file.create_group("/".join(["g"] * groups))
+        group["time"], group["internal_energy"] = np.arange(9.0), np.arange(9.0) ** 2
     return content.getvalue()
 
 
-def dense(sizes: Sequence[int], **options: Any) -> bytes:
-    """A file with columns of zeros, which are packed; what is not written is not there at all."""
+def make_dense_file(sizes: Sequence[int], **options: Any) -> bytes:
+    """Return a file with compressed columns of zeros; empty chunks are not stored."""
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         for number, size in enumerate(sizes):
@@ -275,14 +292,18 @@ BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
         "RATIO",
         "its packed data become more than 100 times",
     ),
-    "deep.h5": (lambda: deep(101), "DEPTH", "its data lie in more than 100 groups"),
+    "deep.h5": (
+        lambda: make_deep_file(101),
+        "DEPTH",
+        "its data lie in more than 100 groups",
+    ),
     "one.h5": (
-        lambda: dense([1 << 22], compression="gzip"),
+        lambda: make_dense_file([1 << 22], compression="gzip"),
         "RATIO",
         "its packed data become more than 100 times",
     ),
     "all.h5": (
-        lambda: dense([1 << 20] * 3, compression="gzip"),
+        lambda: make_dense_file([1 << 20] * 3, compression="gzip"),
         "RATIO",
         "become more than 100 times as many bytes",
     ),
@@ -324,12 +345,12 @@ BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
 def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(
     name: str, tmp_path: Path
 ) -> None:
-    make, bound, said = BEYOND[name]
+    make, bound, message_expected = BEYOND[name]
     (tmp_path / name).write_bytes(make())
     command = "check" if name.endswith(".k") else "info"
-    told = refused(command, str(tmp_path / name))
-    assert said in told
-    assert f"set D2RPICK_MAX_{bound} higher" in told
+    message = read_refusal(command, str(tmp_path / name))
+    assert message_expected in message
+    assert f"set D2RPICK_MAX_{bound} higher" in message
     raised = run(command, str(tmp_path / name), env={f"D2RPICK_MAX_{bound}": "1e9"})
     assert "D2RPICK_MAX" not in raised.stderr
 
@@ -340,7 +361,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         b"%d,0\n" % state for state in range(1000)
     )
     for name, content in {
-        "deep.h5": deep(100),
+        "deep.h5": make_deep_file(100),
         "still.gz": gzip.compress(
             small + (b"#" * 4095 + b"\n") * (1 << 11)
         ),  # 1,000 times as many bytes, few all the same
@@ -359,9 +380,9 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
             ).exit_code
             == 2
         )
-    wrong = run("info", ENERGY, env={"D2RPICK_MAX_LINE": "long"})
+    result = run("info", ENERGY, env={"D2RPICK_MAX_LINE": "long"})
     assert (
-        wrong.stderr
+        result.stderr
         == "d2rpick: D2RPICK_MAX_LINE is 'long', a number above 0 was expected; correct it or leave it out\n"
     )
 
@@ -374,8 +395,11 @@ def test_an_unforeseen_error_names_the_files_of_the_run(
     Path("b.csv.gz").write_bytes(gzip.compress(Path(ENERGY).read_bytes()))
     monkeypatch.setattr(zlib, "decompressobj", lambda **_: 1 / 0)
     for command in (("plan",), ("info",), ("suggest", "--td", "0.064")):
-        told = "a.csv, b.csv.gz: internal error, please report it (ZeroDivisionError: division by zero)"
-        assert refused(*command, "a.csv", "b.csv.gz") == f"{told}; --debug shows where"
+        message = "a.csv, b.csv.gz: internal error, please report it (ZeroDivisionError: division by zero)"
+        assert (
+            read_refusal(*command, "a.csv", "b.csv.gz")
+            == f"{message}; --debug shows where"
+        )
 
 
 @pytest.mark.usefixtures("here")
@@ -383,9 +407,14 @@ def test_links_in_a_circle_give_each_run_once() -> None:
     Path("run.csv").write_bytes(Path(ENERGY).read_bytes())
     Path("again").symlink_to(".")
     Path("self.csv").symlink_to("self.csv")
-    found = json.loads(run("study", "--td", "0.064", "-f", "json", "**/*.csv").stdout)
-    assert [one["source"] for one in found["runs"]] == ["run.csv", "self.csv"]
-    assert [one["status"] for one in found["runs"]] == ["ok", "unreadable"]
+    document = json.loads(
+        run("study", "--td", "0.064", "-f", "json", "**/*.csv").stdout
+    )
+    assert [one_run["source"] for one_run in document["runs"]] == [
+        "run.csv",
+        "self.csv",
+    ]
+    assert [one_run["status"] for one_run in document["runs"]] == ["ok", "unreadable"]
     assert run("info", "-f", "json", "**/run.csv").exit_code == 0
 
 
@@ -427,43 +456,45 @@ def test_no_changed_byte_of_a_resume_file_gives_another_row(tmp_path: Path) -> N
     row = ask(question, ENERGY)
     Ledger(str(file), question).add(row)
     content = bytearray(file.read_bytes())
-    for place in range(11, len(content) - 1, 7):
-        content[place] ^= 1
+    for byte_index in range(11, len(content) - 1, 7):
+        content[byte_index] ^= 1
         file.write_bytes(content)
         assert Ledger(str(file), question).find(ENERGY) is None
-        content[place] ^= 1
+        content[byte_index] ^= 1
 
 
 def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
     times = [0.0, 0.125, 0.25, 0.375, 0.5]
     contents = {
-        "one": glstat_text(times, [0, 10, 20, 30, 40]),
-        "copy": glstat_text(times, [0, 10, 20, 30, 40]),
-        "other": glstat_text(times, [0, 10, 21, 30, 40]),
-        "restart": glstat_text(
+        "one": make_glstat_text(times, [0, 10, 20, 30, 40]),
+        "copy": make_glstat_text(times, [0, 10, 20, 30, 40]),
+        "other": make_glstat_text(times, [0, 10, 21, 30, 40]),
+        "restart": make_glstat_text(
             times[2:], [20, 35, 45]
         ),  # another way from the state it begins with
-        "restart of another": glstat_text(times[2:], [25, 35, 45]),
-        "parts": matsum_text(times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]),
-        "other parts": matsum_text(
+        "restart of another": make_glstat_text(times[2:], [25, 35, 45]),
+        "parts": make_matsum_text(
+            times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]
+        ),
+        "other parts": make_matsum_text(
             times, [7, 3], [[0, 0], [1, 1], [2, 5], [3, 3], [4, 4]]
         ),
     }
     names = {name: tmp_path / name for name in contents}
     for name, content in contents.items():
         names[name].write_bytes(content)
-    for one, other, legs in (
+    for first_file, second_file, legs in (
         ("one", "copy", True), ("one", "other", False), ("one", "restart", True),
         ("one", "restart of another", False), ("parts", "other parts", False), ("parts", "parts", True),
     ):  # fmt: skip
-        for pair in ((one, other), (other, one)):
+        for pair in ((first_file, second_file), (second_file, first_file)):
             result = run("info", *(str(names[name]) for name in pair))
             assert ("different energies at the same times" in result.stderr) is not legs
             assert result.exit_code == (0 if legs else 2)
 
 
 def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
-    """Of no common column no state would be left, as if the run had written none."""
+    """If they have no common column, no state is left, as if the run had written none."""
     for name, head in (
         ("one", "time,internal_energy"),
         ("other", "time,force"),
@@ -472,11 +503,13 @@ def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> N
         start = 4 if name == "leg" else 0
         rows = [f"{start + i},{i + 1}" for i in range(4)]
         (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows, ""]))
-    one, other, leg = (
+    first_file, second_file, leg = (
         str(tmp_path / f"{name}.csv") for name in ("one", "other", "leg")
     )
-    assert "neither a column nor a part in common" in refused("info", one, other)
-    assert run("info", one, leg).exit_code == 0
+    assert "neither a column nor a part in common" in read_refusal(
+        "info", first_file, second_file
+    )
+    assert run("info", first_file, leg).exit_code == 0
 
 
 SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
@@ -484,10 +517,10 @@ ODD = {
     "binout": bytes(made_binout(range(1, 9)).data).replace(
         np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
     ),  # a time
-    "T01": bytes(t01(8).data).replace(
-        np.array(value(3, 0, 1), ">f4").tobytes(), SIGNALLING
+    "T01": bytes(make_t01(8).data).replace(
+        np.array(make_value(3, 0, 1), ">f4").tobytes(), SIGNALLING
     ),  # an energy
-    "matsum": matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
+    "matsum": make_matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
         b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
     ),
 }
@@ -513,7 +546,7 @@ def test_numbers_whose_squares_overflow_reach_no_warning_of_the_machine(
 
 
 def test_a_number_of_too_many_digits_is_no_part() -> None:
-    assert "no part" in refused(
+    assert "no part" in read_refusal(
         "suggest", "--td", "0.1", "--part", "9" * 5000, "sample_data/rolloverT01.gz"
     )
 
@@ -521,9 +554,11 @@ def test_a_number_of_too_many_digits_is_no_part() -> None:
 def test_lines_of_another_state_are_refused() -> None:
     content = Path(GLSTAT).read_bytes()
     begin = content.index(b" internal energy", len(content) // 2)
-    other = content.index(b" kinetic energy")
+    label_index = content.index(b" kinetic energy")
     broken = (
-        content[: begin + 28] + content[other : other + 120] + content[begin + 40 :]
+        content[: begin + 28]
+        + content[label_index : label_index + 120]
+        + content[begin + 40 :]
     )
     refused = run("suggest", "--td", "0.064", "-", stdin=broken)
     assert refused.exit_code == 2
@@ -533,8 +568,8 @@ def test_lines_of_another_state_are_refused() -> None:
 def test_a_loop_of_links_in_place_of_a_file_to_write_is_told(tmp_path: Path) -> None:
     loop = tmp_path / "loop.csv"
     loop.symlink_to(loop)
-    assert f"{loop}: cannot be written" in one_line(
-        child('d2rpick extract "$@"', ENERGY, "-o", loop)
+    assert f"{loop}: cannot be written" in read_one_line(
+        run_in_shell('d2rpick extract "$@"', ENERGY, "-o", loop)
     )
 
 
@@ -547,4 +582,4 @@ def test_a_device_that_never_ends_is_refused(
 ) -> None:
     if not Path(device).exists():
         pytest.skip(f"no {device} here")
-    assert f"{device}: this is a device" in refused(*command, device)
+    assert f"{device}: this is a device" in read_refusal(*command, device)

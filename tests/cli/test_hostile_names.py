@@ -1,4 +1,4 @@
-"""Names that hold control codes, markup, and what shells, spreadsheets and terminals act on, in every output."""
+"""Names with control codes, markup, and characters special to shells, spreadsheets and terminals, in every output."""
 
 import csv
 import html
@@ -62,19 +62,19 @@ FORMS = {
 CHECKS = ("table", "json", "ndjson", "github", "junit", "sarif")
 
 
-def unseen(text: str) -> set[str]:
-    """What of a text is not seen on a terminal, or commands it."""
+def find_unseen(text: str) -> set[str]:
+    """Return the characters of a text that a terminal does not show, or executes."""
     return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {
         "\n"
     }
 
 
-def given_back(line: str) -> list[bytes]:
-    """Words of a command line as a shell takes them."""
-    found = subprocess.run(
+def split_by_shell(line: str) -> list[bytes]:
+    """Return the words of a command line as a shell reads them."""
+    process = subprocess.run(
         ["bash", "-c", f"printf '%s\\0' {line}"], capture_output=True, check=True
     ).stdout
-    return found.split(b"\0")[:-1]
+    return process.split(b"\0")[:-1]
 
 
 def test_a_shell_gives_back_the_words_of_a_command() -> None:
@@ -90,7 +90,7 @@ def test_a_shell_gives_back_the_words_of_a_command() -> None:
     assert not re.search(
         r"(?<!\\)(\\\\)*\\x", line
     )  # whose end not all shells see alike where a digit follows
-    assert given_back(line) == [os.fsencode(word) for word in words]
+    assert split_by_shell(line) == [os.fsencode(word) for word in words]
 
 
 def test_files_that_begin_with_a_dash_are_typed_behind_two() -> None:
@@ -103,15 +103,19 @@ def test_json_gives_a_name_back_in_signs_that_are_seen(name: str) -> None:
     for indent in (2, None):
         text = as_json({name: [name]}, indent)
         assert json.loads(text) == {name: [name]}
-        assert not unseen(text)
+        assert not find_unseen(text)
 
 
 @given(st.text(max_size=40), st.text(max_size=40))
-def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> None:
-    rows = as_markdown(["a", "b"], [[one, other]]).split("\n")[2:]
+def test_a_name_stays_in_its_cell_of_a_markdown_table(
+    first_name: str, second_name: str
+) -> None:
+    rows = as_markdown(["a", "b"], [[first_name, second_name]]).split("\n")[2:]
     assert len(rows) == 1
     assert re.sub(r"\\.", "", rows[0]).count("|") == 3
-    assert re.sub(r"\\([\\|<*\[~&_])", r"\1", in_markdown(one)) == make_printable(one)
+    assert re.sub(
+        r"\\([\\|<*\[~&_])", r"\1", in_markdown(first_name)
+    ) == make_printable(first_name)
 
 
 @pytest.mark.slow
@@ -123,7 +127,7 @@ def test_answers_name_a_file_without_control_codes(
     for form in FORMS[command]:
         result = run(*command, "-f", form, "--", NAME)
         assert result.exit_code == 0, result.stderr
-        assert not unseen(result.stdout + result.stderr)
+        assert not find_unseen(result.stdout + result.stderr)
         if "json" in form:
             documents = [
                 json.loads(line)
@@ -164,15 +168,15 @@ def test_a_spreadsheet_computes_no_name(name: str, here: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")]
+    "arguments", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")]
 )
 def test_refusals_name_a_file_without_control_codes(
-    asked: tuple[str, ...], here: Path
+    arguments: tuple[str, ...], here: Path
 ) -> None:
     shutil.copy(ENERGY, here / NAME)
-    result = run("suggest", *asked, "--", NAME)
+    result = run("suggest", *arguments, "--", NAME)
     assert make_printable(NAME) in result.stderr
-    assert not unseen(result.stderr)
+    assert not find_unseen(result.stderr)
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
@@ -187,7 +191,7 @@ def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(
         1,
         form != "csv",
     )
-    assert not unseen(result.stdout + result.stderr)
+    assert not find_unseen(result.stdout + result.stderr)
     assert form != "markdown" or not re.search(r"(?<!\\)<script", result.stdout)
 
 
@@ -200,7 +204,7 @@ def test_findings_name_a_deck_and_a_history_without_control_codes(
     shutil.copy(DECK, here / deck)
     result = run("check", "-f", form, "--history", NAME, "--", deck, f"no{NAME}")
     assert result.exit_code == 1
-    assert not unseen(result.stdout + result.stderr)
+    assert not find_unseen(result.stdout + result.stderr)
     assert result.stderr.count("\n") == result.stderr.count("d2rpick: ")
     if form in ("json", "sarif"):
         json.loads(result.stdout)
@@ -229,7 +233,7 @@ def test_cards_settings_and_messages_are_text(name: str, here: Path) -> None:
         run("study", "--td", "1", "--", f"no{name}"), run("study", "--td", "9", "--jobs", "1", "--", name),
     ):  # fmt: skip
         assert "internal error" not in result.stderr
-        assert not unseen(result.stdout + result.stderr)
+        assert not find_unseen(result.stdout + result.stderr)
 
 
 @pytest.mark.slow
@@ -259,22 +263,22 @@ def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
             )
         ]
         repeated = [line for line in lines if line.startswith(f"d2rpick {command[0]}")]
-        assert given_back(repeated[-1])[-1] == os.fsencode(name)
+        assert split_by_shell(repeated[-1])[-1] == os.fsencode(name)
     counts = [Tags.of(page) for page in pages.values()]
     assert counts[0] == counts[1]
-    assert not unseen(pages["hostile"]) & {*"\x1b\x9b\x85\u202e\u2066"}
+    assert not find_unseen(pages["hostile"]) & {*"\x1b\x9b\x85\u202e\u2066"}
 
 
 class Tags(HTMLParser):
-    """Counts elements and handlers."""
+    """Parser that counts elements and event handlers."""
 
     @classmethod
     def of(cls, page: str) -> dict[str, int]:
-        found = cls()
-        found.counts = {}
-        found.feed(page)
+        tags = cls()
+        tags.counts = {}
+        tags.feed(page)
         return {
-            name: found.counts.get(name, 0)
+            name: tags.counts.get(name, 0)
             for name in ("script", "img", "iframe", "style", "onload")
         }
 
@@ -297,7 +301,7 @@ def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(
 ) -> None:
     name = "run\u2028\x85\x0b\x1c.csv"
     shutil.copy(ENERGY, here / name)
-    found = run(
+    result = run(
         "study",
         "--jobs",
         "1",
@@ -309,7 +313,9 @@ def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(
         "-",
         stdin=f"{name}\r\n".encode(),
     )
-    assert [one["source"] for one in json.loads(found.stdout)["runs"]] == [name]
+    assert [one_run["source"] for one_run in json.loads(result.stdout)["runs"]] == [
+        name
+    ]
 
 
 def test_a_unit_is_no_formula_of_a_figure(here: Path) -> None:

@@ -1,4 +1,4 @@
-"""Where results go and in which form: formats, files, figures, colours, exit codes."""
+"""Destination and form of results: formats, files, figures, colours, exit codes."""
 
 import csv
 import hashlib
@@ -32,13 +32,13 @@ from tests.command import (
     OSCILLATOR,
     ROLLOVER,
     ROOT,
-    answer,
     put,
-    refused,
+    read_refusal,
     run,
-    started,
+    run_json,
+    start_program,
 )
-from tests.json_schemas import check_by_schema, checked
+from tests.json_schemas import check_by_schema, run_json_checked
 
 SUGGEST = ("suggest", "--td", "0.064")
 VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")
@@ -58,15 +58,15 @@ FORMATS = {
 }
 
 
-def rows_of(text: str) -> list[dict[str, Any]]:
-    """Rows of a CSV result with the types that JSON has."""
+def read_rows(text: str) -> list[dict[str, Any]]:
+    """Return the rows of a CSV result with the types of JSON."""
     return [
-        {key: _typed(key, cell) for key, cell in row.items()}
+        {key: _convert_cell(key, cell) for key, cell in row.items()}
         for row in csv.DictReader(io.StringIO(text))
     ]
 
 
-def _typed(key: str, cell: str) -> Any:
+def _convert_cell(key: str, cell: str) -> Any:
     if key in TEXTS:
         return cell
     return json.loads(cell) if cell else None
@@ -85,32 +85,34 @@ TEXTS = (
 def test_json_follows_the_schema_and_says_where_it_comes_from(
     args: tuple[str, ...],
 ) -> None:
-    found = checked(*args)
-    assert found["tool_version"] == __version__
-    assert found["command"] == [*args, "-f", "json"]
-    assert found["history"]["source"] == [args[-1]]
-    assert found["history"]["sha256"] == [
+    document = run_json_checked(*args)
+    assert document["tool_version"] == __version__
+    assert document["command"] == [*args, "-f", "json"]
+    assert document["history"]["source"] == [args[-1]]
+    assert document["history"]["sha256"] == [
         hashlib.sha256(Path(args[-1]).read_bytes()).hexdigest()
     ]
 
 
 @pytest.mark.parametrize("key", ["td", "candidates", "history", "warnings"])
 def test_the_schema_asks_for_what_scripts_rely_on(key: str) -> None:
-    found = answer(*SUGGEST, ENERGY)
-    del found[key]
+    document = run_json(*SUGGEST, ENERGY)
+    del document[key]
     with pytest.raises(jsonschema.ValidationError, match=key):
-        check_by_schema(found)
+        check_by_schema(document)
 
 
 @pytest.mark.parametrize("args", ANSWERS)
 def test_csv_holds_the_numbers_of_json_to_the_last_digit(args: tuple[str, ...]) -> None:
-    found, rows = answer(*args), rows_of(run(*args, "-f", "csv").stdout)
-    expected = found["candidates"] if args[0] == "suggest" else [found]
+    document, rows = run_json(*args), read_rows(run(*args, "-f", "csv").stdout)
+    expected = document["candidates"] if args[0] == "suggest" else [document]
     assert len(rows) == len(expected)
-    for row, one in zip(rows, expected, strict=True):
-        assert row.pop("td") == found["td"]
+    for row, json_row in zip(rows, expected, strict=True):
+        assert row.pop("td") == document["td"]
         assert row == {
-            key: "; ".join(one[key]) if isinstance(one[key], list) else one[key]
+            key: "; ".join(json_row[key])
+            if isinstance(json_row[key], list)
+            else json_row[key]
             for key in row
         }
     if args[0] == "suggest":
@@ -123,7 +125,7 @@ def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(
 ) -> None:
     text = run(*SUGGEST, "-f", "value", source).stdout
     assert text.endswith("\n")
-    assert float(text) == answer(*SUGGEST, source)["recommended"]["tr"]
+    assert float(text) == run_json(*SUGGEST, source)["recommended"]["tr"]
     assert text.strip() == repr(float(text))
 
 
@@ -133,7 +135,7 @@ def test_markdown_begins_with_the_verdict_and_has_a_table(
 ) -> None:
     verdict, *paragraphs = run(*args, "-f", "markdown").stdout.split("\n\n")
     assert re.match("(use|use with care|do not use|no pair to use): ", verdict)
-    table = next(one for one in paragraphs if one.startswith("|"))
+    table = next(paragraph for paragraph in paragraphs if paragraph.startswith("|"))
     head, rule, *rows = [
         line.strip("|\n").split("|") for line in table.rstrip("\n").split("\n")
     ]
@@ -182,16 +184,16 @@ def test_whatever_the_energies_every_format_gives_one_answer(
         + "".join(f"{t!r},{e!r}\n" for t, e in zip(time.tolist(), energy, strict=True))
     )
     args = ("suggest", "--td", repr(float(share * time[-1])), "-q", str(file))
-    found = checked(*args)
+    document = run_json_checked(*args)
     results = {name: run(*args, "-f", name) for name in FORMATS["suggest"]}
     assert {result.exit_code for result in results.values()} == {
-        0 if found["recommended"] else 1
+        0 if document["recommended"] else 1
     }
-    assert [row["tr"] for row in rows_of(results["csv"].stdout)] == [
-        c["tr"] for c in found["candidates"]
+    assert [row["tr"] for row in read_rows(results["csv"].stdout)] == [
+        c["tr"] for c in document["candidates"]
     ]
     assert results["value"].stdout == (
-        f"{found['recommended']['tr']!r}\n" if found["recommended"] else ""
+        f"{document['recommended']['tr']!r}\n" if document["recommended"] else ""
     )
 
 
@@ -229,11 +231,11 @@ def test_warnings_go_to_stderr_and_quiet_silences_them_but_not_errors() -> None:
 
 def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
     cut = put(tmp_path / "cut.glstat", Path(GLSTAT).read_bytes()[:-40])
-    found, result = answer(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
-    assert found["history"]["complete"] is False
-    assert "truncated-input" in [warning["code"] for warning in found["warnings"]]
+    document, result = run_json(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
+    assert document["history"]["complete"] is False
+    assert "truncated-input" in [warning["code"] for warning in document["warnings"]]
     assert [
-        f"note: {note}" for note in found["history"]["notes"]
+        f"note: {note}" for note in document["history"]["notes"]
     ] == result.stderr.splitlines()[:1]
 
 
@@ -251,18 +253,18 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
 def test_what_stands_out_does_so_on_terminals_and_where_asked_for(
     args: tuple[str, ...], line: str, terminal: bool, tmp_path: Path
 ) -> None:
-    asked = {
+    styled_by_variables = {
         (): terminal,
         ("FORCE_COLOR",): True,
         ("NO_COLOR",): False,
         ("NO_COLOR", "FORCE_COLOR"): False,
     }
-    for names, coloured in asked.items():
-        shown = run(*args, color=terminal, env=dict.fromkeys(names, "1")).stdout
+    for names, coloured in styled_by_variables.items():
+        result = run(*args, color=terminal, env=dict.fromkeys(names, "1")).stdout
         assert (
-            bool(re.search(rf"(?m)^\x1b\[1m{line}", shown))
+            bool(re.search(rf"(?m)^\x1b\[1m{line}", result))
             == coloured
-            == ("\x1b" in shown)
+            == ("\x1b" in result)
         )
     file = tmp_path / "result.txt"
     run(*args, "-o", str(file), color=terminal, env={"FORCE_COLOR": "1"})
@@ -300,10 +302,10 @@ def test_a_file_is_replaced_only_when_that_was_asked_for(
     option: str, tmp_path: Path
 ) -> None:
     file = put(tmp_path / "result.svg", "kept")
-    assert "the file exists; give another one or --overwrite" in refused(
+    assert "the file exists; give another one or --overwrite" in read_refusal(
         *SUGGEST, ENERGY, option, str(file)
     )
-    assert "no such folder" in refused(
+    assert "no such folder" in read_refusal(
         *SUGGEST, ENERGY, option, str(tmp_path / "no" / "a.svg")
     )
     assert file.read_text() == "kept"
@@ -317,7 +319,7 @@ def test_a_file_is_replaced_only_when_that_was_asked_for(
 def test_an_input_is_never_written_to(option: str, spelling: str) -> None:
     Path("energy.svg").write_bytes(Path(ENERGY).read_bytes())
     Path("link.svg").symlink_to("energy.svg")
-    assert "this is an input" in refused(
+    assert "this is an input" in read_refusal(
         *SUGGEST, "energy.svg", option, spelling, "--overwrite"
     )
     assert Path("energy.svg").read_bytes() == Path(ENERGY).read_bytes()
@@ -331,8 +333,8 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
 
     file = put(tmp_path / "result.txt", "old")
     monkeypatch.setattr(Path, "replace", fail)
-    told = refused(*SUGGEST, ENERGY, "-q", "-o", str(file), "--overwrite")
-    assert told.startswith(f"{file}: cannot be written (Permission denied)")
+    message = read_refusal(*SUGGEST, ENERGY, "-q", "-o", str(file), "--overwrite")
+    assert message.startswith(f"{file}: cannot be written (Permission denied)")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
@@ -426,13 +428,13 @@ def test_no_recommendation_leaves_no_older_one_in_the_file(tmp_path: Path) -> No
 
 
 def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
-    told = "-f json writes what its name promises"
+    message = "-f json writes what its name promises"
     name = str(tmp_path / "answer.json")
     result = run("suggest", "--td", "0.0687534", "-o", name, ENERGY)
-    assert (result.exit_code, result.stderr.count(told)) == (0, 1)
-    for asked in (("-f", "json"), ("-f", "table"), ("-q",)):
+    assert (result.exit_code, result.stderr.count(message)) == (0, 1)
+    for options in (("-f", "json"), ("-f", "table"), ("-q",)):
         result = run(
-            "suggest", "--td", "0.0687534", "--overwrite", *asked, "-o", name, ENERGY
+            "suggest", "--td", "0.0687534", "--overwrite", *options, "-o", name, ENERGY
         )
         assert (result.exit_code, result.stderr) == (0, "")
     assert (
@@ -465,7 +467,7 @@ def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(
         ("-", "--report writes a file"),
         (str(tmp_path / "a.svg"), "--report and --plot are the same file"),
     ):
-        assert message in refused(
+        assert message in read_refusal(
             *SUGGEST, "--report", name, "--plot", str(tmp_path / "a.svg"), ENERGY
         )
     assert [*tmp_path.iterdir()] == []
@@ -476,26 +478,26 @@ PERIOD = 0.02
 
 
 class Terminal(io.StringIO):
-    """A stderr that is a terminal."""
+    """Stand-in for stderr that is a terminal."""
 
     def isatty(self) -> bool:
         return True
 
 
-def rest_of(terminal: int) -> bytes:
-    """What is left to be read where nobody writes any more."""
-    rest = b""
+def read_rest(terminal: int) -> bytes:
+    """Read what is left in a terminal that nobody writes to any more."""
+    output = b""
     with suppress(OSError):  # how Linux tells that the other end is closed
         while piece := os.read(terminal, 1000):
-            rest += piece
+            output += piece
     os.close(terminal)
-    return rest
+    return output
 
 
-def shown(
+def show_progress(
     stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False
 ) -> str:
-    """Give what is on ``stream`` after that many periods of reading."""
+    """Return the content of ``stream`` after this many periods of reading."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
         patch.setenv("COLUMNS", "40")
@@ -505,7 +507,7 @@ def shown(
 
 
 def test_a_line_counts_the_time_and_is_erased() -> None:
-    pieces = shown(Terminal(), ["glstat"], periods=10).split("\r")
+    pieces = show_progress(Terminal(), ["glstat"], periods=10).split("\r")
     assert pieces[0] == pieces[-1] == ""
     assert pieces[1] == "reading glstat ... 0 s"
     assert pieces[-2] == " " * len(pieces[-3])
@@ -513,7 +515,7 @@ def test_a_line_counts_the_time_and_is_erased() -> None:
 
 
 def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
-    long = shown(
+    long = show_progress(
         Terminal(), ["a/very/long/name/" * 5 + "binout0000", "b", "c"], periods=5
     ).split("\r")[1]
     assert long.endswith("/binout0000 and 2 more ... 0 s")
@@ -524,7 +526,7 @@ def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
 def test_nothing_is_shown_otherwise(case: str) -> None:
     stream = io.StringIO() if case == "no terminal" else Terminal()
     assert (
-        shown(
+        show_progress(
             stream,
             ["glstat"],
             periods=0 if case == "fast" else 5,
@@ -551,15 +553,15 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.slow
 def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     master, slave = pty.openpty()
-    with started(
+    with start_program(
         "info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave
     ) as process:
         os.close(slave)
         first = os.read(master, 1000)  # blocks until there is something
         result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)
-    rest = rest_of(master)
+    output = read_rest(master)
     assert first.startswith(b"\rreading standard input ... 1 s")
-    assert rest.endswith(b" \r")
+    assert output.endswith(b" \r")
     assert process.returncode == 0
     assert result.startswith(b"source,format,")
 
@@ -569,25 +571,25 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
 def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> None:
     master, slave = pty.openpty()
     options = ["--quiet"] if quiet else []
-    with started(
+    with start_program(
         "rollover", "--scan", "--mesh", "4", "--jobs", "2", *options, stderr=slave
     ) as process:
         os.close(slave)
-        told = b""
+        terminal_text = b""
         if quiet:
             time.sleep(2.5)  # others have told something by now
-        while not quiet and b" runs" not in told:
-            told += os.read(master, 1000)
+        while not quiet and b" runs" not in terminal_text:
+            terminal_text += os.read(master, 1000)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
         process.communicate(timeout=30)
-    told += rest_of(master)
+    terminal_text += read_rest(master)
     assert process.returncode == -signal.SIGINT
-    assert b"Traceback" not in told
-    assert told.endswith(b"d2rpick: interrupted\r\n")
+    assert b"Traceback" not in terminal_text
+    assert terminal_text.endswith(b"d2rpick: interrupted\r\n")
     assert (
-        told == b"\r\nd2rpick: interrupted\r\n"
+        terminal_text == b"\r\nd2rpick: interrupted\r\n"
         if quiet
-        else re.search(rb"\r\d+ of \d+ runs[,\r]", told)
+        else re.search(rb"\r\d+ of \d+ runs[,\r]", terminal_text)
     )
 
 
@@ -664,11 +666,13 @@ def test_an_error_ends_where_the_terminal_does() -> None:
         run(*args, env={"COLUMNS": "80"}).stderr.count("\n") == 1
     )  # a log is no terminal
     master, slave = pty.openpty()
-    with started(*args, stderr=slave, env={**os.environ, "COLUMNS": "80"}) as process:
+    with start_program(
+        *args, stderr=slave, env={**os.environ, "COLUMNS": "80"}
+    ) as process:
         os.close(slave)
         process.wait(timeout=30)
     assert (
-        max(map(len, rest_of(master).decode().replace(str(ROOT), "").splitlines()))
+        max(map(len, read_rest(master).decode().replace(str(ROOT), "").splitlines()))
         <= 80
     )
 
@@ -700,8 +704,8 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
 
 def test_a_td_that_was_given_is_answered_however_poor_and_none_is_chosen_so() -> None:
     poor = ("--max-residual", "2", ENERGY)
-    given = run(*SUGGEST, *poor)
+    result = run(*SUGGEST, *poor)
     chosen = run("suggest", "--td-window", "0.063", "0.065", *poor)
-    for answered in (given, chosen):
+    for answered in (result, chosen):
         assert answered.stdout.startswith("do not use  tr = ")
-    assert (given.exit_code, chosen.exit_code) == (0, 1)
+    assert (result.exit_code, chosen.exit_code) == (0, 1)

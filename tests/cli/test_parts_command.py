@@ -1,4 +1,4 @@
-"""The commands ``parts`` and ``calibrate`` in all their forms, and ``--deck`` where a cost share was asked for."""
+"""The commands ``parts`` and ``calibrate`` in all formats, and ``--deck`` instead of a cost share."""
 
 import csv
 import io
@@ -11,8 +11,8 @@ import d2rpick as d2
 from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
-from tests.command import ENERGY, MATSUM, answer, put, refused, run
-from tests.json_schemas import checked
+from tests.command import ENERGY, MATSUM, put, read_refusal, run, run_json
+from tests.json_schemas import run_json_checked
 from tests.sample_deck import DECK
 
 pytestmark = pytest.mark.usefixtures("by_level")
@@ -25,17 +25,17 @@ WITH_DECK = ("--deck", str(DECK), MATSUM)
     [WITH_DECK, (MATSUM,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)],
 )
 def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
-    found = checked("parts", *args)
-    assert (found["deck"] is None) == ("--deck" not in args)
+    part_table = run_json_checked("parts", *args)
+    assert (part_table["deck"] is None) == ("--deck" not in args)
 
 
 def test_all_forms_hold_the_same() -> None:
     parts = d2.parts(d2.read(MATSUM), deck=DECK)
-    found = parts.to_dict()
+    document = parts.to_dict()
     rows = list(csv.DictReader(io.StringIO(parts.text("csv", Shown()))))
     assert (
         [row["verdict"] for row in rows]
-        == [row["verdict"] for row in found["parts"]]
+        == [row["verdict"] for row in document["parts"]]
         == ["switch", "merge", "keep"]
     )
     assert rows[0]["elements"] == "94 shell"
@@ -51,13 +51,15 @@ def test_all_forms_hold_the_same() -> None:
                 "one rigid body",
             )
         )
-    assert found["recommended"]["parts"] == [1, 2]
+    assert document["recommended"]["parts"] == [1, 2]
 
 
 @pytest.mark.parametrize("word", ["flying", "all"])
 def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
-    found = answer("parts", "--part", word, MATSUM)
-    assert [(one["name"], one["parts"]) for one in found["sets"]] == [("given", [1, 2])]
+    part_table = run_json("parts", "--part", word, MATSUM)
+    assert [
+        (part_set["name"], part_set["parts"]) for part_set in part_table["sets"]
+    ] == [("given", [1, 2])]
 
 
 def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
@@ -79,18 +81,18 @@ def test_without_a_set_to_take_every_form_is_an_objection() -> None:
 
 def test_a_set_of_ones_own_is_compared() -> None:
     sets = {
-        tuple(one["parts"]): one
-        for one in answer("parts", "--part", "step", *WITH_DECK)["sets"]
+        tuple(part_set["parts"]): part_set
+        for part_set in run_json("parts", "--part", "step", *WITH_DECK)["sets"]
     }
     assert sets[(2,)]["saving"] < sets[(1,)]["saving"] < sets[(1, 2)]["saving"]
 
 
 def test_a_given_window_and_step_ratio_count() -> None:
-    found = answer(
+    part_table = run_json(
         "parts", "--tr", "0.1", "--td", "0.3", "--step-ratio", "2", *WITH_DECK
     )
-    best = found["sets"][0]
-    assert (best["tr"], best["td"], found["step_ratio"]) == (0.1, 0.3, 2.0)
+    best = part_table["sets"][0]
+    assert (best["tr"], best["td"], part_table["step_ratio"]) == (0.1, 0.3, 2.0)
     share = best["rigid_fraction"] * (1 - (1 - best["cost_share"]) / 2)
     assert best["saving"] == pytest.approx(share)
 
@@ -109,22 +111,24 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
 def test_where_nothing_can_be_recommended_the_answer_is_an_objection(
     tmp_path: Path,
 ) -> None:
-    other = put(
+    other_deck = put(
         tmp_path / "main.k",
         DECK.read_text("utf-8").replace(
             "         1         2       1.0", "         1        99       1.0"
         ),
     )
-    result = run("parts", "--deck", str(other), MATSUM)
+    result = run("parts", "--deck", str(other_deck), MATSUM)
     assert result.exit_code == 1
     assert "no weight is known for shell (ELFORM 99)" in result.stdout
-    assert run("parts", "--exit-zero", "--deck", str(other), MATSUM).exit_code == 0
+    assert run("parts", "--exit-zero", "--deck", str(other_deck), MATSUM).exit_code == 0
     weights = put(
         tmp_path / "site.toml",
         '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n',
     )
     assert (
-        run("parts", "--deck", str(other), "--weights", str(weights), MATSUM).exit_code
+        run(
+            "parts", "--deck", str(other_deck), "--weights", str(weights), MATSUM
+        ).exit_code
         == 0
     )
 
@@ -139,15 +143,17 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(
     ],
 )
 def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> None:
-    def share(*more: str) -> float:
-        text = run(*command, "--no-verify", "-q", "-f", "json", *more, MATSUM).stdout
-        found = json.loads(text)
-        rows = found.get("windows") or found.get("candidates") or [found]
+    def share(*extra_options: str) -> float:
+        text = run(
+            *command, "--no-verify", "-q", "-f", "json", *extra_options, MATSUM
+        ).stdout
+        document = json.loads(text)
+        rows = document.get("windows") or document.get("candidates") or [document]
         return float(
             next(row["run_time_share"] for row in rows if row.get("recommended", True))
         )
 
-    cost = answer("parts", *WITH_DECK)["sets"][0]["cost_share"]
+    cost = run_json("parts", *WITH_DECK)["sets"][0]["cost_share"]
     by_deck = share("--part", "1,2", "--deck", str(DECK))
     assert by_deck == pytest.approx(share("--part", "1,2", "--cost-share", str(cost)))
     assert share("--part", "recommended", "--deck", str(DECK)) == by_deck
@@ -158,10 +164,12 @@ def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> Non
 
 @pytest.mark.parametrize("command", ["parts", "plan", "suggest"])
 def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
-    own = put(tmp_path / "main.k", DECK.read_bytes())
-    asked = (command, "--part", "1", "--deck", str(own), MATSUM)
-    assert "this is an input" in refused(*asked, "-o", str(own), "--overwrite")
-    assert own.read_bytes() == DECK.read_bytes()
+    own_deck = put(tmp_path / "main.k", DECK.read_bytes())
+    arguments = (command, "--part", "1", "--deck", str(own_deck), MATSUM)
+    assert "this is an input" in read_refusal(
+        *arguments, "-o", str(own_deck), "--overwrite"
+    )
+    assert own_deck.read_bytes() == DECK.read_bytes()
 
 
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
@@ -169,22 +177,24 @@ def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
         tmp_path / "main.k",
         DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"),
     )
-    found = checked("plan", "--part", "1,2", "--deck", str(cut), MATSUM)
-    assert found["run_time_share"] is None
+    plan_answer = run_json_checked("plan", "--part", "1,2", "--deck", str(cut), MATSUM)
+    assert plan_answer["run_time_share"] is None
     assert "absent.k was not read" in next(
-        one["message"] for one in found["warnings"] if one["code"] == "cost-unknown"
+        warning["message"]
+        for warning in plan_answer["warnings"]
+        if warning["code"] == "cost-unknown"
     )
-    whole = answer("suggest", "--td", "0.37", *WITH_DECK)
+    whole = run_json("suggest", "--td", "0.37", *WITH_DECK)
     assert "cost-unknown" in [
-        one["code"] for one in whole["warnings"]
+        warning["code"] for warning in whole["warnings"]
     ]  # no parts are named
 
 
 def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     folder = str(run_folder(tmp_path / "run"))
-    found = checked("calibrate", folder)
-    assert found["told"]
+    document = run_json_checked("calibrate", folder)
+    assert document["told"]
     for form in ("table", "markdown", "csv"):
         assert "QEPH" in run("calibrate", "-f", form, folder).stdout
     site = tmp_path / "site.toml"
@@ -202,18 +212,21 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "asked",
+    "arguments",
     [
         ("parts",), ("suggest", "--td", "0.37"), ("plan",), ("verify", "--tr", "0.097", "--td", "0.37"),
         ("explore", "--td-window", "0.3", "0.37", "--steps", "2"),
     ],
 )  # fmt: skip
 def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
-    asked: tuple[str, ...], tmp_path: Path
+    arguments: tuple[str, ...], tmp_path: Path
 ) -> None:
     def codes(*args: str) -> set[str]:
-        part = ("--no-verify", *(() if asked[0] == "parts" else ("--part", "box")))
-        return {one["code"] for one in answer(*asked, *part, *args)["warnings"]}
+        part = ("--no-verify", *(() if arguments[0] == "parts" else ("--part", "box")))
+        return {
+            warning["code"]
+            for warning in run_json(*arguments, *part, *args)["warnings"]
+        }
 
     assert codes(*WITH_DECK) >= {"weights-by-analogy"}
     deck = put(
@@ -222,13 +235,13 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
     )
     doubts = codes("--deck", str(deck), MATSUM)
     assert "deck-not-followed" in doubts
-    if asked[0] != "parts":
+    if arguments[0] != "parts":
         assert "cost-unknown" in doubts
         assert "weights-by-analogy" not in codes("--cost-share", "0.5", *WITH_DECK)
 
 
 def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
-    """Else `check` finds nodes that two rigid bodies own, D2R108."""
+    """Otherwise `check` finds nodes that belong to two rigid bodies (D2R108)."""
     result = run(
         "plan",
         "-q",

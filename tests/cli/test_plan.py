@@ -1,4 +1,4 @@
-"""The command ``plan`` in all its forms."""
+"""The command ``plan`` in all formats."""
 
 import json
 from pathlib import Path
@@ -7,10 +7,10 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.report.formats import Shown
-from tests.command import ENERGY, answer, put, refused, run
-from tests.computed import starter, stored
-from tests.drops import drop, written
-from tests.json_schemas import check_by_schema, checked
+from tests.command import ENERGY, put, read_refusal, run, run_json
+from tests.computed import locate_stored, read_starter
+from tests.drops import drop, write_run_files
+from tests.json_schemas import check_by_schema, run_json_checked
 
 pytestmark = pytest.mark.slow
 FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
@@ -23,42 +23,47 @@ PART = (
 
 @pytest.fixture(scope="module")
 def history(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    return written(drop(interval=FINE), tmp_path_factory.mktemp("run"))
+    return write_run_files(drop(interval=FINE), tmp_path_factory.mktemp("run"))
 
 
 def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     plan = d2.plan(d2.read(history), parts="box", replay=False, min_quality="poor")
-    found = plan.to_dict()
-    check_by_schema(found)
+    document = plan.to_dict()
+    check_by_schema(document)
     supported = [
         (row["tr"], row["td"])
-        for row in found["windows"]
+        for row in document["windows"]
         if row["status"] == "supported"
     ]
-    every = [
-        (row["tr"], row["td"]) for row in found["windows"] if row["tr"] is not None
+    all_windows = [
+        (row["tr"], row["td"]) for row in document["windows"] if row["tr"] is not None
     ]
     assert all(
-        (row["quality"] is None) is (row["tr"] is None) for row in found["windows"]
+        (row["quality"] is None) is (row["tr"] is None) for row in document["windows"]
     )
-    assert 1 < len(supported) < len(every)
+    assert 1 < len(supported) < len(all_windows)
     values = run("plan", "-q", "-f", "value", "--all", *PART, *history).stdout
-    for text, wanted in ((plan.text("value", Shown()), supported), (values, every)):
+    for text, wanted in (
+        (plan.text("value", Shown()), supported),
+        (values, all_windows),
+    ):
         assert [
             tuple(map(float, line.split(" "))) for line in text.splitlines()
         ] == wanted
     table = plan.text("csv", Shown())
-    assert [row["td"] for row in csv_rows(table)] == [
-        row["td"] for row in found["windows"]
+    assert [row["td"] for row in read_csv_rows(table)] == [
+        row["td"] for row in document["windows"]
     ]
     for form in ("table", "markdown"):
         text = plan.text(form, Shown())
-        assert all(f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in every)
+        assert all(
+            f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in all_windows
+        )
         assert "plan this one from the run switched so" in " ".join(text.split())
 
 
-def csv_rows(text: str) -> list[dict[str, object]]:
-    """Rows of the csv, numbers as numbers."""
+def read_csv_rows(text: str) -> list[dict[str, object]]:
+    """Return the rows of a csv, with numbers as numbers."""
     import csv
     import io
 
@@ -73,14 +78,14 @@ def csv_rows(text: str) -> list[dict[str, object]]:
 
 
 def test_a_poor_window_is_called_poor() -> None:
-    """A level that matches is not all: most of the vibration may be kinetic at td."""
-    box = stored("drop2T01.gz")
+    """The level may match while most of the vibration is kinetic at td."""
+    box = locate_stored("drop2T01.gz")
     plan = d2.plan(d2.read(box), parts="all")
-    found = plan.to_dict()
-    rows = [row for row in found["windows"] if row["status"] == "supported"]
+    document = plan.to_dict()
+    rows = [row for row in document["windows"] if row["status"] == "supported"]
     assert [row["quality"] for row in rows] == ["good", "poor"]
     for row in rows:
-        alone = answer(
+        alone = run_json(
             "suggest",
             "--part",
             "all",
@@ -106,7 +111,7 @@ def test_the_card_holds_the_supported_windows_and_passes_check(
     windows = json.loads(run("check", "-q", "-f", "json", str(card)).stdout)["windows"]
     lines = run("plan", "-q", "-f", "value", *PART, *history).stdout.split()
     assert [
-        time for one in windows for time in (one["tr"], one["td"])
+        time for window in windows for time in (window["tr"], window["td"])
     ] == pytest.approx(list(map(float, lines)), abs=1e-7)
 
 
@@ -154,8 +159,8 @@ def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
 
 
 def test_one_oscillator_is_one_flight() -> None:
-    found = answer("plan", ENERGY)
-    (row,) = found["windows"]
+    plan_answer = run_json("plan", ENERGY)
+    (row,) = plan_answer["windows"]
     assert (row["status"], row["basis"], row["margin_source"]) == (
         "supported",
         "oscillator",
@@ -165,10 +170,10 @@ def test_one_oscillator_is_one_flight() -> None:
 
 
 def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
-    file = stored("drop2T01.gz")
-    asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
-    told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
-    assert told.endswith(
+    file = locate_stored("drop2T01.gz")
+    arguments = ("--part", "flying", "--tr", "0", "--td", "0.27")
+    result = run("verify", "-q", *arguments, file).stdout.splitlines()[0]
+    assert result.endswith(
         "by the energy level alone: tr lies in the flight, and nothing vibrates there"
     )
     chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
@@ -178,7 +183,7 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
         "-q",
         "--part",
         "1",
-        *asked[2:],
+        *arguments[2:],
         "--solver",
         "ls-dyna",
         "--history",
@@ -197,31 +202,45 @@ def test_the_next_window_is_planned_from_the_switched_run(
         (float(tr), float(td))
         for tr, td in map(str.split, done.read_text().splitlines())
     ]
-    switched = written(drop(*windows, interval=FINE), tmp_path / "next")
-    before = [text for name in history for text in ("--before", name)]
-    found = checked("plan", *PART, "--done", str(done), *before, *switched)
+    switched = write_run_files(drop(*windows, interval=FINE), tmp_path / "next")
+    before_options = [text for name in history for text in ("--before", name)]
+    plan_answer = run_json_checked(
+        "plan", *PART, "--done", str(done), *before_options, *switched
+    )
     assert [
-        (row["tr"], row["td"]) for row in found["windows"] if row["status"] == "done"
+        (row["tr"], row["td"])
+        for row in plan_answer["windows"]
+        if row["status"] == "done"
     ] == windows
     assert all(
         row["landing"] > row["td"]
-        for row in found["windows"]
+        for row in plan_answer["windows"]
         if row["status"] == "done"
     )
-    told = run("plan", "-q", *PART, "--done", str(done), *before, *switched).stdout
-    assert "as planned" in told
-    assert "than planned" in told
-    assert "run from the start with those that are done and these" in told
+    result = run(
+        "plan", "-q", *PART, "--done", str(done), *before_options, *switched
+    ).stdout
+    assert "as planned" in result
+    assert "than planned" in result
+    assert "run from the start with those that are done and these" in result
     new = [
         (row["tr"], row["td"])
-        for row in found["windows"]
+        for row in plan_answer["windows"]
         if row["status"] == "supported"
     ]
     lines = run(
-        "plan", "-q", "-f", "value", *PART, "--done", str(done), *before, *switched
+        "plan",
+        "-q",
+        "-f",
+        "value",
+        *PART,
+        "--done",
+        str(done),
+        *before_options,
+        *switched,
     ).stdout.splitlines()
     assert [tuple(map(float, line.split())) for line in lines] == [*windows, *new]
-    assert "said to be done" in refused(
+    assert "said to be done" in read_refusal(
         "plan", "-q", *PART, "--done", str(done), *history
     )
 
@@ -229,7 +248,7 @@ def test_the_next_window_is_planned_from_the_switched_run(
 def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
     history: list[str], tmp_path: Path
 ) -> None:
-    """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
+    """The next run starts from the beginning; a run that was rigid in a finished window cannot be used to judge it."""
     done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
@@ -237,7 +256,7 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
         (float(tr), float(td))
         for tr, td in map(str.split, done.read_text().splitlines())
     ]
-    switched = written(drop(*windows, interval=FINE), tmp_path / "switched")
+    switched = write_run_files(drop(*windows, interval=FINE), tmp_path / "switched")
     args = ("plan", "-q", *PART, "--done", str(done))
     card = run(*args, "-f", "card", *switched)
     assert card.exit_code == 0
@@ -246,9 +265,11 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
     result = run(*args, "--deck", str(main), "--write-deck", str(folder), *switched)
     assert result.exit_code == 0, result.stdout
     assert "0 errors, 0 warnings" in result.stdout
-    found = json.loads(run("check", "-q", "-f", "json", str(folder / "main.k")).stdout)
-    times = [(one["tr"], one["td"]) for one in found["windows"]]
-    assert times[:-1] == [pytest.approx(one, abs=1e-7) for one in windows]
+    document = json.loads(
+        run("check", "-q", "-f", "json", str(folder / "main.k")).stdout
+    )
+    times = [(window["tr"], window["td"]) for window in document["windows"]]
+    assert times[:-1] == [pytest.approx(window, abs=1e-7) for window in windows]
     assert times[-1][0] > windows[-1][1]
     nothing = run(*args, "-f", "card", "--min-rigid", "1", *switched)
     assert (nothing.exit_code, nothing.stdout) == (1, "")
@@ -257,12 +278,12 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
 def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
     tmp_path: Path,
 ) -> None:
-    """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
+    """The first fall of the falling box is free, so the reference can stand in for a run switched there."""
     name, node = "DROP2", "535"
-    deck = put(tmp_path / f"{name}_0000.rad", starter("DROP2"))
+    deck = put(tmp_path / f"{name}_0000.rad", read_starter("DROP2"))
     engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"
     (tmp_path / f"{name}_0001.rad").write_text(engine)
-    history, done = stored("drop2T01.gz"), tmp_path / "done.txt"
+    history, done = locate_stored("drop2T01.gz"), tmp_path / "done.txt"
     done.write_text("0.0 0.277\n")
     args = (
         "plan",
@@ -275,8 +296,11 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         str(deck),
         "--write-deck",
     )
-    for folder, more in ((tmp_path / "a", ()), (tmp_path / "b", ("--done", str(done)))):
-        result = run(*args, str(folder), *more, history)
+    for folder, options in (
+        (tmp_path / "a", ()),
+        (tmp_path / "b", ("--done", str(done))),
+    ):
+        result = run(*args, str(folder), *options, history)
         assert result.exit_code == 0, result.stdout
         assert "0 errors, 0 warnings" in result.stdout
         names = [f"{name}_{leg:04d}.rad" for leg in range(5)]
@@ -286,7 +310,7 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         assert ["/RBODY/ON" in leg for leg in legs] == [True, False, True, False]
         assert all("/TFILE/4" in leg for leg in legs)
     assert legs[0].splitlines()[1].strip() == "0.277"
-    lacking = starter("DROP2").partition(b"/RBODY")
+    lacking = read_starter("DROP2").partition(b"/RBODY")
     deck.write_bytes(lacking[0] + lacking[2][lacking[2].index(b"/SURF") :])
     (tmp_path / f"{name}_0001.rad").write_text(
         engine.replace(f"/RBODY/OFF\n{node}\n", "")
@@ -344,8 +368,10 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(
         *(text for name in history for text in ("--history", name)),
     )
     assert judged.exit_code == 0, judged.stdout
-    assert "the file exists; choose another folder or --overwrite" in refused(*args)
+    assert "the file exists; choose another folder or --overwrite" in read_refusal(
+        *args
+    )
     assert run(*args, "--overwrite").exit_code == 0
-    assert "--write-deck needs --deck" in refused(
+    assert "--write-deck needs --deck" in read_refusal(
         "plan", "--part", "box", "--write-deck", str(folder), *history
     )

@@ -1,4 +1,4 @@
-"""The position error in what suggest, verify and plan write, of a car that a solver computed."""
+"""The position error in the output of suggest, verify and plan, for a computed car."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,9 +12,9 @@ from d2rpick.api.request import Request
 from d2rpick.choice.question import Settings
 from d2rpick.histories.names import Selection
 from d2rpick.report.formats import Shown
-from tests.command import answer, put, run, unwrapped
-from tests.computed import starter, stored
-from tests.json_schemas import check_by_schema, checked
+from tests.command import join_wrapped_lines, put, run, run_json
+from tests.computed import locate_stored, read_starter
+from tests.json_schemas import check_by_schema, run_json_checked
 from tests.sample_deck import DECK
 
 pytestmark = [pytest.mark.usefixtures("by_level"), pytest.mark.slow]
@@ -22,14 +22,14 @@ pytestmark = [pytest.mark.usefixtures("by_level"), pytest.mark.slow]
 ONE_BODY = "the parts become one rigid body"
 
 
-def car() -> str:
-    return stored("carT01.gz")
+def locate_car() -> str:
+    return locate_stored("carT01.gz")
 
 
 def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(
     tmp_path: Path,
 ) -> None:
-    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
     model = model_of(Request(deck=str(deck)))
     silent: Any = SimpleNamespace(springs=(), parts=())
     assert model is not None
@@ -38,30 +38,44 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(
         "16",
         "17",
     )
-    asked = ("suggest", "--td", "0.1464", "--no-verify", "--part", "12-17", car())
-    alone, told = answer(*asked), answer(*asked, "--deck", str(deck))
+    arguments = (
+        "suggest",
+        "--td",
+        "0.1464",
+        "--no-verify",
+        "--part",
+        "12-17",
+        locate_car(),
+    )
+    alone, document = run_json(*arguments), run_json(*arguments, "--deck", str(deck))
     assert (
         alone["history"]["channel"]
-        == told["history"]["channel"]
+        == document["history"]["channel"]
         == "internal energy of engine, battery, wheels"
     )
 
 
 def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
-    chosen = d2.suggest(d2.read(car()), 0.1464, parts="1-17", replay=False)
-    found = chosen.to_dict()
-    check_by_schema(found)
-    best = found["candidates"][0]
+    chosen = d2.suggest(d2.read(locate_car()), 0.1464, parts="1-17", replay=False)
+    document = chosen.to_dict()
+    check_by_schema(document)
+    best = document["candidates"][0]
     assert best["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
     assert {
-        one["position_error_part"]
-        for one in found["candidates"]
-        if one["position_error"]
+        candidate_row["position_error_part"]
+        for candidate_row in document["candidates"]
+        if candidate_row["position_error"]
     } == {"engine"}
-    early = [one for one in found["candidates"] if one["tr"] < 0.0384]
+    early = [
+        candidate_row
+        for candidate_row in document["candidates"]
+        if candidate_row["tr"] < 0.0384
+    ]
     assert early
-    assert all(one["position_error"] is None for one in early)  # in the load
-    assert "out-of-place" not in {warning["code"] for warning in found["warnings"]}
+    assert all(
+        candidate_row["position_error"] is None for candidate_row in early
+    )  # in the load
+    assert "out-of-place" not in {warning["code"] for warning in document["warnings"]}
     table = chosen.text("table", Shown(limit=1))
     assert "off by 0.00" in table
     assert (
@@ -69,11 +83,13 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
         in table
     )
     assert {
-        one["position_error_assumes"]
-        for one in found["candidates"]
-        if one["position_error"]
+        candidate_row["position_error_assumes"]
+        for candidate_row in document["candidates"]
+        if candidate_row["position_error"]
     } == {ONE_BODY}
-    assert {one["position_error_assumes"] for one in early} == {None}
+    assert {candidate_row["position_error_assumes"] for candidate_row in early} == {
+        None
+    }
     head, first, *_ = chosen.text("csv", Shown()).splitlines()
     assert (
         "position_error,position_error_part,position_error_body,position_error_assumes"
@@ -83,64 +99,87 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
 
 
 def test_verify_warns_where_it_is_large() -> None:
-    found = checked(
-        "verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car()
+    verdict = run_json_checked(
+        "verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", locate_car()
     )
-    assert found["position_error"] == pytest.approx(7.5e-3, rel=0.3)
-    assert found["position_error_part"] == "engine"
-    (told,) = [
-        one["message"] for one in found["warnings"] if one["code"] == "out-of-place"
+    assert verdict["position_error"] == pytest.approx(7.5e-3, rel=0.3)
+    assert verdict["position_error_part"] == "engine"
+    (message,) = [
+        warning["message"]
+        for warning in verdict["warnings"]
+        if warning["code"] == "out-of-place"
     ]
-    assert told.startswith("engine is frozen elsewhere than it is at td = 0.1464")
-    assert "1.4% of its path in the flight" in told
-    assert told.endswith(
+    assert message.startswith("engine is frozen elsewhere than it is at td = 0.1464")
+    assert "1.4% of its path in the flight" in message
+    assert message.endswith(
         "this holds if the parts become one rigid body, which `deck` tells"
     )
-    alone = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "12", car())
+    alone = run_json(
+        "verify", "--tr", "0.0826", "--td", "0.1464", "--part", "12", locate_car()
+    )
     assert (alone["position_error"], alone["position_error_part"]) == (None, None)
 
 
 def test_plan_gives_it_for_every_window() -> None:
-    found = checked("plan", "--part", "1-17", car())
-    (row,) = [one for one in found["windows"] if one["status"] == "supported"]
+    plan_answer = run_json_checked("plan", "--part", "1-17", locate_car())
+    (row,) = [
+        window for window in plan_answer["windows"] if window["status"] == "supported"
+    ]
     assert row["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
     assert row["position_error_part"] == "engine"
     assert row["position_error_assumes"] == ONE_BODY
-    told = unwrapped(run("plan", "-q", "--part", "1-17", car()).stdout)
+    text = join_wrapped_lines(run("plan", "-q", "--part", "1-17", locate_car()).stdout)
     assert (
         "out of place at td if the parts become one rigid body: flight 2 by 0.0029; --deck tells which do"
-        in told
+        in text
     )
 
 
 @pytest.fixture(scope="module")
 def deck(tmp_path_factory: pytest.TempPathFactory) -> str:
-    file = put(tmp_path_factory.mktemp("car") / "CAR_0000.rad", starter("CAR"))
+    file = put(tmp_path_factory.mktemp("car") / "CAR_0000.rad", read_starter("CAR"))
     return str(file)
 
 
 def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
-    asked = ("verify", "--tr", "0.0496", "--td", "0.1464", "--part", "12-14", car())
-    taken = answer(*asked)
+    arguments = (
+        "verify",
+        "--tr",
+        "0.0496",
+        "--td",
+        "0.1464",
+        "--part",
+        "12-14",
+        locate_car(),
+    )
+    taken = run_json(*arguments)
     assert taken["position_error"] == pytest.approx(1.8e-3, abs=1e-4)
     assert taken["position_error_assumes"] == ONE_BODY
-    found = answer(*asked, "--deck", deck, "--cost-share", "0.1")
+    document = run_json(*arguments, "--deck", deck, "--cost-share", "0.1")
     keys = (
         "position_error",
         "position_error_part",
         "position_error_body",
         "position_error_assumes",
     )
-    assert [found[key] for key in keys] == [
+    assert [document[key] for key in keys] == [
         0.0,
         None,
         None,
         None,
     ]  # the solver found 0.16 mm
-    check_by_schema(found)
-    table = unwrapped(
+    check_by_schema(document)
+    table = join_wrapped_lines(
         run(
-            "suggest", "-q", "--td", "0.1464", "--part", "12-14", "--deck", deck, car()
+            "suggest",
+            "-q",
+            "--td",
+            "0.1464",
+            "--part",
+            "12-14",
+            "--deck",
+            deck,
+            locate_car(),
         ).stdout
     )
     assert (
@@ -150,7 +189,7 @@ def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
 
 
 def test_a_body_that_is_not_known_is_named(deck: str) -> None:
-    found = answer(
+    verdict = run_json(
         "verify",
         "--tr",
         "0.0496",
@@ -160,40 +199,53 @@ def test_a_body_that_is_not_known_is_named(deck: str) -> None:
         "6,8,12,13",
         "--deck",
         deck,
-        car(),
+        locate_car(),
     )
-    assert [found[key] for key in ("position_error", "position_error_assumes")] == [
+    assert [verdict[key] for key in ("position_error", "position_error_assumes")] == [
         None,
         None,
     ]
-    (told,) = [
-        one["message"] for one in found["warnings"] if one["code"] == "several-bodies"
+    (message,) = [
+        warning["message"]
+        for warning in verdict["warnings"]
+        if warning["code"] == "several-bodies"
     ]
     assert (
-        told
+        message
         == "3 rigid bodies: how far that of parts 6, 8 is out of place is not predicted"
     )
 
 
 def test_a_deck_makes_one_body_of_the_car_and_the_assumption_goes(deck: str) -> None:
-    asked = ("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
-    alone, found = answer(*asked), answer(*asked, "--deck", deck)
-    assert found["position_error"] == pytest.approx(
+    arguments = (
+        "verify",
+        "--tr",
+        "0.0826",
+        "--td",
+        "0.1464",
+        "--part",
+        "1-17",
+        locate_car(),
+    )
+    alone, document = run_json(*arguments), run_json(*arguments, "--deck", deck)
+    assert document["position_error"] == pytest.approx(
         7.47e-3, rel=0.05
     )  # as the solver found at the watched nodes
     assert alone["position_error"] == pytest.approx(7.47e-3, rel=0.2)
-    assert (alone["position_error_assumes"], found["position_error_assumes"]) == (
+    assert (alone["position_error_assumes"], document["position_error_assumes"]) == (
         ONE_BODY,
         None,
     )
-    told = [
-        one["message"] for one in found["warnings"] if one["code"] == "out-of-place"
+    messages = [
+        warning["message"]
+        for warning in document["warnings"]
+        if warning["code"] == "out-of-place"
     ]
-    assert "if the parts" not in told[0]
+    assert "if the parts" not in messages[0]
 
 
 def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
-    found = answer(
+    suggestion = run_json(
         "suggest",
         "--td",
         "0.1464",
@@ -202,11 +254,15 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
         "--no-verify",
         "--deck",
         str(DECK),
-        car(),
+        locate_car(),
     )
-    assert {one["run_time_share"] for one in found["candidates"]} == {None}
-    told = {warning["code"]: warning["message"] for warning in found["warnings"]}
-    assert told["deck-of-another-model"] == (
+    assert {candidate["run_time_share"] for candidate in suggestion["candidates"]} == {
+        None
+    }
+    messages = {
+        warning["code"]: warning["message"] for warning in suggestion["warnings"]
+    }
+    assert messages["deck-of-another-model"] == (
         "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: nothing of the deck is used; name that of "
         "the run"
     )
@@ -215,7 +271,7 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
 def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_deck() -> (
     None
 ):
-    asked = (
+    arguments = (
         "--td",
         "0.1464",
         "--no-verify",
@@ -223,64 +279,81 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
         "12-14",
         "--deck",
         str(DECK),
-        car(),
+        locate_car(),
     )
-    found = answer("suggest", *asked)
-    best = next(one for one in found["candidates"] if one["recommended"])
+    suggestion = run_json("suggest", *arguments)
+    best = next(
+        candidate for candidate in suggestion["candidates"] if candidate["recommended"]
+    )
     assert best["position_error_assumes"] == ONE_BODY
-    told = run("suggest", "-q", *asked).stdout
+    result = run("suggest", "-q", *arguments).stdout
     assert (
-        "at td if the parts become one rigid body: engine is frozen elsewhere" in told
+        "at td if the parts become one rigid body: engine is frozen elsewhere" in result
     )
 
 
 def test_a_lead_part_makes_one_body_with_a_deck_and_without(
     deck: str, tmp_path: Path
 ) -> None:
-    """What the card merges is the body whose error is given: engine, battery and wheels as one are 2 mm off."""
+    """The error is that of the merged body of the card: engine, battery and wheels as one body are 2 mm off."""
     page = ("--report", str(tmp_path / "page.html"), "--overwrite")
     merged = ("--merge", "12", "--no-verify", "--solver", "ls-dyna", *page)
     for with_deck in ((), ("--deck", deck)):
-        found = answer(
-            "suggest", "--td", "0.1464", "--part", "12-14", *merged, *with_deck, car()
+        suggestion = run_json(
+            "suggest",
+            "--td",
+            "0.1464",
+            "--part",
+            "12-14",
+            *merged,
+            *with_deck,
+            locate_car(),
         )
-        best = next(one for one in found["candidates"] if one["recommended"])
+        best = next(
+            candidate
+            for candidate in suggestion["candidates"]
+            if candidate["recommended"]
+        )
         assert best["position_error"] == pytest.approx(2.0e-3, abs=1e-4)
         assert best["position_error_assumes"] is None
 
 
-@pytest.mark.parametrize(("lead", "known"), [("1", False), ("99", False), ("1", True)])
+@pytest.mark.parametrize(
+    ("lead", "is_known"), [("1", False), ("99", False), ("1", True)]
+)
 def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(
-    tmp_path: Path, lead: str, known: bool
+    tmp_path: Path, lead: str, is_known: bool
 ) -> None:
-    """Nor how a lead that is not among the parts moves against them."""
+    """Nor does a lead part outside the parts tell how it moves relative to them."""
     merged = (
         "--merge",
         lead,
         "--report",
         str(tmp_path / "page.html"),
-        *(("--deck", str(DECK)) if known else ()),
+        *(("--deck", str(DECK)) if is_known else ()),
     )
-    asked = ("suggest", "--td", "0.37", "--no-verify", "--part", "1")
-    found = answer(*asked, *merged, "sample_data/rollover_box.matsum")
+    arguments = ("suggest", "--td", "0.37", "--no-verify", "--part", "1")
+    document = run_json(*arguments, *merged, "sample_data/rollover_box.matsum")
     assert {
-        one["position_error"] for one in found["candidates"] if one["tr"] > 0.1
-    } == {0.0 if known else None}
+        candidate["position_error"]
+        for candidate in document["candidates"]
+        if candidate["tr"] > 0.1
+    } == {0.0 if is_known else None}
 
 
 def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
     card = ("--no-verify", "-f", "card", "--solver", "ls-dyna")
-    asked = ("suggest", "-q", "--td", "0.1464", *card, "--deck", deck, car())
-    apart = run(*asked, "--part", "12-14").stdout
+    arguments = ("suggest", "-q", "--td", "0.1464", *card, "--deck", deck, locate_car())
+    apart = run(*arguments, "--part", "12-14").stdout
     assert (
         "        12         0      PART\n        13         0      PART\n        14         0      PART"
         in apart
     )
     assert "--merge" not in apart
-    few = run(*asked, "--part", "1-10").stdout
-    assert "         1         0      PART\n         2         1      PART" in few
+    result = run(*arguments, "--part", "1-10").stdout
+    assert "         1         0      PART\n         2         1      PART" in result
     assert (
-        few.count("         1      PART") == 10
+        result.count("         1      PART") == 10
     )  # led by part 1, and its own row to switch back
-    one = run(*asked, "--part", "1-14").stdout
-    assert "14 parts are one rigid body by the deck, led by part 1 (LRB)" in one
+    run_result = run(*arguments, "--part", "1-14").stdout
+    assert "14 parts are one rigid body by the deck, led by part 1 (LRB)" in run_result

@@ -1,4 +1,4 @@
-"""What cannot be run has one line that says what was found, what was expected and what to do; no file is written."""
+"""Refused input gives one line with what was found, what was expected and what to do; no file is written."""
 
 import shlex
 from pathlib import Path
@@ -13,12 +13,12 @@ from tests.command import (
     MATSUM,
     OSCILLATOR,
     ROLLOVER,
-    refused,
+    read_refusal,
 )
-from tests.computed import stored
+from tests.computed import locate_stored
 from tests.sample_deck import DECK as SAMPLE
 
-CAR = stored("carT01.gz")
+CAR = locate_stored("carT01.gz")
 GIVEN = shlex.join(OSCILLATOR)
 ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
 # A command in a line, and parts of what it is told, $ where that ends.
@@ -214,7 +214,7 @@ rollover --speed 1e300 --t-end 0.001 --mesh 4 | infinite
 )
 def test_what_cannot_be_run_is_told_in_one_line(row: str, here: Path) -> None:
     line, *parts = row.split(" | ")
-    message = f"{refused(*shlex.split(line))}$"
+    message = f"{read_refusal(*shlex.split(line))}$"
     for part in parts:
         assert part in message
     assert not list(here.iterdir())

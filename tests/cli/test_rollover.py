@@ -1,4 +1,4 @@
-"""The command ``rollover``: what it writes is read back, scans in every form, figures, refusals."""
+"""The command ``rollover``: its files are read back, scans in every format, figures, refusals."""
 
 import csv
 import io
@@ -16,7 +16,7 @@ from d2rpick.models.box_run import Outcome, RigidWindow, make_history, simulate
 from d2rpick.report import figures_models
 from d2rpick.report.formats import Shown, write
 from d2rpick.report.rollover import Scan
-from tests.command import codes, run
+from tests.command import list_warning_codes, run
 from tests.json_schemas import check_by_schema
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
@@ -52,15 +52,15 @@ def test_every_format_is_read_back_with_the_energies_of_the_run(
     file = tmp_path / name
     assert run("rollover", *SHORT, "-o", str(file)).exit_code == 0
     part = ("--part", "box") if name.endswith("matsum") else ()
-    read = np.genfromtxt(
+    table_read = np.genfromtxt(
         io.StringIO(run("extract", *part, str(file)).stdout), delimiter=",", names=True
     )
-    np.testing.assert_allclose(read["time"], table["time"], rtol=1e-4)
+    np.testing.assert_allclose(table_read["time"], table["time"], rtol=1e-4)
     step = (
         10.0 if name.endswith("glstat") else 1e-3
     )  # the glstat has the energy of the step as well
     np.testing.assert_allclose(
-        read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step
+        table_read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step
     )
 
 
@@ -76,8 +76,8 @@ def test_a_switched_run_is_rigid_in_between_and_differs_after_it(
         np.genfromtxt(io.StringIO(text), delimiter=",", names=True) for text in texts
     )
     time = whole["time"]
-    before = time < 0.1 - 1e-6
-    np.testing.assert_array_equal(switched[before], whole[before])
+    before_tr = time < 0.1 - 1e-6
+    np.testing.assert_array_equal(switched[before_tr], whole[before_tr])
     rigid = (time > 0.101) & (time < 0.199)
     assert np.ptp(switched["internal_energy"][rigid]) < 1e-9
     assert np.ptp(switched["internal_energy"][time > 0.2]) > 0.1
@@ -139,7 +139,7 @@ def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
         Parameters(mesh=4), reference, switched, (window,)
     )
     outlines, roll, roll_off, height, height_off = figure.axes
-    drawn = [points(line) for line in outlines.lines]
+    drawn = [list_points(line) for line in outlines.lines]
     assert set(drawn[0][:, 1]) == {-Parameters().ground}
     boxes = [outline for outline in drawn if len(outline) > 2]
     assert len(boxes) == 16
@@ -147,70 +147,74 @@ def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     assert len(outlines.patches) == 4  # floor and curb, at the start and at the end
     assert [text.get_text() for text in outlines.texts][0::7] == ["0", "250"]
     for axes in (roll, height):
-        named = axes.get_legend_handles_labels()[1]
-        assert named == ["without switching", "switched", "rigid", "sled pushed last"]
-    off = (
+        labels = axes.get_legend_handles_labels()[1]
+        assert labels == ["without switching", "switched", "rigid", "sled pushed last"]
+    differences = (
         np.degrees(switched.roll - reference.roll),
         1e3 * (switched.centre - reference.centre).imag,
     )
-    wanted = (np.degrees(switched.roll), reference.centre.imag, *off)
+    wanted = (np.degrees(switched.roll), reference.centre.imag, *differences)
     for line, values in zip(
         (roll.lines[1], height.lines[0], roll_off.lines[0], height_off.lines[0]),
         wanted,
         strict=True,
     ):
-        np.testing.assert_allclose(points(line)[:, 1], values)
+        np.testing.assert_allclose(list_points(line)[:, 1], values)
 
 
-def points(line: Line2D) -> np.ndarray:
-    """Points of a line that was drawn."""
+def list_points(line: Line2D) -> np.ndarray:
+    """Return the points of a drawn line."""
     return np.asarray(line.get_xydata(), dtype=np.float64)
 
 
 @pytest.mark.slow
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     plot = tmp_path / "scan.png"
-    found = json.loads(
+    document = json.loads(
         run(*SCAN, "--td", "0.1", "-q", "-f", "json", "--plot", str(plot)).stdout
     )
-    check_by_schema(found)
+    check_by_schema(document)
     assert plot.read_bytes().startswith(b"\x89PNG")
-    assert found["recommended"] in [one["tr"] for one in found["runs"]]
+    assert document["recommended"] in [one_run["tr"] for one_run in document["runs"]]
     reference = simulate(Parameters(mesh=4), 0.11, interval=1e-3)
     chosen = suggest(make_history(reference), 0.1, Settings())
     scanned = Scan(
-        reference, [Outcome(**one) for one in found["runs"]], chosen, chosen.cautions
+        reference,
+        [Outcome(**one_run) for one_run in document["runs"]],
+        chosen,
+        chosen.cautions,
     )
     assert (
-        json.loads(write("rollover", "json", scanned, Shown()))["runs"] == found["runs"]
+        json.loads(write("rollover", "json", scanned, Shown()))["runs"]
+        == document["runs"]
     )
     rows = csv.DictReader(io.StringIO(write("rollover", "csv", scanned, Shown())))
-    assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found[
-        "runs"
-    ]
+    assert [
+        {name: float(cell) for name, cell in row.items()} for row in rows
+    ] == document["runs"]
     assert write("rollover", "markdown", scanned, Shown()).startswith("| tr |")
     text = write("rollover", "table", scanned, Shown())
     assert "\n* " in text
-    assert f"recommended  tr = {found['recommended']:.6g}" in text
+    assert f"recommended  tr = {document['recommended']:.6g}" in text
 
 
 @pytest.mark.slow
 def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
     result = run(*SCAN, "--td", "0.06", "-f", "json")
-    told = {line.split(": ")[1] for line in result.stderr.splitlines()}
-    assert "no-free-flight" in told
-    assert codes(json.loads(result.stdout)) == told
+    messages = {line.split(": ")[1] for line in result.stderr.splitlines()}
+    assert "no-free-flight" in messages
+    assert list_warning_codes(json.loads(result.stdout)) == messages
 
 
 @pytest.mark.slow
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
-    asked = (*SCAN, "--td", "0.04")
-    table, plain = run(*asked, "-q", "--exit-zero"), run(*asked, "-f", "json")
+    arguments = (*SCAN, "--td", "0.04")
+    table, plain = run(*arguments, "-q", "--exit-zero"), run(*arguments, "-f", "json")
     assert table.stdout.endswith("\n\nrecommended  none\n")
     assert (table.exit_code, plain.exit_code) == (0, 1)
-    found = json.loads(plain.stdout)
-    assert found["recommended"] is None
-    assert "no-candidate" in codes(found)
+    document = json.loads(plain.stdout)
+    assert document["recommended"] is None
+    assert "no-candidate" in list_warning_codes(document)
 
 
 def test_a_run_that_does_not_balance_its_energy_says_so() -> None:

@@ -1,4 +1,4 @@
-"""A folder of a run is enough: its main deck is found, named and used, and cards are checked in it before printing."""
+"""A run folder is enough input: its main deck is found, named and used, and cards are checked before printing."""
 
 import shutil
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.base.errors import ArgumentError
-from tests.command import MATSUM, ROOT, answer, put, refused, run
-from tests.energies import sure
+from tests.command import MATSUM, ROOT, put, read_refusal, run, run_json
+from tests.energies import require
 from tests.sample_deck import DECK
 
 pytestmark = pytest.mark.usefixtures("by_level")
@@ -20,29 +20,32 @@ NODAL_BODY = (
 )
 
 
-def folder_of_run(path: Path, more: str = DATABASES) -> Path:
+def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
     """Write the sample run with its deck."""
     path.mkdir(exist_ok=True)
     shutil.copy(MATSUM, path / "matsum")
-    put(path / "main.k", DECK.read_text("utf-8").replace("*END", f"{more}*END"))
+    put(
+        path / "main.k",
+        DECK.read_text("utf-8").replace("*END", f"{extra_keywords}*END"),
+    )
     return path
 
 
 @pytest.fixture
 def box(tmp_path: Path) -> Path:
-    """The folder of the sample run."""
-    return folder_of_run(tmp_path / "run")
+    """Write the folder of the sample run."""
+    return write_run_folder(tmp_path / "run")
 
 
-def card_in(folder: Path, *more: str) -> tuple[str, str]:
-    """Card of a plan, and what is told on stderr."""
-    result = run("plan", str(folder), "--part", "flying", "-f", "card", *more)
+def print_card(folder: Path, *extra_keywords: str) -> tuple[str, str]:
+    """Return the card of a plan, and the messages on stderr."""
+    result = run("plan", str(folder), "--part", "flying", "-f", "card", *extra_keywords)
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
 
-def checked_in(folder: Path, card: str) -> str:
-    """What ``check`` says of the deck with the card in it."""
+def check_with_card(folder: Path, card: str) -> str:
+    """Return the output of ``check`` for the deck with the card in it."""
     main = (folder / "main.k").read_text("utf-8")
     pasted = put(folder.parent / "pasted.k", main.replace("*END", f"{card}*END"))
     result = run("check", "--fail-on", "warning", str(pasted))
@@ -54,15 +57,19 @@ def checked_in(folder: Path, card: str) -> str:
 def test_the_only_main_deck_is_used_and_named(command: str, box: Path) -> None:
     part = [] if command == "parts" else ["--part", "flying"]
     part += ["--steps", "3"] if command == "explore" else []
-    alone = answer(command, *part, str(box))
-    (named,) = [
-        one["message"] for one in alone["warnings"] if one["code"] == "deck-in-folder"
+    alone = run_json(command, *part, str(box))
+    (message,) = [
+        warning["message"]
+        for warning in alone["warnings"]
+        if warning["code"] == "deck-in-folder"
     ]
-    assert named.startswith(
+    assert message.startswith(
         f"{box / 'main.k'} is the main deck in the folder of the run"
     )
-    with_deck = answer(command, *part, "--deck", str(box / "main.k"), str(box))
-    without = [one for one in alone["warnings"] if one["code"] != "deck-in-folder"]
+    with_deck = run_json(command, *part, "--deck", str(box / "main.k"), str(box))
+    without = [
+        warning for warning in alone["warnings"] if warning["code"] != "deck-in-folder"
+    ]
     same = {
         key: value for key, value in alone.items() if key not in ("command", "warnings")
     }
@@ -75,9 +82,9 @@ def test_the_only_main_deck_is_used_and_named(command: str, box: Path) -> None:
 
 
 def test_python_uses_the_same_deck(box: Path) -> None:
-    found = d2.plan(d2.read(box), parts="flying", replay=False, min_quality="poor")
+    planned = d2.plan(d2.read(box), parts="flying", replay=False, min_quality="poor")
     assert (
-        found.windows
+        planned.windows
         == d2.plan(
             d2.read(box),
             parts="flying",
@@ -86,21 +93,21 @@ def test_python_uses_the_same_deck(box: Path) -> None:
             deck=box / "main.k",
         ).windows
     )
-    assert "deck-in-folder" in [one.code for one in found.warnings]
+    assert "deck-in-folder" in [warning.code for warning in planned.warnings]
     without = d2.plan(
         d2.read(box), parts="flying", replay=False, min_quality="poor", deck=False
     )
-    assert "deck-in-folder" not in [one.code for one in without.warnings]
+    assert "deck-in-folder" not in [warning.code for warning in without.warnings]
     assert "--no-deck" in without.command
-    assert "--deck" in found.command  # since the command names the files of the run
+    assert "--deck" in planned.command  # since the command names the files of the run
 
 
 def test_the_overview_reads_the_same_deck(box: Path) -> None:
     assert f"deck-in-folder: {box / 'main.k'}" in run("info", str(box)).stderr
     assert "deck-in-folder" not in run("info", "--no-deck", str(box)).stderr
-    by_python, by_command = d2.read(box).overview(), answer("info", str(box))
+    by_python, by_command = d2.read(box).overview(), run_json("info", str(box))
     assert [flight.start for _, flight in by_python.flights] == [
-        one["start"] for one in by_command["flights"]
+        flight_row["start"] for flight_row in by_command["flights"]
     ]
     shutil.copy(box / "main.k", box / "other.k")
     assert d2.read(box).overview().flights  # nothing is asked here: none is read
@@ -109,18 +116,18 @@ def test_the_overview_reads_the_same_deck(box: Path) -> None:
 def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(
     box: Path,
 ) -> None:
-    card, told = card_in(box)
+    card, messages = print_card(box)
     assert "         2         1      PART" in card
-    assert "card-objection" not in told
-    assert "parts 1, 2: rigid" in checked_in(box, card)
+    assert "card-objection" not in messages
+    assert "parts 1, 2: rigid" in check_with_card(box, card)
 
 
 def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(
     box: Path,
 ) -> None:
-    card, told = card_in(box, "--no-deck")
-    assert "parts-not-joined: no deck of the run was read" in told
-    assert "error D2R108" in checked_in(box, card)
+    card, messages = print_card(box, "--no-deck")
+    assert "parts-not-joined: no deck of the run was read" in messages
+    assert "error D2R108" in check_with_card(box, card)
     assert (
         "parts-not-joined"
         not in run(
@@ -130,13 +137,13 @@ def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(
 
 
 def test_what_check_would_say_is_said_when_the_card_is_printed(tmp_path: Path) -> None:
-    box = folder_of_run(tmp_path / "run", more="")
-    card, told = card_in(box)
-    assert "card-objection: check of the deck with this card, switches.k:" in told
-    assert "D2R111 (warning)" in told
-    assert "warning D2R111" in checked_in(box, card)
+    box = write_run_folder(tmp_path / "run", extra_keywords="")
+    card, messages = print_card(box)
+    assert "card-objection: check of the deck with this card, switches.k:" in messages
+    assert "D2R111 (warning)" in messages
+    assert "warning D2R111" in check_with_card(box, card)
     plan = d2.plan(d2.read(box), parts="flying", replay=False, min_quality="poor")
-    (by_python,) = sure(plan.card()).cautions
+    (by_python,) = require(plan.card()).cautions
     assert by_python.code == "card-objection"
     assert (
         str(tmp_path) not in by_python.message
@@ -149,37 +156,37 @@ def test_ids_of_the_deck_are_not_used_again(tmp_path: Path) -> None:
         f"{0:10d}{0:10d}{0:10d}{0.0:10g}{1:10d}",
     )
     taken = f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{first}\n{second}\n{3:10d}\n"
-    box = folder_of_run(
+    box = write_run_folder(
         tmp_path / "run",
         f"{DATABASES}*SET_PART_LIST\n       950\n         1         2\n{taken}",
     )
-    card, told = card_in(box)
+    card, messages = print_card(box)
     assert "\n       951         0 " in card
     assert "\n       952         0 " in card
-    assert "D2R004" not in told + checked_in(box, card)
+    assert "D2R004" not in messages + check_with_card(box, card)
 
 
 def test_nodal_rigid_bodies_on_the_parts_are_deleted_while_these_are_rigid(
     tmp_path: Path,
 ) -> None:
-    box = folder_of_run(tmp_path / "run", DATABASES + NODAL_BODY)
-    card, _ = card_in(box)
+    box = write_run_folder(tmp_path / "run", DATABASES + NODAL_BODY)
+    card, _ = print_card(box)
     lines = card.splitlines()
     flags = [
-        lines[at + 1][:20]
-        for at, line in enumerate(lines)
+        lines[line_index + 1][:20]
+        for line_index, line in enumerate(lines)
         if line.startswith("$#    nrbf")
     ]
     assert flags == [f"{1:10d}{0:10d}", f"{2:10d}{0:10d}"]
-    assert "D2R112" not in checked_in(box, card)
+    assert "D2R112" not in check_with_card(box, card)
 
 
 def test_of_several_main_decks_one_has_to_be_named(box: Path) -> None:
     shutil.copy(box / "main.k", box / "other.k")
-    told = refused("plan", str(box), "--part", "flying")
-    assert "2 main decks" in told
-    assert "--deck" in told
-    assert "--no-deck" in told
+    message = read_refusal("plan", str(box), "--part", "flying")
+    assert "2 main decks" in message
+    assert "--deck" in message
+    assert "--no-deck" in message
     assert run("plan", str(box), "--part", "flying", "--no-deck").exit_code == 0
     with pytest.raises(ArgumentError, match="2 main decks"):
         d2.plan(d2.read(box), parts="flying")
@@ -190,12 +197,14 @@ def test_includes_restarts_and_cards_alone_are_no_main_decks(box: Path) -> None:
     main = (box / "main.k").read_text("utf-8")
     put(box / "inner.k", main.replace("*END", ""))
     put(box / "main.k", "*KEYWORD\n*INCLUDE\ninner.k\n*END\n")
-    assert "         2         1      PART" in card_in(box)[0]
+    assert "         2         1      PART" in print_card(box)[0]
 
 
 def test_a_file_has_no_folder_whose_deck_is_used(box: Path) -> None:
-    found = answer("plan", "--part", "flying", str(box / "matsum"))
-    assert "deck-in-folder" not in [one["code"] for one in found["warnings"]]
+    plan_answer = run_json("plan", "--part", "flying", str(box / "matsum"))
+    assert "deck-in-folder" not in [
+        warning["code"] for warning in plan_answer["warnings"]
+    ]
 
 
 def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> None:
@@ -203,10 +212,10 @@ def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> No
         run("suggest", "--part", "flying", "--step-ratio", "2", str(box)).exit_code == 0
     )
     (box / "main.k").unlink()
-    assert "--step-ratio needs --cost-share or --deck" in refused(
+    assert "--step-ratio needs --cost-share or --deck" in read_refusal(
         "suggest", "--step-ratio", "2", str(box)
     )
-    assert "--deck and --no-deck exclude each other" in refused(
+    assert "--deck and --no-deck exclude each other" in read_refusal(
         "plan", "--deck", "a.k", "--no-deck", str(box)
     )
 
@@ -214,24 +223,24 @@ def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> No
 ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
-def radioss_run(path: Path, root: str) -> Path:
-    """Write a box of two plates that fall, with the history of the sample box."""
+def write_radioss_run(path: Path, root: str) -> Path:
+    """Write a falling box of two plates, with the history of the sample box."""
     path.mkdir()
     head = "#RADIOSS STARTER\n/BEGIN\nCAR\n      2022         0\n/TITLE\nplates\n/MAT/ELAST/1\nsteel\n"
     rows = [
         f"{7850.0:20g}\n{2.1e11:20g}{0.3:20g}\n/PROP/SHELL/1\nshell\n        24\n\n"
     ]
     rows += [f"{3:10d}{0:10d}{0.005:20g}\n/NODE\n"]
-    places = [(x, y) for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)]
+    positions = [(x, y) for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)]
     rows += [
-        f"{at:10d}{x:20g}{y:20g}{0.0:20g}\n"
-        for at, (x, y) in enumerate(places, start=1)
+        f"{node_number:10d}{x:20g}{y:20g}{0.0:20g}\n"
+        for node_number, (x, y) in enumerate(positions, start=1)
     ]
     for part, nodes in ((1, (1, 3, 4, 2)), (2, (3, 5, 6, 4))):
         rows += [
             f"/PART/{part}\n{('box', 'step')[part - 1]}\n{1:10d}{1:10d}\n/SHELL/{part}\n"
         ]
-        rows += ["".join(f"{one:10d}" for one in (part, *nodes)) + "\n"]
+        rows += ["".join(f"{number:10d}" for number in (part, *nodes)) + "\n"]
     put(path / f"{root}_0000.rad", head + "".join(rows) + "/END\n")
     put(path / f"{root}_0001.rad", ENGINE.replace("0.26", "0.43"))
     shutil.copy(ROOT / "sample_data" / "rollover_boxT01", path / f"{root}T01")
@@ -241,8 +250,8 @@ def radioss_run(path: Path, root: str) -> Path:
 def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(
     tmp_path: Path,
 ) -> None:
-    """The record ends one output interval before the run, and the engine finds its restart by the name of its file."""
-    box = radioss_run(tmp_path / "run", "BOX")
+    """The record ends one output interval before the run; the engine finds its restart file by name."""
+    box = write_radioss_run(tmp_path / "run", "BOX")
     times = ("--tr", "0.1", "--td", "0.37", "--part", "1,2", "--after", "0.09")
     result = run("card", *times, "--history", str(box))
     assert "# ---- BOX_0003.rad\n/RUN/BOX/3\n                0.43\n" in result.stdout

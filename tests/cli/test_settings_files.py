@@ -1,4 +1,4 @@
-"""Settings files that somebody else may have written: they start nothing, write nothing, and never crash a command."""
+"""Settings files from others start no program, write no file, and never crash a command."""
 
 import os
 import tomllib
@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.values import spelled
-from tests.command import ENERGY, put, refused, run
+from tests.command import ENERGY, put, read_refusal, run
 
 ASKED: Final = ("suggest", "--td", "0.0687534", ENERGY)
 # Arguments that a command needs before it looks at its settings.
@@ -78,17 +78,19 @@ VALUES: Final = (
 )
 
 
-def options_of(command: str) -> list[str]:
-    """Keys of the settings of a command."""
-    made = d2rpick.get_command(click.Context(d2rpick), command)
-    assert made
+def list_options(command: str) -> list[str]:
+    """Return the settings keys of a command."""
+    command_object = d2rpick.get_command(click.Context(d2rpick), command)
+    assert command_object
     return [
-        spelled(option) for option in made.params if isinstance(option, click.Option)
+        spelled(option)
+        for option in command_object.params
+        if isinstance(option, click.Option)
     ]
 
 
-def asked_with(command: str, text: str) -> str:
-    """Let a command read these settings; what it says if it refuses them, in one line without an internal error."""
+def ask_with_settings(command: str, text: str) -> str:
+    """Run a command with these settings; return its refusal of one line, which must not be an internal error."""
     put(Path("d2rpick.toml"), text)
     result = run(command, *NEEDED.get(command, ("x",)), "--show-settings")
     assert "internal error" not in result.stderr, text
@@ -101,7 +103,7 @@ def asked_with(command: str, text: str) -> str:
     return result.stderr
 
 
-def table_of(command: str, key: str, value: str) -> str:
+def write_settings_table(command: str, key: str, value: str) -> str:
     return f'[{command}]\n"{key}" = {value}\n'
 
 
@@ -112,35 +114,37 @@ def test_no_program_no_output_and_no_overwriting_comes_from_a_file(
 ) -> None:
     dangerous = [
         key
-        for key in options_of(command)
+        for key in list_options(command)
         if key in FORBIDDEN and (command, key) != ("drive", "resume")
     ]
     assert {"debug", "verbose", "show-settings"} <= {*dangerous}
     for key in dangerous:
-        said = asked_with(command, table_of(command, key, FORBIDDEN[key]))
-        assert f"d2rpick.toml: {key}: " in said
-        assert "never taken from a file; remove the key" in said
+        message = ask_with_settings(
+            command, write_settings_table(command, key, FORBIDDEN[key])
+        )
+        assert f"d2rpick.toml: {key}: " in message
+        assert "never taken from a file; remove the key" in message
 
 
 @pytest.mark.usefixtures("here")
 @settings(max_examples=5)
 @given(
     st.sampled_from(
-        [(command, key) for command in COMMANDS for key in options_of(command)]
+        [(command, key) for command in COMMANDS for key in list_options(command)]
     )
 )
 def test_a_value_of_any_type_is_taken_or_refused(option: tuple[str, str]) -> None:
     for value in VALUES:
-        asked_with(option[0], table_of(*option, value))
+        ask_with_settings(option[0], write_settings_table(*option, value))
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("command", [*COMMANDS])
 def test_each_key_with_each_type_of_value_is_taken_or_refused(command: str) -> None:
-    for key, value in product(options_of(command), VALUES):
-        asked_with(command, table_of(command, key, value))
-        asked_with(command, f'"{key}" = {value}\n')
+    for key, value in product(list_options(command), VALUES):
+        ask_with_settings(command, write_settings_table(command, key, value))
+        ask_with_settings(command, f'"{key}" = {value}\n')
 
 
 @pytest.mark.usefixtures("here")
@@ -150,16 +154,16 @@ def test_each_key_with_each_type_of_value_is_taken_or_refused(command: str) -> N
 )
 def test_a_shared_key_takes_or_refuses_a_value_of_any_type(key: str) -> None:
     for value in VALUES:
-        asked_with("suggest", f"{key} = {value}\n")
+        ask_with_settings("suggest", f"{key} = {value}\n")
         checked = run("check", "x.k")
         assert checked.exit_code == 2
         assert "internal error" not in checked.stderr
-    asked_with("suggest", f"[[{key}]]\na = 1\n")
+    ask_with_settings("suggest", f"[[{key}]]\na = 1\n")
 
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "message"),
     [
         ("td = 1979-05-27", "td is 1979-05-27, a number or a text was expected"),
         ("td-window = '12'", "td-window is '12', a list was expected"),
@@ -173,16 +177,16 @@ def test_a_shared_key_takes_or_refuses_a_value_of_any_type(key: str) -> None:
     ],
 )
 def test_a_value_of_the_wrong_type_is_refused_with_what_was_expected(
-    line: str, said: str
+    line: str, message: str
 ) -> None:
     put(Path("d2rpick.toml"), f"[suggest]\n{line}\n")
-    assert said in refused("suggest", ENERGY)
+    assert message in read_refusal("suggest", ENERGY)
 
 
 @pytest.mark.usefixtures("here")
 def test_a_command_is_set_by_a_table() -> None:
     put(Path("d2rpick.toml"), "suggest = 1979-05-27\n")
-    assert "suggest is 1979-05-27, a table was expected" in refused(*ASKED)
+    assert "suggest is 1979-05-27, a table was expected" in read_refusal(*ASKED)
 
 
 @pytest.mark.usefixtures("here")
@@ -191,7 +195,7 @@ def test_a_byte_order_mark_before_the_settings_is_no_part_of_them() -> None:
     put(Path("d2rpick.toml"), b"\xef\xbb\xbf" + text.encode())
     assert "margin = 0.001  # settings" in run(*ASKED, "--show-settings").stdout
     put(Path("d2rpick.toml"), text.encode("utf-16"))
-    assert "valid TOML was expected" in refused(*ASKED)
+    assert "valid TOML was expected" in read_refusal(*ASKED)
 
 
 # Whose file it is, and where it lies.
@@ -199,7 +203,7 @@ def test_a_byte_order_mark_before_the_settings_is_no_part_of_them() -> None:
 
 @pytest.fixture
 def inner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder two below that with the settings."""
+    """Work in a folder two levels below the settings file."""
     folder = tmp_path / "project" / "runs"
     folder.mkdir(parents=True)
     put(tmp_path / "d2rpick.toml", "margin = 0.001\n")
@@ -207,15 +211,15 @@ def inner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def margin_of(*args: str) -> str:
-    """The margin that the settings give, or the default."""
+def read_margin(*args: str) -> str:
+    """Return the margin in use: that of the settings, or the default."""
     lines = run(*ASKED, *args, "--show-settings").stdout.splitlines()
     return next(line.split()[2] for line in lines if line.startswith("margin = "))
 
 
 @pytest.mark.usefixtures("inner")
 def test_the_settings_of_a_folder_above_count() -> None:
-    assert margin_of() == "0.001"
+    assert read_margin() == "0.001"
 
 
 @pytest.mark.parametrize("sign", [".git", ".hg"])
@@ -225,14 +229,14 @@ def test_the_search_ends_at_the_root_of_the_repository(
 ) -> None:
     root = [inner, inner.parent][depth]
     (root / sign).mkdir()
-    assert margin_of() == "none"
+    assert read_margin() == "none"
     put(root / "pyproject.toml", "[tool.d2rpick]\nmargin = 0.002\n")
-    assert margin_of() == "0.002"
+    assert read_margin() == "0.002"
 
 
 def test_a_work_tree_has_its_root_where_its_file_of_git_lies(inner: Path) -> None:
     put(inner / ".git", "gitdir: elsewhere\n")
-    assert margin_of() == "none"
+    assert read_margin() == "none"
 
 
 def test_the_search_ends_at_the_home_of_the_user(
@@ -241,9 +245,9 @@ def test_the_search_ends_at_the_home_of_the_user(
     link = inner.parents[1] / "home"
     link.symlink_to(inner.parent)
     monkeypatch.setenv("HOME", str(link))
-    assert margin_of() == "none"
+    assert read_margin() == "none"
     put(inner.parent / "d2rpick.toml", "margin = 0.002\n")
-    assert margin_of() == "0.002"
+    assert read_margin() == "0.002"
 
 
 def test_the_settings_of_a_deck_end_at_the_root_of_its_repository(inner: Path) -> None:
@@ -256,7 +260,7 @@ def test_the_settings_of_a_deck_end_at_the_root_of_its_repository(inner: Path) -
 
 @pytest.fixture
 def foreign(inner: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Let all files belong to somebody else."""
+    """Make all files look as if they belong to another user."""
     monkeypatch.setattr(os, "geteuid", lambda: inner.stat().st_uid + 1)
     return inner
 
@@ -273,11 +277,11 @@ def test_a_file_of_another_user_is_not_used_and_named(foreign: Path, text: str) 
     )
     assert result.exit_code == 0
     assert not run(*ASKED, "-q").stderr
-    assert margin_of() == "none"
+    assert read_margin() == "none"
 
 
 @pytest.mark.parametrize(
-    ("text", "named"),
+    ("text", "is_named"),
     [
         ("[project]\nname = 'd2rpick'", False),
         ("[tool.d2rpick", False),
@@ -285,10 +289,10 @@ def test_a_file_of_another_user_is_not_used_and_named(foreign: Path, text: str) 
     ],
 )
 def test_a_pyproject_of_another_user_is_named_if_it_has_settings(
-    foreign: Path, text: str, named: bool
+    foreign: Path, text: str, is_named: bool
 ) -> None:
     put(foreign / "pyproject.toml", text)
-    assert ("not used" in run(*ASKED).stderr) == named
+    assert ("not used" in run(*ASKED).stderr) == is_named
 
 
 @pytest.mark.usefixtures("foreign")
@@ -318,5 +322,5 @@ def test_a_link_to_a_file_of_another_user_is_not_used(inner: Path) -> None:
 
 
 def test_the_values_of_these_tests_are_toml() -> None:
-    """Otherwise a file would be refused as a whole, and its types would not be looked at."""
+    """Otherwise the whole file would be refused before its types are checked."""
     assert all(tomllib.loads(f"a = {value}") for value in VALUES)

@@ -1,4 +1,4 @@
-"""The command ``study`` as a user meets it: formats, codes, lists, and what is left when it is killed."""
+"""The command ``study`` for a user: formats, exit codes, lists, and the rows that survive a kill."""
 
 import csv
 import gzip
@@ -17,8 +17,18 @@ import pytest
 
 from d2rpick import __version__
 from tests import variants
-from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, put, refused, run, started
-from tests.json_schemas import check_by_definition, check_by_schema, checked
+from tests.command import (
+    BOX,
+    ENERGY,
+    GLSTAT,
+    ROOT,
+    put,
+    read_refusal,
+    run,
+    run_json,
+    start_program,
+)
+from tests.json_schemas import check_by_definition, check_by_schema, run_json_checked
 from tests.variants import STUDY
 
 FORMATS = ("table", "json", "csv", "markdown", "ndjson")
@@ -38,17 +48,17 @@ KEYS = (
 
 @pytest.fixture
 def runs(tmp_path: Path) -> list[str]:
-    """Three runs that differ a little."""
-    return variants.variants(tmp_path)
+    """Write three slightly different runs."""
+    return variants.write_variants(tmp_path)
 
 
-def check_line(found: dict[str, Any], kind: str) -> None:
-    """Hold a line of newline-delimited JSON against the schema that ships."""
-    check_by_definition(found, "study-1", kind)
+def check_line(check_report: dict[str, Any], kind: str) -> None:
+    """Validate a line of newline-delimited JSON by the schema of the package."""
+    check_by_definition(check_report, "study-1", kind)
 
 
-def lines_of(text: str) -> list[dict[str, Any]]:
-    """Lines of newline-delimited JSON."""
+def read_lines(text: str) -> list[dict[str, Any]]:
+    """Return the documents of newline-delimited JSON."""
     return [json.loads(line) for line in text.splitlines()]
 
 
@@ -59,21 +69,21 @@ def lines_of(text: str) -> list[dict[str, Any]]:
     "extra", [(), ("absent.csv",), ("--td", "0.064"), ("--max-residual", "0.001")]
 )
 def test_json_follows_the_schema(runs: list[str], extra: tuple[str, ...]) -> None:
-    found = checked(*STUDY, *runs, *extra)
-    assert found["tool_version"] == __version__
-    assert found["command"] == [*STUDY, *runs, *extra, "-f", "json"]
-    assert [row["source"] for row in found["runs"]][:3] == runs
+    document = run_json_checked(*STUDY, *runs, *extra)
+    assert document["tool_version"] == __version__
+    assert document["command"] == [*STUDY, *runs, *extra, "-f", "json"]
+    assert [row["source"] for row in document["runs"]][:3] == runs
 
 
 @pytest.mark.slow
 def test_every_format_says_the_same(runs: list[str]) -> None:
     sources = [*runs, "absent.csv"]
-    found = answer(*STUDY, *sources)
+    document = run_json(*STUDY, *sources)
     rows = list(csv.DictReader(io.StringIO(run(*STUDY, *sources, "-f", "csv").stdout)))
-    for row, one in zip(rows, found["runs"], strict=True):
-        texts = {key: "" if one[key] is None else str(one[key]) for key in KEYS}
+    for row, run_row in zip(rows, document["runs"], strict=True):
+        texts = {key: "" if run_row[key] is None else str(run_row[key]) for key in KEYS}
         assert {key: row[key] for key in KEYS} == texts
-    *lines, last = lines_of(run(*STUDY, *sources, "-f", "ndjson").stdout)
+    *lines, last = read_lines(run(*STUDY, *sources, "-f", "ndjson").stdout)
     for line in lines:
         check_line(line, "line")
     check_line(last, "last")
@@ -83,16 +93,16 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
         for line, error in zip(lines, errors, strict=True)
     ]
     assert [
-        {key: line[key] for key in one}
-        for line, one in zip(again, found["runs"], strict=True)
-    ] == found["runs"]
+        {key: line[key] for key in run_row}
+        for line, run_row in zip(again, document["runs"], strict=True)
+    ] == document["runs"]
     assert {**last, "command": 0} == {
-        **{key: found[key] for key in found if key != "runs"},
+        **{key: document[key] for key in document if key != "runs"},
         "command": 0,
     }
     for form in ("table", "markdown"):
         text = run(*STUDY, *sources, "-f", form).stdout
-        assert f"{found['common_tr']:g}, acceptable in 3 of 3 runs" in text
+        assert f"{document['common_tr']:g}, acceptable in 3 of 3 runs" in text
         assert form == "table" or all(
             source in text for source in sources
         )  # a table folds long names
@@ -100,16 +110,21 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
 
 @pytest.mark.slow
 def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
-    found = checked("study", "--td-window", "0.06", "0.07", *runs)
-    assert (found["td"], found["td_window"]) == (None, [0.06, 0.07])
-    for name, one in zip(runs, found["runs"], strict=True):
-        pair = answer("suggest", "--td-window", "0.06", "0.07", name)["recommended"]
-        assert (one["tr"], one["td"]) == (pair["tr"], pair["td"])
-        verdict = answer(
-            "verify", "--tr", repr(found["common_tr"]), "--td", repr(one["td"]), name
+    study_answer = run_json_checked("study", "--td-window", "0.06", "0.07", *runs)
+    assert (study_answer["td"], study_answer["td_window"]) == (None, [0.06, 0.07])
+    for name, run_row in zip(runs, study_answer["runs"], strict=True):
+        pair = run_json("suggest", "--td-window", "0.06", "0.07", name)["recommended"]
+        assert (run_row["tr"], run_row["td"]) == (pair["tr"], pair["td"])
+        verdict = run_json(
+            "verify",
+            "--tr",
+            repr(study_answer["common_tr"]),
+            "--td",
+            repr(run_row["td"]),
+            name,
         )
         assert verdict["verified"]
-        assert one["common_error"] == pytest.approx(verdict["residual"], abs=1e-3)
+        assert run_row["common_error"] == pytest.approx(verdict["residual"], abs=1e-3)
     assert (
         "of each run in 0.06 to 0.07"
         in run("study", "--td-window", "0.06", "0.07", *runs).stdout
@@ -117,15 +132,17 @@ def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
 
 
 def test_options_of_suggest_hold_for_each_run() -> None:
-    found = answer("study", "--td", "0.37", "--part", "box", BOX, BOX, "--jobs", "2")
+    study_answer = run_json(
+        "study", "--td", "0.37", "--part", "box", BOX, BOX, "--jobs", "2"
+    )
     (expected,) = [
         c
-        for c in answer("suggest", "--td", "0.37", "--part", "box", BOX)["candidates"]
+        for c in run_json("suggest", "--td", "0.37", "--part", "box", BOX)["candidates"]
         if c["recommended"]
     ]
-    assert [row["tr"] for row in found["runs"]] == [expected["tr"]] * 2
-    assert found["runs"][0]["basis"] == "energy"
-    later = answer(*STUDY, "--after", "0.02", ENERGY)
+    assert [row["tr"] for row in study_answer["runs"]] == [expected["tr"]] * 2
+    assert study_answer["runs"][0]["basis"] == "energy"
+    later = run_json(*STUDY, "--after", "0.02", ENERGY)
     assert later["runs"][0]["tr"] > 0.02
 
 
@@ -186,8 +203,10 @@ def test_names_come_from_a_list_too(runs: list[str]) -> None:
     Path("list.txt").write_text(text)
     expected = [runs[0], "run2.csv", runs[2]]
     for args in ((runs[0], "--from", "list.txt"), (runs[0], "--from", "-")):
-        found = json.loads(run(*STUDY, *args, "-f", "json", stdin=text.encode()).stdout)
-        assert [row["source"] for row in found["runs"]] == expected
+        document = json.loads(
+            run(*STUDY, *args, "-f", "json", stdin=text.encode()).stdout
+        )
+        assert [row["source"] for row in document["runs"]] == expected
     result = run(*STUDY, "-f", "csv", env={"D2RPICK_STUDY_FROM": "list.txt"})
     assert result.stdout.count("\n") == 3
 
@@ -197,8 +216,8 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one() -> None:
     for name in ("one", "two"):
         Path(name).mkdir()
         (Path(name) / "glstat").write_bytes(Path(GLSTAT).read_bytes())
-    found = answer(*STUDY, "*/glstat", "one", "no*")
-    statuses = [(row["source"], row["status"]) for row in found["runs"]]
+    document = run_json(*STUDY, "*/glstat", "one", "no*")
+    statuses = [(row["source"], row["status"]) for row in document["runs"]]
     expected = [os.path.join(name, "glstat") for name in ("one", "two")]  # noqa: PTH118
     assert statuses == [
         (expected[0], "ok"),
@@ -206,14 +225,14 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one() -> None:
         ("one", "ok"),
         ("no*", "unreadable"),
     ]
-    assert found["agree"] is True
+    assert document["agree"] is True
 
 
 # Processes.
 
 
 def wait_for(ledger: Path, lines: int) -> None:
-    """Wait until a ledger has so many lines."""
+    """Wait until a ledger has this many lines."""
     for _ in range(1000):
         with suppress(
             FileNotFoundError
@@ -240,12 +259,12 @@ def test_rows_come_in_order_as_soon_as_they_can(
 ) -> None:
     os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
     args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")
-    with started(*args, cwd=tmp_path, text=True) as process:
+    with start_program(*args, cwd=tmp_path, text=True) as process:
         assert process.stdout is not None
         assert json.loads(process.stdout.readline())["source"] == "run1.csv"
         (tmp_path / "slow.csv").write_bytes(Path(runs[2]).read_bytes())
-        rest, _ = process.communicate(timeout=30)
-    assert [line.get("source") for line in lines_of(rest)] == [
+        other_lines, _ = process.communicate(timeout=30)
+    assert [line.get("source") for line in read_lines(other_lines)] == [
         "slow.csv",
         "run2.csv",
         None,
@@ -271,7 +290,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(
     )
     os.mkfifo(slow)  # whoever reads it waits
     finished = 2 if jobs == "1" else 3
-    with started(*args, cwd=tmp_path, text=True) as process:
+    with start_program(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, finished)
         process.send_signal(signal.SIGKILL)
         text, _ = process.communicate(
@@ -283,7 +302,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(
             ledger.read_bytes().splitlines()[0][:200]
         )  # as if it had been writing
     slow.unlink()
-    variants.write(slow, variants.variant(1.0005))
+    variants.write(slow, variants.make_variant(1.0005))
     again = run(*args)
     assert again.stderr.startswith(f"note: {finished} of 4 runs reused from {ledger}\n")
     whole = run(*(arg for arg in args if arg not in ("--resume", str(ledger))))
@@ -302,12 +321,12 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
     os.mkfifo(tmp_path / "slow.csv")
     ledger = tmp_path / "ledger.ndjson"
     args = (*STUDY[:-1], jobs, runs[0], "slow.csv", "--resume", str(ledger))
-    with started(*args, cwd=tmp_path, text=True) as process:
+    with start_program(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, 1)
         time.sleep(0.1)
         (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
-        text, said = process.communicate(timeout=30)
-    assert (process.returncode, text, said.strip()) == (
+        text, error_output = process.communicate(timeout=30)
+    assert (process.returncode, text, error_output.strip()) == (
         -signal.SIGINT,
         "",
         "d2rpick: interrupted",
@@ -329,11 +348,11 @@ def test_a_run_that_kills_its_process_is_a_row(
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     args = (*STUDY[:-1], "2", "-f", "json", runs[0], "deadly.csv", *runs[1:])
-    with started(*args, cwd=tmp_path, text=True) as process:
+    with start_program(*args, cwd=tmp_path, text=True) as process:
         text, _ = process.communicate(timeout=30)
-    found = json.loads(text)
-    assert [row["status"] for row in found["runs"]] == ["ok", "failed", "ok", "ok"]
-    assert "memory" in found["runs"][1]["message"]
+    document = json.loads(text)
+    assert [row["status"] for row in document["runs"]] == ["ok", "failed", "ok", "ok"]
+    assert "memory" in document["runs"][1]["message"]
     assert process.returncode == 1
 
 
@@ -348,12 +367,12 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     args = (*STUDY[:-1], jobs, "-f", "json", "--exit-zero", runs[0], "odd.csv", runs[1])
-    with started(*args, cwd=tmp_path, text=True) as process:
+    with start_program(*args, cwd=tmp_path, text=True) as process:
         text, _ = process.communicate(timeout=30)
-    found = json.loads(text)
-    check_by_schema(found)
-    assert [row["status"] for row in found["runs"]] == ["ok", "internal-error", "ok"]
-    assert found["runs"][1]["message"].startswith(
+    document = json.loads(text)
+    check_by_schema(document)
+    assert [row["status"] for row in document["runs"]] == ["ok", "internal-error", "ok"]
+    assert document["runs"][1]["message"].startswith(
         "odd.csv: internal error, please report it (ZeroDivisionError"
     )
     assert process.returncode == 2
@@ -362,8 +381,8 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
 # Taking up where it ended.
 
 
-def taken(args: Sequence[str]) -> str:
-    """Say how many runs were taken from the ledger."""
+def count_taken(args: Sequence[str]) -> str:
+    """Return how many runs came from the ledger."""
     return next(
         (line for line in run(*args).stderr.splitlines() if "reused from" in line), ""
     )
@@ -374,16 +393,16 @@ def test_runs_are_computed_again_after_a_change(
 ) -> None:
     ledger = str(tmp_path / "ledger.ndjson")
     args = (*STUDY, *runs, "--resume", ledger)
-    assert taken(args) == ""
-    assert taken(args) == f"note: 3 of 3 runs reused from {ledger}"
+    assert count_taken(args) == ""
+    assert count_taken(args) == f"note: 3 of 3 runs reused from {ledger}"
     changed = "have changed, or were computed with other options"
     assert (
-        taken((*args, "--tolerance", "0.19"))
+        count_taken((*args, "--tolerance", "0.19"))
         == f"note: 0 of 3 runs reused from {ledger}; 3 {changed}"
     )
     os.utime(runs[1])
-    assert taken(args) == f"note: 2 of 3 runs reused from {ledger}; 1 {changed}"
-    assert taken((*args, "--tolerance", "0.19")).startswith("note: 2 of 3")
+    assert count_taken(args) == f"note: 2 of 3 runs reused from {ledger}; 1 {changed}"
+    assert count_taken((*args, "--tolerance", "0.19")).startswith("note: 2 of 3")
     assert run(*args, "-q").stderr == ""
 
 
@@ -392,10 +411,10 @@ def test_what_ndjson_gave_can_be_taken_up(runs: list[str], tmp_path: Path) -> No
         tmp_path / "result.ndjson", run(*STUDY, *runs[:2], "-f", "ndjson").stdout
     )
     assert (
-        taken((*STUDY, *runs, "--resume", str(ledger)))
+        count_taken((*STUDY, *runs, "--resume", str(ledger)))
         == f"note: 2 of 3 runs reused from {ledger}"
     )
-    *_, third = lines_of(ledger.read_text())
+    *_, third = read_lines(ledger.read_text())
     assert third["source"] == runs[2]
 
 
@@ -406,9 +425,9 @@ def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(
     ledger, figure = str(tmp_path / "ledger.ndjson"), str(tmp_path / "figure.svg")
     run(*STUDY, *runs, "--resume", ledger)
     args = (*STUDY, *runs, "--resume", ledger, "--plot", figure, "--overwrite")
-    assert taken(args).startswith("note: 0 of 3")
+    assert count_taken(args).startswith("note: 0 of 3")
     first = Path(figure).read_bytes()
-    assert taken(args).startswith("note: 3 of 3")
+    assert count_taken(args).startswith("note: 3 of 3")
     assert Path(figure).read_bytes() == first
 
 
@@ -417,7 +436,7 @@ def test_a_ledger_is_never_replaced_by_a_result(
     runs: list[str], tmp_path: Path, option: str
 ) -> None:
     name = str(tmp_path / "file.svg")
-    assert "are the same file" in refused(
+    assert "are the same file" in read_refusal(
         *STUDY, *runs, "--resume", name, option, name, "--overwrite"
     )
     assert not Path(name).exists()
@@ -427,13 +446,13 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
     ledger = tmp_path / "ledger.ndjson"
     with (
         ledger.open("w") as file,
-        started(
+        start_program(
             *STUDY, *runs, "--resume", str(ledger), stdout=file, text=True
         ) as process,
     ):
-        _, said = process.communicate(timeout=30)
+        _, error_output = process.communicate(timeout=30)
     assert process.returncode == 2
-    assert "standard output are the same file" in said
+    assert "standard output are the same file" in error_output
 
 
 # Files.
@@ -446,12 +465,12 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(
     # a database by its content; its name is none that a plot would have
     (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
     (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
-    before = (tmp_path / "glstat").read_bytes()
+    content_before = (tmp_path / "glstat").read_bytes()
     result = run(
         *STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite"
     )
     assert (result.exit_code, "this is an input" in result.stderr) == (2, True)
-    assert (tmp_path / "glstat").read_bytes() == before
+    assert (tmp_path / "glstat").read_bytes() == content_before
 
 
 # Svg grows most with the number of curves; from eleven runs on they are drawn as many.

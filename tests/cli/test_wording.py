@@ -1,4 +1,4 @@
-"""The library speaks of arguments; every argument that a message names has an option."""
+"""Each argument named in a library message has an option of the same name."""
 
 import ast
 import re
@@ -8,14 +8,14 @@ import pytest
 
 from d2rpick.cli import COMMANDS
 from d2rpick.cli.output import ARGUMENTS, option_of, with_options
-from tests.command import ENERGY, ROLLOVER, ROOT, run, unwrapped
+from tests.command import ENERGY, ROLLOVER, ROOT, join_wrapped_lines, run
 
 # Layers whose messages name no options.
 SPEAKING = ("histories", "vibration", "flight", "choice", "models")
 
 
-def messages(folder: str) -> Iterator[str]:
-    """Texts in the code of a folder that are no docstrings."""
+def find_messages(folder: str) -> Iterator[str]:
+    """Yield the strings in the code of a folder that are not docstrings."""
     for path in sorted((ROOT / "d2rpick" / folder).rglob("*.py")):
         nodes = list(ast.walk(ast.parse(path.read_text())))
         stated = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
@@ -30,7 +30,7 @@ def messages(folder: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("folder", SPEAKING)
 def test_messages_name_arguments_and_no_options(folder: str) -> None:
-    texts = list(messages(folder))
+    texts = list(find_messages(folder))
     assert texts
     assert [text for text in texts if re.search(r"(^|\s|\()--[a-z]", text)] == []
     assert [
@@ -43,8 +43,10 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
 
 @pytest.mark.slow
 def test_every_argument_has_an_option_that_exists() -> None:
-    shown = "".join(run(command, "--help").stdout for command in COMMANDS)
-    assert {name for name in ARGUMENTS if f"{option_of(name)} " not in shown} == set()
+    help_text = "".join(run(command, "--help").stdout for command in COMMANDS)
+    assert {
+        name for name in ARGUMENTS if f"{option_of(name)} " not in help_text
+    } == set()
 
 
 def test_the_command_line_names_the_option_that_cures() -> None:
@@ -54,7 +56,7 @@ def test_the_command_line_names_the_option_that_cures() -> None:
         in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr
     )
     assert "choose with --energy: " in run("suggest", "--td", "0.37", ROLLOVER).stderr
-    assert "choose with --energy: " in unwrapped(
+    assert "choose with --energy: " in join_wrapped_lines(
         run("study", "--td", "0.37", ROLLOVER).stdout
     )
     assert (

@@ -21,7 +21,7 @@ from d2rpick.deck.reader import read_deck
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.rule import BACK, GOOD, PARTS, THERE
-from tests.decks import spans, write
+from tests.decks import list_spans, write
 from tests.sample_deck import DECK
 
 WINDOW = [(1, 0.02, 0.09)]
@@ -210,13 +210,13 @@ def test_rows_that_are_read_late_are_those_of_the_keywords(
     deck = read_deck(deck.path)
     change(tmp_path / "main.k", LATER)
     if size == "small":
-        assert spans(deck) == WINDOW
+        assert list_spans(deck) == WINDOW
     else:
         with pytest.raises(
             DeckError,
             match=r"main\.k: the file was rewritten or replaced while it was read; read it",
         ):
-            spans(deck)
+            list_spans(deck)
 
 
 @pytest.mark.parametrize("size", ["small", "big"])
@@ -271,7 +271,7 @@ def test_a_deck_that_is_half_saved_is_read_when_it_is_whole(
             write(tmp_path, text)
 
     monkeypatch.setattr(time, "sleep", write_the_rest)
-    assert spans(read_deck(path)) == WINDOW
+    assert list_spans(read_deck(path)) == WINDOW
 
 
 @pytest.mark.usefixtures("new_files")
@@ -298,7 +298,7 @@ def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None
     assert find_main_decks(str(tmp_path)) == [main]
     writer = Thread(target=lambda: pipe.write_text(GOOD))
     writer.start()
-    assert spans(read_deck(str(pipe))) == WINDOW
+    assert list_spans(read_deck(str(pipe))) == WINDOW
     writer.join()
 
 

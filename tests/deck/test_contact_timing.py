@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 import d2rpick as d2
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.contact_timing import Pushes, find_pair_timing, find_sensor_timing
-from tests.command import answer, put, refused, run
+from tests.command import put, read_refusal, run, run_json
 
 PUSHES = Pushes(
     ((0.0, 0.01), (0.05, 0.06), (0.062, 0.07), (0.12, 0.13), (0.2, 0.21)), speed=3.0
@@ -110,7 +110,7 @@ def test_the_printed_pair_is_read_back_with_its_windows(
     )
     assert card is not None
     assert len(card.card.windows) == 2
-    report = answer(
+    report = run_json(
         "check", str(put(tmp_path / "pair.k", card.card.text)), "--history", falls
     )
     read_windows = [(window["tr"], window["td"]) for window in report["windows"]]
@@ -141,13 +141,13 @@ def test_the_printed_sensor_names_its_wait_and_wall(falls: str) -> None:
 def test_what_pushes_has_to_be_named_once(
     falls: str, options: tuple[str, ...], message: str
 ) -> None:
-    assert message in refused(
+    assert message in read_refusal(
         "plan", "-q", "--part", "box", "--no-verify", "-f", "card", *options, falls
     )
 
 
 def test_without_momenta_nothing_shows_when_something_pushes() -> None:
-    message = refused(
+    message = read_refusal(
         "card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT
     )
     assert "needs a history with the force of that contact or wall" in message

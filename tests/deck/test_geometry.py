@@ -13,9 +13,9 @@ from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from tests.command import put
-from tests.computed import starter, stored
+from tests.computed import locate_stored, read_starter
 from tests.deck import test_ls_dyna_inventory as dyna, test_radioss_inventory as rad
-from tests.decks import read, row, wide
+from tests.decks import make_row, pad, read
 
 RHO, E, NU = 8000.0, 2.0e11, 0.25
 SPEED = math.sqrt(E / RHO)
@@ -44,20 +44,20 @@ IN_SOLIDS = SPEED * math.sqrt((1 - NU) / ((1 + NU) * (1 - 2 * NU)))
 @pytest.mark.parametrize(
     ("section", "elements", "mass", "step"),
     [
-        (SHELL, "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 3, 4), RHO * 2 * 0.01, 1 / IN_SHELLS),
-        (SHELL, "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 3, 3), RHO * 0.01, 2 / math.sqrt(5) / IN_SHELLS),
-        ("*SECTION_SOLID\n         1         2\n", "*ELEMENT_SOLID\n" + row(1, 7, *range(1, 9)), RHO * 6,
+        (SHELL, "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 3, 4), RHO * 2 * 0.01, 1 / IN_SHELLS),
+        (SHELL, "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 3, 3), RHO * 0.01, 2 / math.sqrt(5) / IN_SHELLS),
+        ("*SECTION_SOLID\n         1         2\n", "*ELEMENT_SOLID\n" + make_row(1, 7, *range(1, 9)), RHO * 6,
          1 / IN_SOLIDS),
-        ("*SECTION_SOLID\n         1        10\n", "*ELEMENT_SOLID\n" + row(1, 7, 1, 2, 4, 5, 5, 5, 5, 5), RHO,
+        ("*SECTION_SOLID\n         1        10\n", "*ELEMENT_SOLID\n" + make_row(1, 7, 1, 2, 4, 5, 5, 5, 5, 5), RHO,
          3 / math.sqrt(49 / 4) / IN_SOLIDS),
-        ("*SECTION_BEAM\n         1         2\n      0.05\n", "*ELEMENT_BEAM\n" + row(1, 7, 1, 2), RHO * 0.1,
+        ("*SECTION_BEAM\n         1         2\n      0.05\n", "*ELEMENT_BEAM\n" + make_row(1, 7, 1, 2), RHO * 0.1,
          2 / SPEED),
     ],
 )  # fmt: skip
 def test_by_hand(
     tmp_path: Path, section: str, elements: str, mass: float, step: float
 ) -> None:
-    part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
+    part = "*KEYWORD\n*PART\na\n" + make_row(7, 1, 1, width=10)
     masses = compute_masses_and_steps(
         ls_dyna_inventory.read_ls_dyna_inventory(
             read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")
@@ -68,8 +68,8 @@ def test_by_hand(
 
 @pytest.mark.parametrize("lost", ["*MAT", "*SECTION", "*NODE"])
 def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> None:
-    part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 3, 4)}*END\n".replace(
+    part = "*KEYWORD\n*PART\na\n" + make_row(7, 1, 1, width=10)
+    text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{make_row(1, 7, 1, 2, 3, 4)}*END\n".replace(
         lost, "*OTHER"
     )
     mass, step = compute_masses_and_steps(
@@ -80,11 +80,11 @@ def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> No
 
 
 def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
-    part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
+    part = "*KEYWORD\n*PART\na\n" + make_row(7, 1, 1, width=10)
     assert (
         compute_masses_and_steps(
             ls_dyna_inventory.read_ls_dyna_inventory(
-                read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n")
+                read(tmp_path, f"{part}*ELEMENT_SHELL\n{make_row(1, 7, 1)}*END\n")
             )
         )
         == {}
@@ -92,13 +92,13 @@ def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
 
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
-    (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
+    (tmp_path / "CAR_0000.rad").write_bytes(read_starter("CAR"))
     masses = compute_masses_and_steps(
         radioss_inventory.read_radioss_inventory(
             read_run(str(tmp_path / "CAR_0000.rad"))
         )
     )
-    lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
+    lines = Path(locate_stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)
     for cells in rows:
         values = dict(zip(head, cells, strict=True))
@@ -174,9 +174,9 @@ def test_where_elements_are_missing_no_part_is_placed() -> None:
     assert Placement(replace(make_plate(), complete=False)).parts == {}
 
 
-PART = f"/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 4, 6)}{rad.PROPS}"
+PART = f"/PART/1\na\n{pad(1, 1)}/SHELL/1\n{pad(1, 1, 2, 4, 6)}{rad.PROPS}"
 WATCHED = "/TH/NODE/7\nthree points\nDX        VX\n         2         0first\n        99         0no node\n         4\n"
-PLATE = "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3)
+PLATE = "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 4, 3)
 
 
 def list_coordinates(inventory: Inventory) -> list[list[float]]:
@@ -194,9 +194,9 @@ def test_nodes_of_a_time_history_are_watched(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keyword", "ids"),
     [
-        ("", row(2, 99, 4, width=10)),
+        ("", make_row(2, 99, 4, width=10)),
         ("_ID", "         2first\n         4second\n"),
-        ("_SET", row(2, 4, width=10)),  # sets of nodes, not nodes
+        ("_SET", make_row(2, 4, width=10)),  # sets of nodes, not nodes
     ],
 )
 def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> None:
@@ -241,7 +241,7 @@ def test_a_starter_that_moves_its_nodes_places_no_part(tmp_path: Path) -> None:
 
 
 def test_the_car_lies_where_its_generator_put_it(tmp_path: Path) -> None:
-    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
     placed_parts = Placement(read_inventory(str(deck)))
     np.testing.assert_allclose(
         placed_parts.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9

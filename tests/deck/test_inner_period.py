@@ -9,8 +9,8 @@ from hypothesis import given, settings, strategies as st
 from d2rpick.deck import read_inventory
 from d2rpick.deck.pieces import find_inner_period
 from tests.command import put
-from tests.decks import wide
-from tests.sprung import DENSITY, cubes
+from tests.decks import pad
+from tests.sprung import DENSITY, write_cubes
 
 
 def find_period(folder: Path, deck: str) -> tuple[float, ...] | None:
@@ -40,25 +40,25 @@ def test_two_masses_on_parallel_springs(
     )
     periods = find_period(
         tmp_path_factory.mktemp("deck"),
-        cubes((first_mass, second_mass), [(10, 20, k) for k in stiffness]),
+        write_cubes((first_mass, second_mass), [(10, 20, k) for k in stiffness]),
     )
     assert periods is not None
     assert periods == pytest.approx((expected, expected))
 
 
 def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -> None:
-    deck = cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 1.0)])
+    deck = write_cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 1.0)])
     periods = find_period(tmp_path, deck)
     assert periods
     assert (
         periods[0] < 1
     )  # [s]; the light mass on its soft spring has a period of 0.6 s
     softer = find_period(
-        tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)])
+        tmp_path, write_cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)])
     )
     assert softer == pytest.approx(periods, rel=1e-5)
     heavier = find_period(
-        tmp_path, cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)])
+        tmp_path, write_cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)])
     )
     assert heavier
     assert heavier[0] > 1
@@ -69,7 +69,7 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
     side, stiffness = 2.0, 1e5
     mass = DENSITY * side**3
     periods = find_period(
-        tmp_path, cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)])
+        tmp_path, write_cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)])
     )
     angle = math.atan(side / 10)
     both = (
@@ -82,12 +82,16 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "deck",
     [
-        cubes((5.0, 5.0), []),
-        cubes((5.0, 5.0), [(10, 20, 0.0)]),
-        cubes((5.0, 5.0), [(10, 20, 1e5)], prop="SPR_GENE"),
-        cubes((5.0, 5.0), [(10, 20, 1e5)], more=wide(7)),
-        cubes((5.0, 5.0), [(10, 20, 1e5)]).replace("/END", "#include other.inc\n/END"),
-        cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(f"{DENSITY:>20}", f"{0.0:>20}"),
+        write_cubes((5.0, 5.0), []),
+        write_cubes((5.0, 5.0), [(10, 20, 0.0)]),
+        write_cubes((5.0, 5.0), [(10, 20, 1e5)], prop="SPR_GENE"),
+        write_cubes((5.0, 5.0), [(10, 20, 1e5)], extra_text=pad(7)),
+        write_cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(
+            "/END", "#include other.inc\n/END"
+        ),
+        write_cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(
+            f"{DENSITY:>20}", f"{0.0:>20}"
+        ),
     ],
     ids=[
         "no springs",

@@ -9,33 +9,31 @@ from d2rpick.deck.model import Inventory
 from d2rpick.flight.position_error import RigidBody
 from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_ls_dyna_inventory import read_text, write_nodes
-from tests.decks import row, wide
+from tests.decks import make_row, pad
 
 # Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.
 MESH = (
     "*KEYWORD\n"
     + "".join(f"*PART\np{part}\n{part:10d}         1         1\n" for part in (7, 9, 11))
     + "*NODE\n" + write_nodes()
-    + "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7) + row(3, 11, 9, 10, 12, 11)
+    + "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 4, 3) + make_row(2, 9, 5, 6, 8, 7) + make_row(3, 11, 9, 10, 12, 11)
 )  # fmt: skip
 
 
-SET = "*SET_NODE_LIST\n" + wide(5) + wide(4, 5)
+SET = "*SET_NODE_LIST\n" + pad(5) + pad(4, 5)
 JOINTS = {
-    "spotweld": "*CONSTRAINED_SPOTWELD\n" + wide(4, 5),
-    "spotweld of an id": "*CONSTRAINED_SPOTWELD_ID\n" + wide(99) + wide(4, 5),
-    "rivet": "*CONSTRAINED_RIVET\n" + wide(5, 1),
-    "nodal rigid body": SET + "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 5),
-    "generalized weld": SET + "*CONSTRAINED_GENERALIZED_WELD_SPOT\n" + wide(5, 0),
-    "extra nodes": "*CONSTRAINED_EXTRA_NODES_NODE\n" + wide(9, 2),
-    "extra nodes of a set": SET + "*CONSTRAINED_EXTRA_NODES_SET\n" + wide(9, 5),
-    "tied contact": "*CONTACT_TIED_SHELL_EDGE_TO_SURFACE\n" + wide(7, 9, 3, 3),
+    "spotweld": "*CONSTRAINED_SPOTWELD\n" + pad(4, 5),
+    "spotweld of an id": "*CONSTRAINED_SPOTWELD_ID\n" + pad(99) + pad(4, 5),
+    "rivet": "*CONSTRAINED_RIVET\n" + pad(5, 1),
+    "nodal rigid body": SET + "*CONSTRAINED_NODAL_RIGID_BODY\n" + pad(1, 0, 5),
+    "generalized weld": SET + "*CONSTRAINED_GENERALIZED_WELD_SPOT\n" + pad(5, 0),
+    "extra nodes": "*CONSTRAINED_EXTRA_NODES_NODE\n" + pad(9, 2),
+    "extra nodes of a set": SET + "*CONSTRAINED_EXTRA_NODES_SET\n" + pad(9, 5),
+    "tied contact": "*CONTACT_TIED_SHELL_EDGE_TO_SURFACE\n" + pad(7, 9, 3, 3),
     "tied contact of an id": "*CONTACT_TIED_NODES_TO_SURFACE_ID\n"
-    + wide(1)
-    + wide(7, 9, 3, 3),
-    "tied contact of nodes": SET
-    + "*CONTACT_TIED_NODES_TO_SURFACE\n"
-    + wide(5, 9, 4, 3),
+    + pad(1)
+    + pad(7, 9, 3, 3),
+    "tied contact of nodes": SET + "*CONTACT_TIED_NODES_TO_SURFACE\n" + pad(5, 9, 4, 3),
 }
 
 
@@ -58,8 +56,8 @@ def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(
 ) -> None:
     for text in (
         "",
-        "*CONSTRAINED_SPOTWELD\n" + wide(1, 2),
-        "*CONSTRAINED_SPOTWELD\n" + wide(4, 999),
+        "*CONSTRAINED_SPOTWELD\n" + pad(1, 2),
+        "*CONSTRAINED_SPOTWELD\n" + pad(4, 999),
     ):
         inventory = read_with_mesh(tmp_path, text)
         assert inventory.groups([7, 9, 11]) == ((7,), (9,), (11,))
@@ -72,7 +70,7 @@ def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(
 
 def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) -> None:
     inventory = read_with_mesh(
-        tmp_path, "*CONSTRAINED_SPOTWELD\n" + wide(4, 5) + wide(6, 9)
+        tmp_path, "*CONSTRAINED_SPOTWELD\n" + pad(4, 5) + pad(6, 9)
     )
     assert inventory.groups([7, 9, 11]) == ((7, 9, 11),)
     assert inventory.groups([7, 11]) == (
@@ -85,27 +83,36 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
     ("text", "told"),
     [
         (
-            "*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(1, 2, 0, 0),
+            "*CONTACT_TIED_NODES_TO_SURFACE\n" + pad(1, 2, 0, 0),
             "*CONTACT_TIED_NODES_TO_SURFACE",
         ),
-        ("*CONTACT_SPOTWELD\n" + wide(1, 2, 2, 2), "*CONTACT_SPOTWELD"),
+        ("*CONTACT_SPOTWELD\n" + pad(1, 2, 2, 2), "*CONTACT_SPOTWELD"),
         (
-            "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + wide(1, 2, 2, 2),
+            "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + pad(1, 2, 2, 2),
             "TIEBREAK",
         ),
-        ("*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + wide(0) + wide(7, 9, 3, 3), "MPP"),
         (
-            "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77),
+            "*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + pad(0) + pad(7, 9, 3, 3),
+            "MPP",
+        ),
+        (
+            "*CONSTRAINED_NODAL_RIGID_BODY\n" + pad(1, 0, 77),
             "nodal rigid body",
         ),  # the set does not exist
-        ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
+        ("*CONSTRAINED_SPR2\n" + pad(7, 9), "*CONSTRAINED_SPR2"),
         (
-            "*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456),
+            "*CONSTRAINED_INTERPOLATION\n" + pad(1, 2, 123456),
             "*CONSTRAINED_INTERPOLATION",
         ),
-        ("*CONSTRAINED_BEAM_IN_SOLID_ID\n" + wide(1), "*CONSTRAINED_BEAM_IN_SOLID_ID"),
-        ("*CONSTRAINED_LINEAR_GLOBAL\n" + wide(1), "*CONSTRAINED_LINEAR_GLOBAL"),
-        ("*CONSTRAINED_TIE-BREAK\n" + wide(1, 2), "*CONSTRAINED_TIE-BREAK"),
+        (
+            "*CONSTRAINED_BEAM_IN_SOLID_ID\n" + pad(1),
+            "*CONSTRAINED_BEAM_IN_SOLID_ID",
+        ),
+        (
+            "*CONSTRAINED_LINEAR_GLOBAL\n" + pad(1),
+            "*CONSTRAINED_LINEAR_GLOBAL",
+        ),
+        ("*CONSTRAINED_TIE-BREAK\n" + pad(1, 2), "*CONSTRAINED_TIE-BREAK"),
     ],
 )
 def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
@@ -121,7 +128,7 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
 
 
 RADIOSS = "".join(
-    f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}"
+    f"/PART/{n}\np{n}\n{pad(1, 1)}/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}"
     for n in (1, 2, 3)
 )
 
@@ -129,16 +136,16 @@ RADIOSS = "".join(
 @pytest.mark.parametrize(
     ("group", "surface", "joined"),
     [
-        (f"/GRNOD/PART/5\ng\n{wide(1)}", f"/SURF/PART/6\ns\n{wide(2)}", {1: {2}, 2: {1}}),
-        (f"/GRNOD/NODE/5\ng\n{wide(4, 3)}", f"/SURF/PART/EXT/6\ns\n{wide(2)}", {1: {2}, 2: {1}}),
-        (f"/GRNOD/NODE/5\ng\n{wide(4, 3)}", f"/SURF/PART/6\ns\n{wide(2, 3)}", None),
-        (f"/GRNOD/BOX/5\ng\n{wide(4)}", f"/SURF/PART/6\ns\n{wide(2)}", None),
+        (f"/GRNOD/PART/5\ng\n{pad(1)}", f"/SURF/PART/6\ns\n{pad(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{pad(4, 3)}", f"/SURF/PART/EXT/6\ns\n{pad(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{pad(4, 3)}", f"/SURF/PART/6\ns\n{pad(2, 3)}", None),
+        (f"/GRNOD/BOX/5\ng\n{pad(4)}", f"/SURF/PART/6\ns\n{pad(2)}", None),
     ],
 )  # fmt: skip
 def test_tied_interfaces_of_radioss(
     tmp_path: Path, group: str, surface: str, joined: dict[int, set[int]] | None
 ) -> None:
-    tie = f"/INTER/TYPE2/1\ntie\n{wide(5, 6)}"
+    tie = f"/INTER/TYPE2/1\ntie\n{pad(5, 6)}"
     inventory = rad.read_text(
         tmp_path, rad.write_nodes(12) + RADIOSS + rad.PROPS + group + surface + tie
     )
@@ -153,7 +160,7 @@ def test_tied_interfaces_of_radioss(
 def test_other_ties_of_radioss_leave_the_bodies_open(
     tmp_path: Path, keyword: str
 ) -> None:
-    tie = f"/{keyword}/1\ntie\n{wide(4, 0, 0, 5)}"
+    tie = f"/{keyword}/1\ntie\n{pad(4, 0, 0, 5)}"
     inventory = rad.read_text(tmp_path, rad.write_nodes(12) + RADIOSS + rad.PROPS + tie)
     assert [tie.split()[0] for tie in inventory.ties] == [f"/{keyword}/1"]
     assert bodies_of(inventory, [1, 2]) == ()

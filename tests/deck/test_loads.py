@@ -17,7 +17,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.histories.run import Run
 from d2rpick.histories.surroundings import Surroundings
 from tests import made_car
-from tests.decks import wide
+from tests.decks import pad
 
 BODY, WHEEL, OTHER = (
     set(made_car.BODY),
@@ -27,19 +27,19 @@ BODY, WHEEL, OTHER = (
 
 
 def write_group(number: int, *nodes: int) -> str:
-    return f"/GRNOD/NODE/{number}\nnodes\n{wide(*nodes)}"
+    return f"/GRNOD/NODE/{number}\nnodes\n{pad(*nodes)}"
 
 
 def write_support(code: str, group: int, skew: int = 0) -> str:
-    return f"/BCS/1\nheld\n   {code}{wide(skew, group)}"
+    return f"/BCS/1\nheld\n   {code}{pad(skew, group)}"
 
 
 def read_radioss(folder: Path, further_cards: str) -> Inventory:
-    return read_inventory(made_car.starter(folder, further_cards))
+    return read_inventory(made_car.write_starter(folder, further_cards))
 
 
 def read_ls_dyna(folder: Path, further_cards: str) -> Inventory:
-    return read_inventory(made_car.keywords(folder, further_cards))
+    return read_inventory(made_car.write_keywords(folder, further_cards))
 
 
 def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
@@ -57,10 +57,10 @@ def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
         (write_group(1, 22) + write_support("111 111", 1), (WHEEL, True)),
         (write_group(1, *range(31, 37)) + write_support("111 111", 1), (OTHER, False)),  # completely fixed: an obstacle
         (write_group(1, *range(31, 37)) + write_support("110 111", 1), (set(), False)),  # no motion there, free along z
-        ("/GRNOD/PART/1\nparts\n" + wide(9) + write_support("111 000", 1), (OTHER, True)),
-        (write_group(1, 1) + "/IMPVEL/1\nmoved\n" + wide(1, "Y", 0, 0, 1), (BODY, True)),
-        ("/IMPDISP/FGEO/1\nmoved\n" + wide(1, 0) + wide(1.0, width=20) + wide(21, 1.0) + wide(22, 1.0), (WHEEL, True)),
-        (write_group(1, 99) + write_support("111 000", 1) + write_group(2, 1, 2) + "/RBODY/1\nbody\n" + wide(99, 0, 0,
+        ("/GRNOD/PART/1\nparts\n" + pad(9) + write_support("111 000", 1), (OTHER, True)),
+        (write_group(1, 1) + "/IMPVEL/1\nmoved\n" + pad(1, "Y", 0, 0, 1), (BODY, True)),
+        ("/IMPDISP/FGEO/1\nmoved\n" + pad(1, 0) + pad(1.0, width=20) + pad(21, 1.0) + pad(22, 1.0), (WHEEL, True)),
+        (write_group(1, 99) + write_support("111 000", 1) + write_group(2, 1, 2) + "/RBODY/1\nbody\n" + pad(99, 0, 0,
          0, "", 0, 2),
          (BODY, True)),
     ],
@@ -110,8 +110,8 @@ def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sens
     for sensor, times in ((0, (0.01, 0.05)), (4, (0.0, inf))):
         moved = (
             "/IMPVEL/1\nmoved\n"
-            + wide(1, "X", 0, sensor, 1)
-            + wide(0, 1, 0.01, 0.05, width=20)
+            + pad(1, "X", 0, sensor, 1)
+            + pad(0, 1, 0.01, 0.05, width=20)
         )
         (hold,) = read_radioss(tmp_path, write_group(1, 1) + moved).boundary.holds
         assert (hold.start, hold.end) == times
@@ -122,18 +122,18 @@ def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sens
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
-        ("*BOUNDARY_SPC_NODE\n" + wide(1, 0, 1, 1, 1), BODY),
-        ("*BOUNDARY_SPC_NODE\n" + wide(1, 0, 0, 0, 0), set()),
-        ("*BOUNDARY_SPC_SET_ID\n" + wide(5) + wide(4, 0, 1, 1, 1) + "*SET_NODE_LIST\n" + wide(4) + wide(21, 22), WHEEL),
-        ("*BOUNDARY_SPC_SYMMETRY_PLANE\n" + wide(1), set()),
-        ("*CONSTRAINED_GLOBAL\n" + wide(7, 7, 2, 0.0, 1.6, 0.0), BODY),
-        ("*CONSTRAINED_GLOBAL\n" + wide(2, 0, 2, 0.0, 1.6, 0.0), set()),  # a symmetry plane
-        ("*NODE\n" + f"{99:8d}" + wide(0, 0, 0, width=16).rstrip() + wide(7, 7, width=8) + "*CONSTRAINED_SPOTWELD\n"
-         + wide(99, 1), BODY),
-        ("*PART\ntool\n" + wide(10, 1, 2) + "*MAT_RIGID\n" + wide(2, 7800.0, 2.1e11, 0.3) + wide(1.0, 7, 7)
-         + "*ELEMENT_SHELL\n" + wide(99, 10, 1, 2, 6, 5, width=8), BODY | {10}),
-        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n" + wide(9, 1, 2, 1, 1.0), OTHER),
-        ("*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + wide(1, 9, 2, 1, 1.0) + wide(1, 1) + wide(21, 1, 2, 1, 1.0),
+        ("*BOUNDARY_SPC_NODE\n" + pad(1, 0, 1, 1, 1), BODY),
+        ("*BOUNDARY_SPC_NODE\n" + pad(1, 0, 0, 0, 0), set()),
+        ("*BOUNDARY_SPC_SET_ID\n" + pad(5) + pad(4, 0, 1, 1, 1) + "*SET_NODE_LIST\n" + pad(4) + pad(21, 22), WHEEL),
+        ("*BOUNDARY_SPC_SYMMETRY_PLANE\n" + pad(1), set()),
+        ("*CONSTRAINED_GLOBAL\n" + pad(7, 7, 2, 0.0, 1.6, 0.0), BODY),
+        ("*CONSTRAINED_GLOBAL\n" + pad(2, 0, 2, 0.0, 1.6, 0.0), set()),  # a symmetry plane
+        ("*NODE\n" + f"{99:8d}" + pad(0, 0, 0, width=16).rstrip() + pad(7, 7, width=8) + "*CONSTRAINED_SPOTWELD\n"
+         + pad(99, 1), BODY),
+        ("*PART\ntool\n" + pad(10, 1, 2) + "*MAT_RIGID\n" + pad(2, 7800.0, 2.1e11, 0.3) + pad(1.0, 7, 7)
+         + "*ELEMENT_SHELL\n" + pad(99, 10, 1, 2, 6, 5, width=8), BODY | {10}),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n" + pad(9, 1, 2, 1, 1.0), OTHER),
+        ("*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + pad(1, 9, 2, 1, 1.0) + pad(1, 1) + pad(21, 1, 2, 1, 1.0),
          BODY | WHEEL),
     ],
 )  # fmt: skip
@@ -142,21 +142,22 @@ def test_supports_of_ls_dyna(tmp_path: Path, more: str, expected: set[int]) -> N
 
 
 def test_birth_and_death(tmp_path: Path) -> None:
-    motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + wide(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
-    spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + wide(1, 0, 1, 1, 1) + wide(0.0, 0.02)
+    motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + pad(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
+    spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + pad(1, 0, 1, 1, 1) + pad(0.0, 0.02)
     holds = read_ls_dyna(tmp_path, motion + spc).boundary.holds
     assert {(hold.start, hold.end) for hold in holds} == {(0.01, 0.05), (0.0, 0.02)}
 
 
 def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
     boundary = read_radioss(
-        tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + write_support("111 000", 1)
+        tmp_path,
+        "/GRNOD/BOX/1\nnodes\n" + pad(1) + write_support("111 000", 1),
     ).boundary
     assert not boundary.holds
     assert "/BCS/1" in boundary.notes[0]
     boundary = read_ls_dyna(
         tmp_path,
-        "*BOUNDARY_SPC_SET\n" + wide(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + wide(1, 1.0),
+        "*BOUNDARY_SPC_SET\n" + pad(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + pad(1, 1.0),
     ).boundary
     assert [note.split(" ")[0] for note in boundary.notes] == [
         "*BOUNDARY_SPC_SET",
@@ -174,7 +175,7 @@ def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
 def write_gravity(
     function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z"
 ) -> str:
-    return f"/GRAV/2\nmore\n{wide(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
+    return f"/GRAV/2\nmore\n{pad(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
 
 
 def find_surroundings(inventory: Inventory) -> Surroundings:
@@ -183,7 +184,7 @@ def find_surroundings(inventory: Inventory) -> Surroundings:
 
 
 RAMP = "/FUNCT/1\nramp\n" + "".join(
-    wide(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1))
+    pad(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1))
 )
 
 
@@ -218,7 +219,7 @@ def test_gravity_by_part(
         (RAMP + write_gravity(1, -1.62), (0.0, 1.62)),
         (write_gravity(0, -1.62, sensor=3), (0.0, 1.62)),
         (
-            RAMP.replace(wide(1, 0, width=20), "").replace(wide(3, 1, width=20), "")
+            RAMP.replace(pad(1, 0, width=20), "").replace(pad(3, 1, width=20), "")
             + write_gravity(1, 1.0),
             None,
         ),
@@ -228,7 +229,7 @@ def test_gravity_by_part(
 def test_values_that_gravity_keeps(
     tmp_path: Path, card: str, expected: tuple[float, ...] | None
 ) -> None:
-    name = made_car.starter(tmp_path, card)
+    name = made_car.write_starter(tmp_path, card)
     text = (tmp_path / "MADE_0000.rad").read_text()
     (tmp_path / "MADE_0000.rad").write_text(
         text.partition("/GRAV/1\n")[0] + card + "/END\n"
@@ -239,7 +240,7 @@ def test_values_that_gravity_keeps(
 def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
     tmp_path: Path,
 ) -> None:
-    name = made_car.starter(tmp_path)
+    name = made_car.write_starter(tmp_path)
     text = (tmp_path / "MADE_0000.rad").read_text().partition("/GRAV/1\n")[0]
     (tmp_path / "MADE_0000.rad").write_text(
         text
@@ -259,10 +260,10 @@ def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
     [
         ("", (9.81,)),
         (
-            "*SET_PART_LIST\n" + wide(5) + wide(1, 2) + "*LOAD_BODY_PARTS\n" + wide(5),
+            "*SET_PART_LIST\n" + pad(5) + pad(1, 2) + "*LOAD_BODY_PARTS\n" + pad(5),
             (0.0,),
         ),
-        ("*LOAD_BODY_VECTOR\n" + wide(1, 1.0), None),
+        ("*LOAD_BODY_VECTOR\n" + pad(1, 1.0), None),
     ],
 )
 def test_body_loads_of_ls_dyna(
@@ -274,8 +275,10 @@ def test_body_loads_of_ls_dyna(
 
 
 def test_the_deck_of_another_model_tells_nothing(tmp_path: Path) -> None:
-    history = made_car.t01(tmp_path, 3.0)
-    deck = made_car.starter(tmp_path, write_group(1, 1) + write_support("111 000", 1))
+    history = made_car.write_t01(tmp_path, 3.0)
+    deck = made_car.write_starter(
+        tmp_path, write_group(1, 1) + write_support("111 000", 1)
+    )
     assert in_deck(open_run([history]), read_inventory(deck)).surroundings.supports[1]
     other_inventory = read_inventory("sample_data/rollover_box.k")
     assert not in_deck(open_run([history]), other_inventory).surroundings.supports

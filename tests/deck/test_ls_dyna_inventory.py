@@ -12,8 +12,8 @@ from d2rpick.deck import ls_dyna_inventory, read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import count_pieces
 from d2rpick.deck.reader import read_deck
-from tests.decks import read, row, write
-from tests.sample_deck import DECK, FLYING, deck, radioss
+from tests.decks import make_row, read, write
+from tests.sample_deck import DECK, FLYING, make_deck, make_radioss_files
 
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 
@@ -37,8 +37,8 @@ def count_elements(deck_inventory: Inventory) -> dict[int, dict[str, int]]:
     return {part: dict(counts) for part, counts in deck_inventory.counts.items()}
 
 
-SHELLS = row(1, 7, 1, 2, 4, 3) + row(2, 7, 5, 6, 8, 7)
-WIDE = row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)
+SHELLS = make_row(1, 7, 1, 2, 4, 3) + make_row(2, 7, 5, 6, 8, 7)
+WIDE = make_row(1, 7, 1, 2, 4, 3, width=10) + make_row(2, 7, 5, 6, 8, 7, width=10)
 LINES = SHELLS.splitlines(keepends=True)
 
 
@@ -64,7 +64,9 @@ FORMS = {
     + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
     "lower case": f"*Element_Shell\n{SHELLS}",
     "CR LF": f"*ELEMENT_SHELL\n{SHELLS}".replace("\n", "\r\n"),
-    "triangles": "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8),
+    "triangles": "*ELEMENT_SHELL\n"
+    + make_row(1, 7, 1, 2, 4, 4)
+    + make_row(2, 7, 5, 6, 8),
     "trailing nodes": "*ELEMENT_SHELL\n" + SHELLS.replace("\n", "       0" * 4 + "\n"),
 }
 
@@ -79,8 +81,8 @@ def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None
 
 
 def test_long_format(tmp_path: Path) -> None:
-    head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20)
-    shells = row(1, 7, 1, 2, 4, 3, width=20) + row(2, 7, 5, 6, 8, 7, width=20)
+    head = "*KEYWORD LONG=Y\n*PART\na\n" + make_row(7, 1, 1, width=20)
+    shells = make_row(1, 7, 1, 2, 4, 3, width=20) + make_row(2, 7, 5, 6, 8, 7, width=20)
     long_inventory = read_text(
         tmp_path, f"{head}*NODE\n{write_nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n"
     )
@@ -91,20 +93,23 @@ def test_long_format(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("elements", "expected"),
     [
-        ("*ELEMENT_SOLID\n" + row(1, 7, *range(1, 9)), {7: {"solid": 1}}),
-        ("*ELEMENT_SOLID (ten nodes format)\n" + row(1, 7) + row(*range(1, 9)) + row(2, 9) + row(*range(5, 15)),
+        ("*ELEMENT_SOLID\n" + make_row(1, 7, *range(1, 9)), {7: {"solid": 1}}),
+        ("*ELEMENT_SOLID (ten nodes format)\n" + make_row(1, 7) + make_row(*range(1, 9))
+          + make_row(2, 9) + make_row(*range(5, 15)),
          {7: {"solid": 1}, 9: {"solid": 1}}),
-        ("*ELEMENT_SOLID_ORTHO\n" + row(1, 7, *range(1, 9)) + ("             1.0" * 3 + "\n") * 2, {7: {"solid": 1}}),
-        ("*ELEMENT_BEAM\n" + row(1, 7, 1, 2, 3) + row(2, 9, 2, 3, 0), {7: {"beam": 1}, 9: {"beam": 1}}),
-        ("*ELEMENT_BEAM_THICKNESS\n" + row(1, 7, 1, 2, 3) + "             2.0" * 4 + "\n", {7: {"beam": 1}}),
-        ("*ELEMENT_BEAM_PID\n" + row(1, 7, 1, 2, 3) + row(7, 9), {7: {"beam": 1}}),
-        ("*ELEMENT_DISCRETE\n" + row(1, 7, 1, 2, 0) + "       2       9       3       4       0   1.00E+00\n",
+        ("*ELEMENT_SOLID_ORTHO\n" + make_row(1, 7, *range(1, 9))
+          + ("             1.0" * 3 + "\n") * 2, {7: {"solid": 1}}),
+        ("*ELEMENT_BEAM\n" + make_row(1, 7, 1, 2, 3) + make_row(2, 9, 2, 3, 0), {7: {"beam": 1}, 9: {"beam": 1}}),
+        ("*ELEMENT_BEAM_THICKNESS\n" + make_row(1, 7, 1, 2, 3) + "             2.0" * 4 + "\n", {7: {"beam": 1}}),
+        ("*ELEMENT_BEAM_PID\n" + make_row(1, 7, 1, 2, 3) + make_row(7, 9), {7: {"beam": 1}}),
+        ("*ELEMENT_DISCRETE\n" + make_row(1, 7, 1, 2, 0) + "       2       9       3       4       0   1.00E+00\n",
          {7: {"spring": 1}, 9: {"spring": 1}}),
-        ("*ELEMENT_SOLID_H20\n" + (row(1, 7) + row(*range(1, 11)) + row(*range(11, 21))) * 2, {7: {"solid": 2}}),
-        ("*ELEMENT_SOLID_TET4TOTET10\n" + row(1, 7) + row(1, 2, 3, 5), {7: {"solid": 1}}),
-        ("*ELEMENT_SEATBELT\n" + row(1, 7, 1, 2) + "*ELEMENT_SEATBELT_SLIPRING\n" + row(1, 1, 2, width=10),
+        ("*ELEMENT_SOLID_H20\n"
+          + (make_row(1, 7) + make_row(*range(1, 11)) + make_row(*range(11, 21))) * 2, {7: {"solid": 2}}),
+        ("*ELEMENT_SOLID_TET4TOTET10\n" + make_row(1, 7) + make_row(1, 2, 3, 5), {7: {"solid": 1}}),
+        ("*ELEMENT_SEATBELT\n" + make_row(1, 7, 1, 2) + "*ELEMENT_SEATBELT_SLIPRING\n" + make_row(1, 1, 2, width=10),
          {7: {"seatbelt": 1}}),
-        ("*ELEMENT_TSHELL\n" + row(1, 7, *range(1, 9)), {7: {"thick shell": 1}}),
+        ("*ELEMENT_TSHELL\n" + make_row(1, 7, *range(1, 9)), {7: {"thick shell": 1}}),
         ("*ELEMENT_MASS\n       1       1             0.5       7\n", {}),
     ],
 )  # fmt: skip
@@ -122,7 +127,7 @@ def test_other_kinds(
 def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
     tmp_path: Path,
 ) -> None:
-    text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
+    text = "".join(make_row(n, 7) + make_row(*range(1, 9)) for n in range(1, 60_001))
     assert len(text) > 4 << 20  # a piece ends within the element
     for shift in (
         "",
@@ -137,9 +142,14 @@ def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
 def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(
     tmp_path: Path,
 ) -> None:
-    included_deck = f"*KEYWORD\n*PART\nc\n         1         1         1\n*ELEMENT_SHELL\n{row(1, 1, 1, 2, 4, 3)}*END\n"
-    transform = "*INCLUDE_TRANSFORM\nother.k\n" + row(4, 0, 20, 0, 0, width=10) + "\n\n"
-    elements = row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7)
+    included_deck = (
+        "*KEYWORD\n*PART\nc\n         1         1         1\n"
+        f"*ELEMENT_SHELL\n{make_row(1, 1, 1, 2, 4, 3)}*END\n"
+    )
+    transform = (
+        "*INCLUDE_TRANSFORM\nother.k\n" + make_row(4, 0, 20, 0, 0, width=10) + "\n\n"
+    )
+    elements = make_row(1, 7, 1, 2, 4, 3) + make_row(2, 9, 5, 6, 8, 7)
     main = f"{HEAD}*NODE\n{write_nodes()}*ELEMENT_SHELL\n{elements}{transform}*END\n"
     joined_inventory = read_text(tmp_path, main, other=included_deck)
     assert count_elements(joined_inventory) == {
@@ -154,9 +164,9 @@ def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(
 def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
     strange = (
         "*ELEMENT_SOLID_STRANGE\n"
-        + row(1, 7)
+        + make_row(1, 7)
         + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n"
-        + row(1, 5, 1, 2, 4, 99)
+        + make_row(1, 5, 1, 2, 4, 99)
     )
     partial_inventory = read_text(
         tmp_path, f"{HEAD}*NODE\n{write_nodes()}{strange}       2"
@@ -176,11 +186,13 @@ def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
 def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(
     tmp_path: Path,
 ) -> None:
-    head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20) + "*ELEMENT_SHELL\n"
-    first = 4_000_000_000
-    shells = row(1, 7, first, first + 1, first + 2, first + 3, width=20) + row(
-        2, 7, first, 5, 6, first + 9, width=20
+    head = (
+        "*KEYWORD LONG=Y\n*PART\na\n" + make_row(7, 1, 1, width=20) + "*ELEMENT_SHELL\n"
     )
+    first = 4_000_000_000
+    shells = make_row(
+        1, 7, first, first + 1, first + 2, first + 3, width=20
+    ) + make_row(2, 7, first, 5, 6, first + 9, width=20)
     wide = f"{3:20d}{7:20d}{'9' * 20}{first:20d}{first:20d}\n"
     large_inventory = read_text(tmp_path, f"{head}{shells}{wide}*END\n")
     assert count_elements(large_inventory) == {7: {"shell": 2}}
@@ -211,13 +223,16 @@ def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
 
 def test_materials_and_sections_are_told(tmp_path: Path) -> None:
     cards = (
-        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10)
+        "*MAT_RIGID\n" + make_row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + make_row(2, width=10)
         + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
-        + row(3, width=10) + "*MAT_FABRIC\n" + row(4, width=10) + "*MAT_SIMPLIFIED_RUBBER/FOAM\n" + row(5, width=10)
-        + "*SECTION_SOLID\n" + row(1, 1, width=10)
+        + make_row(3, width=10) + "*MAT_FABRIC\n" + make_row(4, width=10)
+        + "*MAT_SIMPLIFIED_RUBBER/FOAM\n" + make_row(5, width=10)
+        + "*SECTION_SOLID\n" + make_row(1, 1, width=10)
     )  # fmt: skip
     parts = "".join(f"*PART\np{n}\n{n:10d}{1:10d}{n:10d}\n" for n in range(1, 6))
-    solids = "*ELEMENT_SOLID\n" + "".join(row(n, n, *range(1, 9)) for n in range(1, 6))
+    solids = "*ELEMENT_SOLID\n" + "".join(
+        make_row(n, n, *range(1, 9)) for n in range(1, 6)
+    )
     part_data = read_text(
         tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{write_nodes()}{solids}*END\n"
     )
@@ -247,7 +262,7 @@ def test_counts_and_nodes_agree_with_a_plain_count(
         for n, (part, node) in enumerate(shells, start=1)
     ]
     parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
-    elements = "".join(row(*line) for line in lines)
+    elements = "".join(make_row(*line) for line in lines)
     text = f"*KEYWORD\n{parts}*NODE\n{write_nodes(count=44)}*ELEMENT_SHELL\n{elements}*END\n"
     random_inventory = ls_dyna_inventory.read_ls_dyna_inventory(
         read_deck(write(folder, text))
@@ -275,8 +290,10 @@ def test_counts_and_nodes_agree_with_a_plain_count(
 
 
 def test_the_sample_decks_are_what_their_module_writes() -> None:
-    assert DECK.read_text("utf-8") == deck()
-    assert {name: (FLYING / name).read_text("utf-8") for name in radioss()} == radioss()
+    assert DECK.read_text("utf-8") == make_deck()
+    assert {
+        name: (FLYING / name).read_text("utf-8") for name in make_radioss_files()
+    } == make_radioss_files()
     sample_inventory = read_inventory(str(DECK))
     assert count_elements(sample_inventory) == {
         1: {"shell": 94},
@@ -293,7 +310,7 @@ def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
         (9, 13, 14, 15, 16),
         (9, 16, 17, 18, 18),
     ]
-    mesh = "".join(row(number, *shell) for number, shell in enumerate(shells, 1))
+    mesh = "".join(make_row(number, *shell) for number, shell in enumerate(shells, 1))
     shell_inventory = read_text(
         tmp_path,
         HEAD + "*NODE\n" + write_nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n",

@@ -13,18 +13,18 @@ from tests import made_car
 from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_joints import MESH
 from tests.deck.test_ls_dyna_inventory import read_text
-from tests.decks import row, wide
+from tests.decks import make_row, pad
 
 # Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
-ROW = "".join(wide(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))
+ROW = "".join(pad(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))
 RADIOSS = (
-    "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}" for n in (1, 2, 3))
-    + f"/SHELL/1\n{ROW}/SHELL/2\n{wide(31, 41, 42, 44, 43)}/SHELL/3\n{wide(32, 45, 46, 48, 47)}"
+    "".join(f"/PART/{n}\np{n}\n{pad(1, 1)}" for n in (1, 2, 3))
+    + f"/SHELL/1\n{ROW}/SHELL/2\n{pad(31, 41, 42, 44, 43)}/SHELL/3\n{pad(32, 45, 46, 48, 47)}"
 )
-SPRING = f"/PART/9\nmount\n{wide(2, 1)}/SPRING/9\n"
+SPRING = f"/PART/9\nmount\n{pad(2, 1)}/SPRING/9\n"
 # The same for the three shells of LS-DYNA, on the nodes 1 to 12.
 DISCRETE = (
-    f"*PART\nmount\n{wide(15, 2)}*SECTION_DISCRETE\n{wide(2)}\n\n*ELEMENT_DISCRETE\n"
+    f"*PART\nmount\n{pad(15, 2)}*SECTION_DISCRETE\n{pad(2)}\n\n*ELEMENT_DISCRETE\n"
 )
 
 
@@ -37,7 +37,7 @@ def read_radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
 
 
 def write_body(number: int, *nodes: int) -> str:
-    group = "".join(wide(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
+    group = "".join(pad(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
     line = f"{48 + number:10d}{0:10d}{0:10d}{0:10d}{'0':>20}{number:10d}\n"
     return f"/RBODY/{number}\nrb\n{line}/GRNOD/NODE/{number}\ng\n{group}"
 
@@ -51,7 +51,7 @@ def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> N
 
 
 def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
-    inventory = read_radioss(tmp_path, SPRING, wide(91, 40, 41))
+    inventory = read_radioss(tmp_path, SPRING, pad(91, 40, 41))
     assert inventory.bodies([1, 2, 3]) == ((1, 2), (3,))
     assert inventory.bodies([1, 2, 3, 9]) == ((1, 2, 9), (3,))
     assert inventory.bodies([2, 3]) == ((2,), (3,))
@@ -66,7 +66,7 @@ def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
 
 
 def test_springs_of_ls_dyna_hold_parts_too(tmp_path: Path) -> None:
-    found = read_text(tmp_path, MESH + DISCRETE + row(91, 15, 4, 5) + "*END\n")
+    found = read_text(tmp_path, MESH + DISCRETE + make_row(91, 15, 4, 5) + "*END\n")
     assert found.bodies([7, 9, 11]) == ((7, 9), (11,))
 
 
@@ -89,7 +89,7 @@ def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
 def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(
     tmp_path: Path,
 ) -> None:
-    spring = SPRING + wide(91, 40, 41)
+    spring = SPRING + pad(91, 40, 41)
     inventory = read_radioss(
         tmp_path,
         spring,
@@ -135,8 +135,8 @@ def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_t
 def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) -> None:
     """Four parts of a car are one body, hubs and tyres two wheels."""
     for deck, whole in (
-        (made_car.starter(tmp_path), True),
-        (made_car.keywords(tmp_path), False),
+        (made_car.write_starter(tmp_path), True),
+        (made_car.write_keywords(tmp_path), False),
     ):
         inventory = read_inventory(deck)
         assert bodies_of(inventory, [*made_car.BODY, *made_car.WHEELS]) == (
@@ -151,11 +151,13 @@ def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) ->
             RigidBody((7,), whole),
         )  # Radioss switches each piece by itself
     welded = read_inventory(
-        made_car.keywords(tmp_path, f"*CONSTRAINED_SPOTWELD\n{wide(21, 31)}")
+        made_car.write_keywords(tmp_path, f"*CONSTRAINED_SPOTWELD\n{pad(21, 31)}")
     )
     assert count_pieces(welded, [7]) == 1
     through = read_inventory(
-        made_car.keywords(tmp_path, f"*ELEMENT_SHELL\n{row(99, 1, 21, 22, 32, 31)}")
+        made_car.write_keywords(
+            tmp_path, f"*ELEMENT_SHELL\n{make_row(99, 1, 21, 22, 32, 31)}"
+        )
     )
     assert (
         count_pieces(through, [7]),

@@ -16,7 +16,7 @@ from d2rpick.deck.printing import print_cards
 from d2rpick.deck.writing import write_deck
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.rules import check_deck
-from tests.decks import wide
+from tests.decks import pad
 
 MAIN, END = 99, 0.02
 ENGINE = f"""\
@@ -42,24 +42,22 @@ WIDE = 20  # columns of a real number
 def write_starter() -> str:
     """Return a strip of four shells with a velocity at one end; SI units."""
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
-    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide(
+    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{pad(2022, 0)}" + 2 * pad(
         "kg", "m", "s", width=WIDE
     )
-    text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{wide(7850.0, width=WIDE)}{wide(2.1e11, 0.3, width=WIDE)}"
-    text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}{wide(*5 * [0.0], width=WIDE)}"
-    text += f"{wide(3, 0)[:-1]}{wide(0.002, 0.0, width=WIDE)[:-1]}{'':10}{wide(1, 1)}"
-    text += f"/PART/1\nstrip\n{wide(1, 1)}/NODE\n"
-    text += "".join(
-        wide(node)[:-1] + wide(x, y, 0.0, width=WIDE) for node, x, y in nodes
-    )
-    text += wide(MAIN)[:-1] + wide(0.2, 0.05, 0.01, width=WIDE)
+    text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{pad(7850.0, width=WIDE)}{pad(2.1e11, 0.3, width=WIDE)}"
+    text += f"/PROP/SHELL/1\nshell\n{pad(24, 0, 0, 0)}{pad(*5 * [0.0], width=WIDE)}"
+    text += f"{pad(3, 0)[:-1]}{pad(0.002, 0.0, width=WIDE)[:-1]}{'':10}{pad(1, 1)}"
+    text += f"/PART/1\nstrip\n{pad(1, 1)}/NODE\n"
+    text += "".join(pad(node)[:-1] + pad(x, y, 0.0, width=WIDE) for node, x, y in nodes)
+    text += pad(MAIN)[:-1] + pad(0.2, 0.05, 0.01, width=WIDE)
     text += "/SHELL/1\n" + "".join(
-        wide(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4)
+        pad(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4)
     )
-    text += f"/GRNOD/NODE/1\nstrip\n{wide(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{wide(1, 2)}"
-    text += f"/RBODY/1\nstrip\n{wide(MAIN, 0, 0, 0)[:-1]}{wide(0.0, width=WIDE)[:-1]}{wide(1, 0, 0, 0)}"
-    text += 2 * wide(0.0, 0.0, 0.0, width=WIDE) + wide(0, 0, 0)
-    return text + f"/TH/PART/1\nparts\nDEF       MASS\n{wide(1)}/END\n"
+    text += f"/GRNOD/NODE/1\nstrip\n{pad(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{pad(1, 2)}"
+    text += f"/RBODY/1\nstrip\n{pad(MAIN, 0, 0, 0)[:-1]}{pad(0.0, width=WIDE)[:-1]}{pad(1, 0, 0, 0)}"
+    text += 2 * pad(0.0, 0.0, 0.0, width=WIDE) + pad(0, 0, 0)
+    return text + f"/TH/PART/1\nparts\nDEF       MASS\n{pad(1)}/END\n"
 
 
 def run_solver(folder: Path, name: str) -> None:
@@ -197,11 +195,11 @@ def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> N
     """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
     head, _, body_lines = write_starter().partition("/RBODY/1")
     reals = [
-        wide(*row, width=WIDE)
+        pad(*row, width=WIDE)
         for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))
     ]
-    wall = f"/GRNOD/NODE/5\nall\n{wide(*range(1, 11))}/RWALL/PLANE/8\nground\n{wide(0, 0, 5, 0)}{''.join(reals)}"
-    thrown = f"/INIVEL/TRA/3\nthrown\n{wide(0.0, 0.0, -5.0, width=WIDE)[:-1]}{wide(5)}"
+    wall = f"/GRNOD/NODE/5\nall\n{pad(*range(1, 11))}/RWALL/PLANE/8\nground\n{pad(0, 0, 5, 0)}{''.join(reals)}"
+    thrown = f"/INIVEL/TRA/3\nthrown\n{pad(0.0, 0.0, -5.0, width=WIDE)[:-1]}{pad(5)}"
     reference = tmp_path / "reference"
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(

@@ -14,8 +14,8 @@ from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, write_nu
 from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 from d2rpick.histories.formats import READERS
 from d2rpick.rules import check_deck
-from tests.command import refused, run
-from tests.decks import found, read, spans, write
+from tests.command import read_refusal, run
+from tests.decks import count_findings, list_spans, read, write
 
 TIMES = st.floats(1e-9, 1e9)
 # A contact force acts from the end of each window in the test to the next window.
@@ -102,8 +102,11 @@ def test_the_solver_is_that_of_the_history() -> None:
 
 def test_the_command_line_offers_the_solvers_there_are() -> None:
     assert f"[{'|'.join(SOLVERS)}]" in run("card", "--help").stdout
-    assert f"'abaqus' was found, one of {', '.join(SOLVERS)} was expected" in refused(
-        "card", "--solver", "abaqus", "--tr", "1", "--td", "2", "--part", "1"
+    assert (
+        f"'abaqus' was found, one of {', '.join(SOLVERS)} was expected"
+        in read_refusal(
+            "card", "--solver", "abaqus", "--tr", "1", "--td", "2", "--part", "1"
+        )
     )
 
 
@@ -192,7 +195,7 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
     card = print_cards(windows, Printing(part=tuple(parts), merge=parts[-1]))
     folder = tmp_path_factory.mktemp("card")
     assert check_deck(write(folder, card.text)).findings == ()
-    assert spans(read(folder, card.text)) == [
+    assert list_spans(read(folder, card.text)) == [
         (part, tr, td) for part in sorted(parts) for tr, td in card.windows
     ]
     assert all(len(line) <= 100 for line in card.text.split("\n"))
@@ -230,7 +233,7 @@ def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
     assert re.findall(
         r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE
     ) == [*("8", "7", "9", "10", "11", "12")]
-    assert not found(tmp_path, text)
+    assert not count_findings(tmp_path, text)
 
 
 radioss_cards = partial(print_cards, solver="radioss")

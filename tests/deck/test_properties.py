@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from d2rpick.base.errors import D2RPickError
 from d2rpick.rules import check_deck
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS
-from tests.decks import read, spans, write
+from tests.decks import list_spans, read, write
 
 TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)
 
@@ -82,7 +82,7 @@ def write_text(written: Written) -> str:
 def test_what_is_written_is_read(written: Written) -> None:
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), write_text(written))
-        assert spans(deck) == written.windows
+        assert list_spans(deck) == written.windows
         checked = check_deck(deck.path)
         assert {finding.rule for finding in checked.findings} <= {"D2R104"}
 
@@ -92,7 +92,7 @@ def test_offsets_move_every_window(written: Written) -> None:
     outer = f"*INCLUDE_TRANSFORM\ninner.k\n{0:10d}{0:10d}{written.offset:10d}\n"
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), outer, {"inner.k": write_text(written)})
-        assert spans(deck) == [
+        assert list_spans(deck) == [
             (part + written.offset, tr, td) for part, tr, td in written.windows
         ]
 

@@ -13,12 +13,12 @@ from d2rpick.deck.radioss_run import RadiossRun, find_rigid_parts, read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
 from tests.command import put
-from tests.decks import wide
+from tests.decks import pad
 
 REAL = 20
 ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/TFILE/4\n1e-5\n"
 ALL = (1, 2, 3, 4)
-BODY = f"/RBODY/7\nbody\n{wide(99, 0, 0, 0, '', 0, 70)}"
+BODY = f"/RBODY/7\nbody\n{pad(99, 0, 0, 0, '', 0, 70)}"
 
 
 def write_quad(part: int, left_edge: float) -> tuple[str, str]:
@@ -31,12 +31,12 @@ def write_quad(part: int, left_edge: float) -> tuple[str, str]:
         (left_edge, 1.0),
     )
     nodes = "".join(
-        wide(n)[:-1] + wide(x, y, 0.0, width=REAL)
+        pad(n)[:-1] + pad(x, y, 0.0, width=REAL)
         for n, (x, y) in zip(ids, corners, strict=True)
     )
     return (
         nodes,
-        f"/PART/{part}\np{part}\n{wide(part, 1)}/SHELL/{part}\n{wide(part, *ids)}",
+        f"/PART/{part}\np{part}\n{pad(part, 1)}/SHELL/{part}\n{pad(part, *ids)}",
     )
 
 
@@ -53,26 +53,28 @@ def write_starter(
     )
     text = (
         "#RADIOSS STARTER\n/BEGIN\nbox\n"
-        + wide(2022, 0)
-        + 2 * wide("kg", "m", "s", width=REAL)
+        + pad(2022, 0)
+        + 2 * pad("kg", "m", "s", width=REAL)
     )
-    text += f"/MAT/ELAST/1\nsteel\n{wide(7850.0, width=REAL)}{wide(2.1e11, 0.3, width=REAL)}"
+    text += (
+        f"/MAT/ELAST/1\nsteel\n{pad(7850.0, width=REAL)}{pad(2.1e11, 0.3, width=REAL)}"
+    )
     for part, depth in enumerate(thickness, start=1):
         text += (
             f"/PROP/SHELL/{part}\nshell\n"
-            f"{wide(24)}{wide(0.0, width=REAL)}{wide(3, 0)[:-1]}{wide(depth, width=REAL)}"
+            f"{pad(24)}{pad(0.0, width=REAL)}{pad(3, 0)[:-1]}{pad(depth, width=REAL)}"
         )
-    text += f"/PROP/SPRING/4\nspring\n{wide(0.0, width=REAL)}{wide(1e4, width=REAL)}"
+    text += f"/PROP/SPRING/4\nspring\n{pad(0.0, width=REAL)}{pad(1e4, width=REAL)}"
     text += (
         "/NODE\n"
         + "".join(nodes)
-        + wide(99)[:-1]
-        + wide(1.5, 0.5, 0.1, width=REAL)
+        + pad(99)[:-1]
+        + pad(1.5, 0.5, 0.1, width=REAL)
         + "".join(parts)
     )
     return (
         text
-        + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{further_cards}/END\n"
+        + f"/PART/4\nspring\n{pad(4, 1)}/SPRING/4\n{pad(41, 11, 20)}{further_cards}/END\n"
     )
 
 
@@ -84,17 +86,17 @@ def write_run(folder: Path, further_cards: str = "", engine: str = ENGINE) -> st
 
 
 def write_group(number: int, *ids: int, kind: str = "NODE") -> str:
-    return f"/GRNOD/{kind}/{number}\ngroup\n{wide(*ids)}"
+    return f"/GRNOD/{kind}/{number}\ngroup\n{pad(*ids)}"
 
 
 def write_velocity(number: int) -> str:
-    return (
-        f"/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(number)}"
-    )
+    return f"/INIVEL/TRA/3\nthrown\n{pad(10.0, 0.0, 0.0, width=REAL)[:-1]}{pad(number)}"
 
 
 def write_gravity(number: int) -> str:
-    return f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, number)[:-1]}{wide(1.0, -9.81, width=REAL)}"
+    return (
+        f"/GRAV/5\ndown\n{pad(0, 'Z', 0, 0, number)[:-1]}{pad(1.0, -9.81, width=REAL)}"
+    )
 
 
 def write_bodies(
@@ -155,8 +157,8 @@ def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -
     )
     wall = (
         "/RWALL/PLANE/3\nground\n"
-        + wide(0, 0, 1, 0)
-        + 2 * wide(0.0, 0.0, 0.0, width=REAL)
+        + pad(0, 0, 1, 0)
+        + 2 * pad(0.0, 0.0, 0.0, width=REAL)
     )
     nodes, run, name = write_bodies(
         tmp_path,
@@ -164,7 +166,7 @@ def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -
         + write_velocity(1)
         + write_gravity(1)
         + wall
-        + wide(0.0, 0.0, 1.0, width=REAL),
+        + pad(0.0, 0.0, 1.0, width=REAL),
     )
     assert not check_deck(name).findings
     assert run.starter
@@ -260,7 +262,7 @@ def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
             write_group(1, 10, 11) + write_velocity(1),
             "does not give all nodes of parts 1, 2, 4 one velocity",
         ),
-        ("/INIVEL/NODE/1\nthrown\n" + wide(20), "does not give all nodes"),
+        ("/INIVEL/NODE/1\nthrown\n" + pad(20), "does not give all nodes"),
         ("/TRANSFORM/TRA/1\nmoved\n", "/TRANSFORM moves nodes"),
         ("//SUBMODEL/1\nother\n", "ids of a //SUBMODEL may be moved"),
         ("#include other.inc\n", "other.inc was not read"),

@@ -12,12 +12,12 @@ from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 from d2rpick.deck.radioss_flaws import find_flaws
 from d2rpick.deck.radioss_run import read_run
 from tests.deck.test_openradioss import MAIN, write_starter
-from tests.decks import wide
+from tests.decks import pad
 
 WIDE = 20
 OFF, ON = f"/RBODY/OFF\n{MAIN}\n", f"/RBODY/ON\n{MAIN}\n"
-ALL = f"/GRNOD/NODE/7\nall\n{wide(*range(1, 11))}{wide(MAIN)}"
-SENSOR = f"/SENSOR/TIME/5\nclock\n{wide(0.001, 0.002, width=WIDE)}"
+ALL = f"/GRNOD/NODE/7\nall\n{pad(*range(1, 11))}{pad(MAIN)}"
+SENSOR = f"/SENSOR/TIME/5\nclock\n{pad(0.001, 0.002, width=WIDE)}"
 
 
 def find_run_flaws(
@@ -45,9 +45,9 @@ def write_wall(
     diameter: float = 0.0,
     fields: str = "",
 ) -> str:
-    sizes = wide(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + wide(0)
-    return f"/RWALL/{kind}\nwall\n{fields or wide(0, 0, 0, 0)}{sizes}" + "".join(
-        wide(*point, width=WIDE) for point in points
+    sizes = pad(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + pad(0)
+    return f"/RWALL/{kind}\nwall\n{fields or pad(0, 0, 0, 0)}{sizes}" + "".join(
+        pad(*point, width=WIDE) for point in points
     )
 
 
@@ -56,7 +56,10 @@ def write_wall(
     [
         (write_wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
         (write_wall("PLANE/1", 0.15, (0.35, 0, 0), (0, 0, 0)), 4),
-        (write_wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=wide(0, 0, 0, 2)), 4),
+        (
+            write_wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=pad(0, 0, 0, 2)),
+            4,
+        ),
         (write_wall("CYL/1", 0.15, (0.2, 0.05, 0), (0.2, 0.05, 1), diameter=0.05), 6),
         (write_wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
         (write_wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
@@ -68,7 +71,7 @@ def write_wall(
                 (0.15, 0, -1),
                 (0.15, 0, 1),
                 (0.15, 1, -1),
-                fields=wide(0, 0, 2, 0),
+                fields=pad(0, 0, 2, 0),
             ),
             4,
         ),
@@ -78,20 +81,24 @@ def write_wall(
                 0.25,
                 (1, 0, 0, 0),
                 (1, 0.05, 0.01),
-                fields=wide(MAIN, 0, 0, 0),
+                fields=pad(MAIN, 0, 0, 0),
             ),
             6,
         ),
         (write_wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
         (
             "/GRNOD/PART/77\nall\n"
-            + wide(1)
-            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)),
+            + pad(1)
+            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=pad(0, 0, 77, 0)),
             10,
         ),
         (
             write_wall(
-                "PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)
+                "PLANE/1",
+                0.25,
+                (0.05, 0, 0),
+                (1, 0, 0),
+                fields=pad(0, 0, 0, 0, 1),
             ),
             4,
         ),  # before 2026 there is no Iform
@@ -111,7 +118,7 @@ GROUND = write_wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0))
 
 
 def set_ikrem(deck: str, value: int = 1) -> str:
-    return deck.replace(wide(1, 0, 0, 0), wide(1, value, 0, 0))
+    return deck.replace(pad(1, 0, 0, 0), pad(1, value, 0, 0))
 
 
 def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(
@@ -119,10 +126,10 @@ def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highes
 ) -> None:
     second_body = (
         "/NODE\n"
-        + wide(98)[:-1]
-        + wide(0.2, 0.05, 0.05, width=WIDE)
+        + pad(98)[:-1]
+        + pad(0.2, 0.05, 0.05, width=WIDE)
         + "/RBODY/{}\nother\n"
-        + wide(98)
+        + pad(98)
     )
     assert list_codes(find_run_flaws(tmp_path, GROUND)) == [THROUGH_WALL]
     assert find_run_flaws(tmp_path, GROUND, deck=set_ikrem(write_starter())) == ()
@@ -135,15 +142,17 @@ def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highes
 
 
 def test_a_wall_keeps_the_nodes_of_a_body_with_a_sensor(tmp_path: Path) -> None:
-    deck = write_starter().replace(wide(MAIN, 0, 0, 0)[:-1], wide(MAIN, 5, 0, 0)[:-1])
+    deck = write_starter().replace(pad(MAIN, 0, 0, 0)[:-1], pad(MAIN, 5, 0, 0)[:-1])
     assert find_run_flaws(tmp_path, SENSOR + GROUND, deck=deck) == ()
 
 
 def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> None:
-    deck = write_starter().replace(wide(2022, 0), wide(2026, 0))
+    deck = write_starter().replace(pad(2022, 0), pad(2026, 0))
     assert (
         find_run_flaws(
-            tmp_path, GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 0, 1)), deck=deck
+            tmp_path,
+            GROUND.replace(pad(0, 0, 0, 0), pad(0, 0, 0, 0, 1)),
+            deck=deck,
         )
         == ()
     )
@@ -151,17 +160,17 @@ def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> 
 
 
 def write_velocity(group: int, kind: str = "TRA") -> str:
-    return f"/INIVEL/{kind}/1\nthrown\n{wide(10.0, 0.0, 0.0, width=WIDE)[:-1]}{wide(group, 0)}"
+    return f"/INIVEL/{kind}/1\nthrown\n{pad(10.0, 0.0, 0.0, width=WIDE)[:-1]}{pad(group, 0)}"
 
 
 def write_spin(group: int) -> str:
-    return f"/INIVEL/AXIS/1\nspin\n{wide('Z', 0, group)}{wide(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
+    return f"/INIVEL/AXIS/1\nspin\n{pad('Z', 0, group)}{pad(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
 
 
 LISTED = "/INIVEL/NODE/1\nlist\n" + "".join(
-    f"{wide(node, 0)[:-1]}{wide(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
+    f"{pad(node, 0)[:-1]}{pad(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
 )
-MAINS = f"/GRNOD/NODE/98\nmain\n{wide(MAIN)}"
+MAINS = f"/GRNOD/NODE/98\nmain\n{pad(MAIN)}"
 
 
 @pytest.mark.parametrize(
@@ -185,12 +194,13 @@ def test_a_body_that_the_starter_lets_rest_is_found(
 def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(
     tmp_path: Path,
 ) -> None:
-    assert find_run_flaws(tmp_path, write_velocity(1) + wide(0.0005, width=WIDE)) == ()
-    assert find_run_flaws(tmp_path, write_velocity(1) + wide("", "", 5)) == ()
+    assert find_run_flaws(tmp_path, write_velocity(1) + pad(0.0005, width=WIDE)) == ()
+    assert find_run_flaws(tmp_path, write_velocity(1) + pad("", "", 5)) == ()
     assert find_run_flaws(tmp_path, write_velocity(1).replace("10.0", " 0.0")) == ()
     assert (
         find_run_flaws(
-            tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE)
+            tmp_path,
+            "/INIVEL/FVM/1\nfluid\n" + pad(10.0, 0.0, 0.0, width=WIDE),
         )
         == ()
     )
@@ -235,23 +245,23 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
     [
         (
             "/GRNOD/BOX/8\nbox\n"
-            + wide(1)
-            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)),
+            + pad(1)
+            + write_wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=pad(0, 0, 8, 0)),
             (),
         ),
-        (GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 8)), ()),
+        (GROUND.replace(pad(0, 0, 0, 0), pad(0, 0, 0, 8)), ()),
         ("/TRANSFORM/TRA/1\n" + GROUND, ()),
         (write_wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
         (write_wall("PLANE/1", 0.1, (0, 0, 0), (0, 0, 0)), ()),
         (
-            write_wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=wide(97, 0, 0, 0)),
+            write_wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=pad(97, 0, 0, 0)),
             (),
         ),
         (write_velocity(8), ()),
         ("", (ON + CAP + write_start(8, type_=2), OFF)),
         ("//SUBMODEL/1\nmoved\n" + write_velocity(1), ()),
         (
-            f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{write_velocity(8)}",
+            f"/PART/3\nfluid\n{pad(1, 1)}/SPHCEL/3\n{pad(1, 1)}/GRNOD/PART/8\nfluid\n{pad(3)}{write_velocity(8)}",
             (),
         ),
     ],

@@ -8,9 +8,9 @@ from d2rpick.deck import radioss_inventory, read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.rules import check_deck
-from tests.computed import starter, stored
+from tests.computed import locate_stored, read_starter
 from tests.deck.test_ls_dyna_inventory import count_elements
-from tests.decks import wide
+from tests.decks import pad
 
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
 PROPS = (
@@ -40,46 +40,48 @@ def write_nodes(count: int) -> str:
     ("elements", "kind"),
     [
         (
-            "/SHELL/1\n# a comment\n"
-            + wide(1, 1, 2, 3, 4)
-            + "\n"
-            + wide(2, 3, 4, 5, 6),
+            "/SHELL/1\n# a comment\n" + pad(1, 1, 2, 3, 4) + "\n" + pad(2, 3, 4, 5, 6),
             "shell",
         ),
-        ("/SH3N/1\n" + wide(1, 1, 2, 3) + wide(2, 3, 4, 5), "triangle"),
-        ("/BRICK/1\n" + wide(*range(1, 10)) + wide(2, *range(9, 17)), "solid"),
-        ("/TETRA4/1\n" + wide(1, 1, 2, 3, 4) + wide(2, 5, 6, 7, 8), "tetrahedron"),
         (
-            "/TETRA10/1\n"
-            + wide(1)
-            + wide(*range(1, 11))
-            + wide(2)
-            + wide(*range(11, 21)),
+            "/SH3N/1\n" + pad(1, 1, 2, 3) + pad(2, 3, 4, 5),
+            "triangle",
+        ),
+        (
+            "/BRICK/1\n" + pad(*range(1, 10)) + pad(2, *range(9, 17)),
+            "solid",
+        ),
+        (
+            "/TETRA4/1\n" + pad(1, 1, 2, 3, 4) + pad(2, 5, 6, 7, 8),
+            "tetrahedron",
+        ),
+        (
+            "/TETRA10/1\n" + pad(1) + pad(*range(1, 11)) + pad(2) + pad(*range(11, 21)),
             "tetrahedron",
         ),
         (
             "/BRIC20/1\n"
-            + (wide(1, *range(1, 9)) + wide(*range(9, 17)) + wide(*range(17, 21))) * 2,
+            + (pad(1, *range(1, 9)) + pad(*range(9, 17)) + pad(*range(17, 21))) * 2,
             "solid",
         ),
-        ("/SPRING/1\n" + wide(1, 1, 2) + wide(2, 3, 4), "spring"),
+        ("/SPRING/1\n" + pad(1, 1, 2) + pad(2, 3, 4), "spring"),
     ],
 )
 def test_two_elements_of_every_kind(tmp_path: Path, elements: str, kind: str) -> None:
     read_inventory = read_text(
-        tmp_path, f"{write_nodes(24)}/PART/1\na\n{wide(1, 1)}{elements}{PROPS}"
+        tmp_path, f"{write_nodes(24)}/PART/1\na\n{pad(1, 1)}{elements}{PROPS}"
     )
     assert count_elements(read_inventory) == {1: {kind: 2}}
     assert read_inventory.notes == ()
 
 
 def test_flags_of_properties_are_read(tmp_path: Path) -> None:
-    parts = "".join(f"/PART/{n}\np{n}\n{wide(n, 1)}" for n in range(1, 6))
-    bricks = "".join(f"/BRICK/{n}\n{wide(n, *range(1, 9))}" for n in (4, 5))
-    springs = "".join(f"/SPRING/{n}\n{wide(10 + n, 1, 2)}" for n in (2, 3))
+    parts = "".join(f"/PART/{n}\np{n}\n{pad(n, 1)}" for n in range(1, 6))
+    bricks = "".join(f"/BRICK/{n}\n{pad(n, *range(1, 9))}" for n in (4, 5))
+    springs = "".join(f"/SPRING/{n}\n{pad(10 + n, 1, 2)}" for n in (2, 3))
     read_inventory = read_text(
         tmp_path,
-        f"{write_nodes(9)}{parts}/SHELL/1\n{wide(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}",
+        f"{write_nodes(9)}{parts}/SHELL/1\n{pad(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}",
     )
     assert read_inventory.formulation(1, "shell").cost == "QEPH"
     assert [read_inventory.parts[n].section.damped for n in (2, 3)] == [True, False]
@@ -87,13 +89,13 @@ def test_flags_of_properties_are_read(tmp_path: Path) -> None:
 
 
 def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) -> None:
-    parts = "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}" for n in (1, 2, 3))
+    parts = "".join(f"/PART/{n}\np{n}\n{pad(1, 1)}" for n in (1, 2, 3))
     shells = "".join(
-        f"/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2)
+        f"/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2)
     )
     read_inventory = read_text(
         tmp_path,
-        f"{write_nodes(9)}{parts}{shells}/SHELL/3\n{wide(3, 1, 2, 5, 6)}{PROPS}",
+        f"{write_nodes(9)}{parts}{shells}/SHELL/3\n{pad(3, 1, 2, 5, 6)}{PROPS}",
     )
     assert read_inventory.groups([1, 2]) == ((1,), (2,))
     assert set(read_inventory.elements_within([1, 2])) == {
@@ -108,7 +110,9 @@ def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) 
     ("without", "complete"), [("", True), ("/PART/1", False), ("/NODE", False)]
 )
 def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -> None:
-    text = f"{write_nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}"
+    text = (
+        f"{write_nodes(4)}/PART/1\na\n{pad(1, 1)}/SHELL/1\n{pad(1, 1, 2, 3, 4)}{PROPS}"
+    )
     partial_inventory = read_text(
         tmp_path, text.replace(without, "/OTHER") if without else text
     )
@@ -119,11 +123,11 @@ def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -
 def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
+    (tmp_path / "CAR_0000.rad").write_bytes(read_starter("CAR"))
     car_inventory = read_inventory(str(tmp_path / "CAR_0000.rad"))
     head, *rows = (
         line.split(",")
-        for line in Path(stored("car_parts.csv")).read_text("ascii").splitlines()
+        for line in Path(locate_stored("car_parts.csv")).read_text("ascii").splitlines()
     )
     table = [dict(zip(head, cells, strict=True)) for cells in rows]
     assert {int(row["id"]): int(row["elements"]) for row in table} == {
@@ -146,14 +150,14 @@ def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(
 
 
 def test_an_include_that_is_absent_is_told(tmp_path: Path) -> None:
-    text = f"{write_nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
+    text = f"{write_nodes(4)}/PART/1\na\n{pad(1, 1)}/SHELL/1\n{pad(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
     partial_inventory = read_text(tmp_path, text)
     assert not partial_inventory.complete
     assert any("absent.inc was not read" in note for note in partial_inventory.notes)
 
 
 def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> None:
-    text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{write_nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
+    text = f"{BEGIN}{PROPS}/PART/1\na\n{pad(1, 1)}{write_nodes(8)}/SHELL/1\n{pad(1, 1, 2, 3, 4)}{pad(2, 3, 4, 5, 6)}"
     deck = tmp_path / "TEST_0000.rad"
     for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
         deck.write_text(text[:end])
@@ -175,6 +179,6 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
 def test_titles_may_be_empty(tmp_path: Path) -> None:
     part = read_text(
         tmp_path,
-        f"{write_nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}",
+        f"{write_nodes(4)}/PART/1\n\n{pad(1, 1)}{PROPS}/SHELL/1\n{pad(1, 1, 2, 3, 4)}",
     ).parts[1]
     assert (part.title, part.section.formulations["shell"].name) == ("", "QEPH")

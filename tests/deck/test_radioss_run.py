@@ -12,7 +12,7 @@ from d2rpick.deck.radioss_files import is_radioss, list_run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.rules import RULES, check_deck
 from tests.command import put
-from tests.computed import stored
+from tests.computed import locate_stored
 from tests.decks import write
 
 EXAMPLE = RULES["D2R401"].passing[0]
@@ -422,7 +422,7 @@ def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) ->
     ("name", "nodes"), [("CAR_all", [1808]), ("CAR_heavy", range(1808, 1814))]
 )
 def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
-    checked = check_deck(stored(f"{name}_0001.rad"))
+    checked = check_deck(locate_stored(f"{name}_0001.rad"))
     assert checked.findings == ()
     run_windows = [(window.unit.id, window.tr, window.td) for window in checked.windows]
     assert run_windows == [(node, 0.0496, 0.1464) for node in nodes]

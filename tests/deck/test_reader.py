@@ -12,7 +12,7 @@ from d2rpick.deck.source import Block, SourceFile, find_marks
 from d2rpick.deck.stored import HeldInMemory
 from d2rpick.deck.switching import read_switching
 from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, write_automatic_card
-from tests.decks import found, read, spans
+from tests.decks import count_findings, list_spans, read
 
 WINDOW = [(1, 0.02, 0.09)]
 LONG_CARDS = (
@@ -90,8 +90,8 @@ SAME = {
 
 @pytest.mark.parametrize("deck", SAME.values(), ids=SAME.keys())
 def test_the_same_window_however_it_is_written(tmp_path: Path, deck: str) -> None:
-    assert spans(read(tmp_path, deck)) == WINDOW
-    assert not {"D2R001", "D2R002"} & found(tmp_path, deck).keys()
+    assert list_spans(read(tmp_path, deck)) == WINDOW
+    assert not {"D2R001", "D2R002"} & count_findings(tmp_path, deck).keys()
 
 
 def test_fields_know_their_place(tmp_path: Path) -> None:
@@ -113,13 +113,13 @@ def test_comment_blocks_disable_the_rest_of_their_line_and_the_card_below(
     assert [card.line for card in deck.disabled] == [
         GOOD[: GOOD.index("*DEFORM")].count("\n") + 1
     ]
-    assert spans(deck) == []
+    assert list_spans(deck) == []
 
 
 def test_encrypted_blocks_are_found_and_end_the_card_before(tmp_path: Path) -> None:
     deck = read(tmp_path, THERE + "-----BEGIN PGP MESSAGE-----\nhQEMA\n" + BACK)
     assert [block.line for block in deck.encrypted] == [THERE.count("\n") + 1]
-    assert spans(deck) == WINDOW
+    assert list_spans(deck) == WINDOW
 
 
 @pytest.mark.parametrize("chunk", [37, 64, 100])
@@ -298,7 +298,7 @@ def test_includes(
 ) -> None:
     main = read(tmp_path, deck, files)
     assert main.unread == []
-    assert spans(main) == expected
+    assert list_spans(main) == expected
 
 
 def test_a_place_in_an_include_names_the_include(tmp_path: Path) -> None:
@@ -327,7 +327,7 @@ def test_includes_that_cannot_be_read(
 ) -> None:
     main = read(tmp_path, deck + THERE + BACK, files)
     assert [reason in unread.reason for unread in main.unread] == [True]
-    assert spans(main) == WINDOW
+    assert list_spans(main) == WINDOW
 
 
 def test_a_chain_of_includes_ends(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 from d2rpick.deck import read_inventory
 from d2rpick.rules import check_deck
 from tests.deck.test_openradioss import run_solver
-from tests.decks import wide
+from tests.decks import pad
 
 WIDE = 20  # columns of a real number
 STEP = 1e-5  # duration of a cycle
@@ -35,13 +35,13 @@ class Listed(NamedTuple):
 
 
 def write_head(version: int) -> str:
-    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(version, 0)}" + 2 * wide(
+    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{pad(version, 0)}" + 2 * pad(
         "kg", "m", "s", width=WIDE
     )
-    text += f"/TITLE\nplates\n/MAT/ELAST/1\nsteel\n{wide(7850.0, width=WIDE)}{wide(2.1e11, 0.3, width=WIDE)}"
+    text += f"/TITLE\nplates\n/MAT/ELAST/1\nsteel\n{pad(7850.0, width=WIDE)}{pad(2.1e11, 0.3, width=WIDE)}"
     return (
         text
-        + f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{wide(0.005, width=WIDE)}"
+        + f"/PROP/SHELL/1\nshell\n{pad(24, 0, 0, 0)}\n{pad(3, 0)[:-1]}{pad(0.005, width=WIDE)}"
     )
 
 
@@ -55,44 +55,42 @@ def write_plates(lines: Mapping[int, str]) -> str:
     }
     coordinates |= {100 + part: (3.0 * part + 0.5, 0.5, 0.2) for part in (1, 2, 3)}
     text = "/NODE\n" + "".join(
-        wide(node)[:-1] + wide(*position, width=WIDE)
+        pad(node)[:-1] + pad(*position, width=WIDE)
         for node, position in coordinates.items()
     )
     for part in (1, 2, 3):
-        text += f"/PART/{part}\nplate\n{lines.get(part, wide(1, 1))}"
-        text += f"/SHELL/{part}\n{wide(part, *(10 * part + at for at in range(1, 5)))}"
+        text += f"/PART/{part}\nplate\n{lines.get(part, pad(1, 1))}"
+        text += f"/SHELL/{part}\n{pad(part, *(10 * part + at for at in range(1, 5)))}"
     return text + "".join(
-        f"/GRNOD/PART/{part}\nplate\n{wide(part)}" for part in (1, 2, 3)
+        f"/GRNOD/PART/{part}\nplate\n{pad(part)}" for part in (1, 2, 3)
     )
 
 
 def write_body(number: int, node: int, part: int, sensor: int = 0) -> str:
     first = (
-        wide(node, sensor, 0, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(part, 0, 0, 0)
+        pad(node, sensor, 0, 0)[:-1] + pad(0.0, width=WIDE)[:-1] + pad(part, 0, 0, 0)
     )
-    return f"/RBODY/{number}\nbody\n{first}{2 * wide(0.0, 0.0, 0.0, width=WIDE)}{wide(0, 0, 0)}"
+    return f"/RBODY/{number}\nbody\n{first}{2 * pad(0.0, 0.0, 0.0, width=WIDE)}{pad(0, 0, 0)}"
 
 
 def write_merge(*lines: tuple[int, ...]) -> str:
-    return "/MERGE/RBODY/1\nmerged\n" + "".join(wide(*line) for line in lines)
+    return "/MERGE/RBODY/1\nmerged\n" + "".join(pad(*line) for line in lines)
 
 
 def write_clock(number: int, delay: float, stop: float | None = None) -> str:
-    return f"/SENSOR/TIME/{number}\nclock\n{wide(delay, width=WIDE)}" + (
-        wide(stop, width=WIDE) if stop else ""
+    return f"/SENSOR/TIME/{number}\nclock\n{pad(delay, width=WIDE)}" + (
+        pad(stop, width=WIDE) if stop else ""
     )
 
 
 def write_logic(kind: str, number: int, *others: int, delay: float = 0.0) -> str:
-    return (
-        f"/SENSOR/{kind}/{number}\nof others\n{wide(delay, width=WIDE)}{wide(*others)}"
-    )
+    return f"/SENSOR/{kind}/{number}\nof others\n{pad(delay, width=WIDE)}{pad(*others)}"
 
 
 def write_rigid_part(node: int = 0, sensor: int = 0) -> str:
-    first = wide(1, 1, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(1)
-    second = wide(node, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide("", sensor)
-    return first + second + 2 * wide(0.0, 0.0, 0.0, width=WIDE)
+    first = pad(1, 1, 0)[:-1] + pad(0.0, width=WIDE)[:-1] + pad(1)
+    second = pad(node, 0)[:-1] + pad(0.0, width=WIDE)[:-1] + pad("", sensor)
+    return first + second + 2 * pad(0.0, 0.0, 0.0, width=WIDE)
 
 
 THREE = write_body(1, 101, 1) + write_body(2, 102, 2) + write_body(3, 103, 3)
@@ -103,10 +101,10 @@ ALONE = write_body(1, 101, 1, 5)
 
 def write_fourth(*nodes: int) -> str:
     """Write a further part of one element, on nodes of the plates."""
-    return f"/PART/4\nfurther\n{wide(1, 1)}/SHELL/4\n{wide(4, *nodes)}"
+    return f"/PART/4\nfurther\n{pad(1, 1)}/SHELL/4\n{pad(4, *nodes)}"
 
 
-BOTH = f"/GRNOD/PART/9\nboth\n{wide(1, 2)}"
+BOTH = f"/GRNOD/PART/9\nboth\n{pad(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
         THREE + write_merge((1, 1, 2, 1)),
@@ -145,8 +143,8 @@ LISTED = {
     ),
     "above all nodes": Listed(
         "/NODE\n"
-        + wide(5000)[:-1]
-        + wide(9.0, 9.0, 9.0, width=WIDE)
+        + pad(5000)[:-1]
+        + pad(9.0, 9.0, 9.0, width=WIDE)
         + write_body(7, 0, 1)
         + write_body(2, 103, 2)
         + write_body(3, 0, 3),
@@ -174,12 +172,12 @@ LISTED = {
         {1: MIDDLE},
     ),
     "a group of a range of nodes": Listed(
-        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + write_body(1, 101, 9),
+        f"/GRNOD/GENE/9\nrange\n{pad(11, 24)}" + write_body(1, 101, 9),
         (OFF + "101", ON + "101", OFF + "101"),
         {1: MIDDLE, 2: MIDDLE},
     ),
     "groups of materials and properties": Listed(
-        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}"
+        f"/GRNOD/MAT/9\nall\n{pad(1)}/GRNOD/PROP/8\nnone\n{pad(7)}"
         + write_body(1, 101, 9),
         (OFF + "101", ON + "101", OFF + "101"),
         dict.fromkeys((1, 2, 3), MIDDLE),
@@ -191,7 +189,9 @@ LISTED = {
         write_body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}, version=2018
     ),
     "a second number on the line of Tdelay is no Tstop": Listed(
-        ALONE + f"/SENSOR/TIME/5\nclock\n{wide(0.0, 0.002, width=WIDE)}", ("",), {}
+        ALONE + f"/SENSOR/TIME/5\nclock\n{pad(0.0, 0.002, width=WIDE)}",
+        ("",),
+        {},
     ),
     "a restart keeps sensors": Listed(
         write_body(1, 101, 1, 7) + TWICE, ("", "", ""), {1: MIDDLE}
@@ -274,7 +274,7 @@ RIGID_PARTS = {
 
 def write_run(folder: Path, run: Listed) -> str:
     """Write a run of legs of 2 ms each, or of one of 6 ms."""
-    end = f"/TH/PART/1\nparts\nDEF\n{wide(1, 2, 3)}/END\n"
+    end = f"/TH/PART/1\nparts\nDEF\n{pad(1, 2, 3)}/END\n"
     main = folder / "X_0000.rad"
     main.write_text(
         write_head(run.version) + write_plates(run.parts) + run.starter + end

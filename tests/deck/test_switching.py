@@ -7,7 +7,7 @@ import pytest
 from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
 from d2rpick.deck.ls_dyna_parts import find_element_cards, read_parts
 from d2rpick.rules.rule import PARTS, write_automatic_card
-from tests.decks import read, spans, wide, windows
+from tests.decks import list_spans, pad, read, windows
 
 Spans = list[tuple[int | None, float, float | None]]
 
@@ -73,7 +73,7 @@ CASES: dict[str, tuple[str, Spans]] = {
 
 @pytest.mark.parametrize(("deck", "expected"), CASES.values(), ids=CASES.keys())
 def test_windows(tmp_path: Path, deck: str, expected: Spans) -> None:
-    assert spans(read(tmp_path, deck)) == expected
+    assert list_spans(read(tmp_path, deck)) == expected
 
 
 def test_what_nothing_made_rigid_is_an_orphan(tmp_path: Path) -> None:
@@ -119,7 +119,8 @@ def test_part_sets_are_resolved(
     tmp_path: Path, cards: str, expected: list[int]
 ) -> None:
     assert [
-        part for part, _, _ in spans(read(tmp_path, PARTS + cards + write_set_card(9)))
+        part
+        for part, _, _ in list_spans(read(tmp_path, PARTS + cards + write_set_card(9)))
     ] == expected
 
 
@@ -131,19 +132,19 @@ def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> Non
 
 
 PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
-    "pairs": ("*PART\na\n" + wide(1, 1, 7) + "\n" + wide(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
-    "contact": ("*PART_CONTACT\na\n" + wide(1, 1, 7) + wide(0.1) + "b\n" + wide(2, 1, 8), {1: "7", 2: "8"}),
+    "pairs": ("*PART\na\n" + pad(1, 1, 7) + "\n" + pad(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
+    "contact": ("*PART_CONTACT\na\n" + pad(1, 1, 7) + pad(0.1) + "b\n" + pad(2, 1, 8), {1: "7", 2: "8"}),
     "inertia": (
-        "*PART_INERTIA\na\n" + wide(1, 1, 7) + wide(0, 0, 0, 1, 0) + wide(1) + wide(0) + "b\n" + wide(2, 1, 8),
+        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 0) + pad(1) + pad(0) + "b\n" + pad(2, 1, 8),
         {1: "7", 2: "8"},
     ),
     "inertia in local axes": (
-        "*PART_INERTIA\na\n" + wide(1, 1, 7) + wide(0, 0, 0, 1, 1) + wide(1) + wide(0) + wide(9)
-        + "b\n" + wide(2, 1, 8),
+        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 1) + pad(1) + pad(0) + pad(9)
+        + "b\n" + pad(2, 1, 8),
         {1: "7", 2: "8"},
     ),
     "move is no part": ("*PART_MOVE\n10,0,0,0.0045\n", {}),
-    "composite": ("*PART_COMPOSITE\na\n" + wide(5, 2) + wide(7, 0.1), {5: ""}),
+    "composite": ("*PART_COMPOSITE\na\n" + pad(5, 2) + pad(7, 0.1), {5: ""}),
 }  # fmt: skip
 
 
@@ -157,8 +158,8 @@ def test_parts(tmp_path: Path, deck: str, expected: dict[int, str]) -> None:
 @pytest.mark.parametrize("name", ["*MAT_RIGID", "*MAT_020", "*mat_rigid_title"])
 def test_rigid_materials_move_with_their_include(tmp_path: Path, name: str) -> None:
     title = "steel\n" if "title" in name else ""
-    inner = f"{name}\n{title}{wide(7)}*PART\na\n{wide(1, 1, 7)}"
-    deck = "*INCLUDE_TRANSFORM\na.k\n" + wide(0, 0, 100, 50) + wide(0) + wide(0)
+    inner = f"{name}\n{title}{pad(7)}*PART\na\n{pad(1, 1, 7)}"
+    deck = "*INCLUDE_TRANSFORM\na.k\n" + pad(0, 0, 100, 50) + pad(0) + pad(0)
     parts = read_parts(read(tmp_path, deck, {"a.k": inner}))
     assert parts.is_rigid(101)
     assert not parts.is_rigid(1)

@@ -9,7 +9,7 @@ from d2rpick.deck import read_inventory
 from d2rpick.rules import check_deck
 from d2rpick.rules.rule import write_engine_files, write_starter_deck
 from tests.command import MATSUM, put
-from tests.decks import wide
+from tests.decks import pad
 
 NODES = [
     (x, y, z)
@@ -45,7 +45,7 @@ def write_bricks(
         [element, element, *range(first, first + 8)]
         for element, first in ((1, 1), (2, 11))
     )
-    text += "*ELEMENT_SOLID\n" + "".join(wide(*row, width=8) for row in rows)
+    text += "*ELEMENT_SOLID\n" + "".join(pad(*row, width=8) for row in rows)
     return str(put(folder / "main.k", f"{text}{further_cards}*END\n"))
 
 
@@ -118,8 +118,8 @@ def test_other_laws_and_elements_are_switched(tmp_path: Path, law: str) -> None:
         ("/EULER/MAT/1\n 0.0\n", "D2R118"),
         ("/MAT/OGDEN/1\nrubber\n 1000.0\n", "D2R119"),
         ("/MAT/LAW92/1\nrubber\n 1000.0\n", "D2R119"),
-        (f"/PROP/SOLID/1\nbrick\n{wide(24, 10)}", "D2R119"),
-        (f"/PROP/SOLID/1\nbrick\n{wide(24, 4)}", ""),
+        (f"/PROP/SOLID/1\nbrick\n{pad(24, 10)}", "D2R119"),
+        (f"/PROP/SOLID/1\nbrick\n{pad(24, 4)}", ""),
         ("/ALE/MAT/2\n 0.0\n/MAT/ELAST/1\nsteel\n 7850.0\n", ""),
     ],
 )

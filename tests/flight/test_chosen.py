@@ -1,4 +1,4 @@
-"""What the user says of a flight counts, with a warning that names the evidence against it."""
+"""A flight given by the user is used, with a warning that names the contradicting evidence."""
 
 import numpy as np
 import pytest
@@ -10,59 +10,59 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
-from tests.records import table
+from tests.records import make_table
 
 TIME = np.linspace(0.0, 1.0, 1001)
 
 
-def braked(until: float = 1.0) -> History:
-    """A block that slides with friction up to a time, and vibrates."""
+def make_braked_block(until: float = 1.0) -> History:
+    """Return a vibrating block that slides with friction until ``until``."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.minimum(TIME, until)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
-    return table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
+    return make_table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
 
 
-def warned(history: History, td: float, **given: float) -> dict[str, str]:
+def find_warnings(history: History, td: float, **options: float) -> dict[str, str]:
     return {
-        one.code: one.message
-        for one in cautions_of(examine(history, td, Settings(**given)))  # type: ignore[arg-type]
+        caution.code: caution.message
+        for caution in cautions_of(examine(history, td, Settings(**options)))  # type: ignore[arg-type]
     }
 
 
 def test_an_end_of_the_load_that_is_given_overrules_the_evidence_and_the_warning_names_it() -> (
     None
 ):
-    refused = suggest(braked(), 0.8, Settings())
+    refused = suggest(make_braked_block(), 0.8, Settings())
     assert refused.recommended is None
-    answer = suggest(braked(), 0.8, Settings(after=0.3))
+    answer = suggest(make_braked_block(), 0.8, Settings(after=0.3))
     assert (answer.flight.start, answer.flight.source) == (0.3, "given")
     assert answer.recommended
     assert answer.quality
     assert answer.quality.grade != "good"
-    told = warned(braked(), 0.8, after=0.3)
+    warnings = find_warnings(make_braked_block(), 0.8, after=0.3)
     assert (
         "the momentum shows no free flight at td = 0.8"
-        in told["flight-sources-disagree"]
+        in warnings["flight-sources-disagree"]
     )
-    assert "no-free-flight" not in told
+    assert "no-free-flight" not in warnings
 
 
 def test_an_end_of_the_load_before_that_of_the_evidence_is_used_with_a_warning() -> (
     None
 ):
-    history = braked(until=0.4)
+    history = make_braked_block(until=0.4)
     assert examine(history, 0.8, Settings()).flight.start == pytest.approx(
         0.4, abs=0.005
     )
-    for after, contradicted in ((0.2, True), (0.398, False), (0.5, False)):
-        flight = examine(history, 0.8, Settings(after=after)).flight
-        assert (flight.start, flight.source) == (after, "given")
+    for load_end, contradicted in ((0.2, True), (0.398, False), (0.5, False)):
+        flight = examine(history, 0.8, Settings(after=load_end)).flight
+        assert (flight.start, flight.source) == (load_end, "given")
         assert flight.certain is not contradicted
         assert bool(flight.doubts) is contradicted
     assert (
         "the momentum shows that the flight begins at 0.4"
-        in warned(history, 0.8, after=0.2)["flight-sources-disagree"]
+        in find_warnings(history, 0.8, after=0.2)["flight-sources-disagree"]
     )
 
 
@@ -72,7 +72,7 @@ def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warni
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.maximum(TIME - 0.6, 0)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
-    history = table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
+    history = make_table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
     for td in (0.5, 0.7):
         flight = examine(history, td, Settings(landing=0.8)).flight
         assert flight.end == 0.8
@@ -84,12 +84,15 @@ def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warni
 
 
 def test_flights_that_are_given_are_listed_and_td_is_chosen_in_them() -> None:
-    assert not flights_of(braked(), Settings())
-    (flight,) = flights_of(braked(), Settings(after=0.3, landing=0.9))
+    assert not flights_of(make_braked_block(), Settings())
+    (flight,) = flights_of(make_braked_block(), Settings(after=0.3, landing=0.9))
     assert (flight.start, flight.end, flight.source) == (0.3, 0.9, "given")
-    assert longest_flight(braked(), Settings(after=0.3, landing=0.9)) == (0.3, 0.9)
+    assert longest_flight(make_braked_block(), Settings(after=0.3, landing=0.9)) == (
+        0.3,
+        0.9,
+    )
     with pytest.raises(RangeError, match="give the end of the load as `after`"):
-        longest_flight(braked(), Settings())
+        longest_flight(make_braked_block(), Settings())
 
 
 def test_a_message_advises_nothing_that_was_given() -> None:
@@ -97,17 +100,19 @@ def test_a_message_advises_nothing_that_was_given() -> None:
     flown = np.full((TIME.size, 1, 3), 0.0)
     flown[:, 0, 0] = 50 * np.minimum(TIME, 0.1)
     whole = Momenta(TIME, flown, None, Precision(7), (0,))
-    history = table(
+    history = make_table(
         TIME,
         5 + 90 * TIME,
         whole,
         balance=Balance(TIME, 5 + 90 * TIME, 200 - 90 * TIME),
     )
-    told = warned(history, 0.8)
+    warnings = find_warnings(history, 0.8)
     assert (
         "the momentum is that of free flight at td = 0.8, but the internal energy keeps no level"
-        in told["no-free-flight"]
+        in warnings["no-free-flight"]
     )
-    given = warned(history, 0.8, after=0.1)
-    assert "keeps no level" in given["flight-sources-disagree"]
-    assert not [one for one in given.values() if "`after`" in one]
+    warnings_with_load_end = find_warnings(history, 0.8, after=0.1)
+    assert "keeps no level" in warnings_with_load_end["flight-sources-disagree"]
+    assert not [
+        message for message in warnings_with_load_end.values() if "`after`" in message
+    ]

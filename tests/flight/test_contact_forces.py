@@ -1,4 +1,4 @@
-"""Flight by the forces of contacts and rigid walls, and by nothing else where momenta are missing."""
+"""Flights found by the forces of contacts and rigid walls, alone if momenta are missing."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from tests.command import ROOT, answer, codes, put
-from tests.energies import sure
-from tests.records import table
+from tests.command import ROOT, list_warning_codes, put, run_json
+from tests.energies import require
+from tests.records import make_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,23 +30,23 @@ TIME = np.linspace(0, 1, 401)
 STEP = float(TIME[1])
 
 
-def contact(
+def make_contact(
     *acts: tuple[float, float], time: Samples = TIME, name: str = "contact"
 ) -> ContactForce:
-    """A contact that acts in these times."""
+    """Return a contact whose force acts during these times."""
     forces = np.zeros((time.size, 3))
     for start, end in acts:
         forces[(time >= start) & (time <= end), 2] = 5.0
     return ContactForce.of_forces(name, time, forces)
 
 
-def around(td: float, *forces: ContactForce) -> FreeFlight | None:
+def find_flight_around(td: float, *forces: ContactForce) -> FreeFlight | None:
     touches = Touches.of(forces)
     return touches and touches.flight_around(td)
 
 
-def without_momenta(history: History) -> History:
-    """The same record, of which only energies and forces are written."""
+def drop_momenta(history: History) -> History:
+    """Return the same record with energies and forces only."""
     evidence = history.evidence
     return replace(history, evidence=Given((), evidence.balance, None, evidence.forces))
 
@@ -60,8 +60,10 @@ def without_momenta(history: History) -> History:
 def test_the_ends_of_a_flight_are_known_to_one_output_interval(
     load: float, landing: float, end: float, td: float
 ) -> None:
-    flight = sure(
-        around(td, contact((0.0, load)), contact((landing, end), name="ground"))
+    flight = require(
+        find_flight_around(
+            td, make_contact((0.0, load)), make_contact((landing, end), name="ground")
+        )
     )
     assert load <= flight.start <= load + STEP * 1.001
     assert landing - STEP * 1.001 <= flight.end <= landing
@@ -71,31 +73,41 @@ def test_the_ends_of_a_flight_are_known_to_one_output_interval(
 
 @pytest.mark.parametrize("td", [0.1, 0.2, 0.55, 1.5])
 def test_there_is_none_where_something_touches_or_nothing_is_written(td: float) -> None:
-    assert around(td, contact((0.05, 0.2), (0.5, 0.6))) is None
+    assert find_flight_around(td, make_contact((0.05, 0.2), (0.5, 0.6))) is None
 
 
 def test_a_gap_between_two_pushes_is_too_short_for_a_flight() -> None:
-    assert around(0.31, contact((0.1, 0.3), (0.32, 0.6))) is None
+    assert find_flight_around(0.31, make_contact((0.1, 0.3), (0.32, 0.6))) is None
 
 
 def test_what_always_or_never_acts_says_nothing_of_a_flight() -> None:
     """A tied contact holds parts together; a contact without a force may be that of other parts."""
-    tied, idle = contact((0.0, 1.0), name="tied"), contact(name="idle")
-    assert around(0.5, tied, idle) is None
-    flight = sure(around(0.5, tied, idle, contact((0.0, 0.2), (0.8, 1.0))))
+    tied, idle = make_contact((0.0, 1.0), name="tied"), make_contact(name="idle")
+    assert find_flight_around(0.5, tied, idle) is None
+    flight = require(
+        find_flight_around(0.5, tied, idle, make_contact((0.0, 0.2), (0.8, 1.0)))
+    )
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
     assert flight.end == pytest.approx(0.8, abs=1.1 * STEP)
 
 
 def test_files_that_are_written_at_different_times_are_put_together() -> None:
     coarse = np.linspace(0, 0.9, 31)
-    flight = sure(
-        around(0.5, contact((0.0, 0.2)), contact((0.7, 0.9), time=coarse, name="wall"))
+    flight = require(
+        find_flight_around(
+            0.5,
+            make_contact((0.0, 0.2)),
+            make_contact((0.7, 0.9), time=coarse, name="wall"),
+        )
     )
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
     assert 0.7 - 0.031 <= flight.end <= 0.7
     assert (
-        around(0.95, contact((0.0, 0.2)), contact((0.7, 0.8), time=coarse, name="wall"))
+        find_flight_around(
+            0.95,
+            make_contact((0.0, 0.2)),
+            make_contact((0.7, 0.8), time=coarse, name="wall"),
+        )
         is None
     )
 
@@ -104,27 +116,31 @@ def test_forces_find_the_flights_of_a_computed_run_that_its_momenta_find() -> No
     history = open_run([COMPUTED]).history(Selection())
     by_momenta, by_forces = (
         find_all_seen(history),
-        find_all_seen(without_momenta(history)),
+        find_all_seen(drop_momenta(history)),
     )
     assert {source for source, _ in by_momenta} == {"momentum"}
     assert {source for source, _ in by_forces} == {"contact-force"}
-    for (_, one), (_, other) in zip(by_momenta, by_forces, strict=True):
-        assert one.start == pytest.approx(
-            other.start, abs=3 * history.step
+    for (_, flight_of_momenta), (_, flight_of_forces) in zip(
+        by_momenta, by_forces, strict=True
+    ):
+        assert flight_of_momenta.start == pytest.approx(
+            flight_of_forces.start, abs=3 * history.step
         )  # momenta leave the last push a moment
-        assert one.end == pytest.approx(other.end, abs=1.01 * history.step)
+        assert flight_of_momenta.end == pytest.approx(
+            flight_of_forces.end, abs=1.01 * history.step
+        )
 
 
 def test_momenta_of_parts_come_first_since_a_contact_may_be_of_others() -> None:
     history = open_run([COMPUTED]).history(Selection())
-    rattle = contact((0.2, 0.21), time=history.time, name="loose things")
+    rattle = make_contact((0.2, 0.21), time=history.time, name="loose things")
     evidence = history.evidence
     of_others = Given(
         evidence.momenta, evidence.balance, evidence.masses, (*evidence.forces, rattle)
     )
-    seen = find_seen_flight(replace(history, evidence=of_others), 0.205)
-    assert seen.source == "momentum"
-    assert seen.doubts == ()
+    evidence_of_td = find_seen_flight(replace(history, evidence=of_others), 0.205)
+    assert evidence_of_td.source == "momentum"
+    assert evidence_of_td.doubts == ()
     alone = find_seen_flight(
         replace(history, evidence=Given((), None, None, (*evidence.forces, rattle))),
         0.205,
@@ -132,38 +148,46 @@ def test_momenta_of_parts_come_first_since_a_contact_may_be_of_others() -> None:
     assert alone.flight is None or alone.refusal
 
 
-def crash(time: Samples) -> Samples:
-    """Energy of parts that vibrate, crash into a wall whose force is not written at 0.6, and vibrate on."""
+def compute_crash_energy(time: Samples) -> Samples:
+    """Return the energy of vibrating parts that hit a wall of unwritten force at 0.6 and continue to vibrate."""
     level = np.where(time < 0.6, 1.0, np.minimum(6.0, 1 + 50 * (time - 0.6)))
     return np.asarray(level + 0.2 * np.sin(300 * time))
 
 
-def with_forces(energy: Samples, *forces: ContactForce) -> History:
-    return replace(table(TIME, energy), evidence=Given((), None, None, forces))
+def make_history_with_forces(energy: Samples, *forces: ContactForce) -> History:
+    return replace(make_table(TIME, energy), evidence=Given((), None, None, forces))
 
 
 def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
-    history = with_forces(crash(TIME), contact((0.05, 0.3)))
-    found = sure(around(0.5, *history.evidence.forces))
-    assert is_deformed(history, found)
-    seen = find_seen_flight(history, 0.5)
-    assert seen.flight is None or seen.refusal or seen.flight.start > 0.6
-    calm = with_forces(1 + 0.2 * np.sin(300 * TIME), contact((0.05, 0.3)))
-    assert not is_deformed(calm, found)
-    assert sure(find_seen_flight(calm, 0.5).flight).start == pytest.approx(
+    history = make_history_with_forces(
+        compute_crash_energy(TIME), make_contact((0.05, 0.3))
+    )
+    flight = require(find_flight_around(0.5, *history.evidence.forces))
+    assert is_deformed(history, flight)
+    evidence = find_seen_flight(history, 0.5)
+    assert evidence.flight is None or evidence.refusal or evidence.flight.start > 0.6
+    calm = make_history_with_forces(
+        1 + 0.2 * np.sin(300 * TIME), make_contact((0.05, 0.3))
+    )
+    assert not is_deformed(calm, flight)
+    assert require(find_seen_flight(calm, 0.5).flight).start == pytest.approx(
         0.3, abs=1.1 * STEP
     )
 
 
 def test_before_any_contact_has_ended_forces_alone_show_no_flight() -> None:
     """A load of another kind may act from the start on, which only the external work shows."""
-    history = with_forces(0.4 + 0.2 * np.sin(300 * TIME), contact((0.8, 0.85)))
-    assert sure(find_seen_flight(history, 0.6).refusal).startswith(
+    history = make_history_with_forces(
+        0.4 + 0.2 * np.sin(300 * TIME), make_contact((0.8, 0.85))
+    )
+    assert require(find_seen_flight(history, 0.6).refusal).startswith(
         "the contact force shows no free flight at td = 0.6"
     )
     work = Balance(TIME, internal=history.energy, external_work=np.zeros_like(TIME))
-    known = replace(history, evidence=Given((), work, None, history.evidence.forces))
-    assert sure(find_seen_flight(known, 0.6).flight).start == 0
+    forces_alone = replace(
+        history, evidence=Given((), work, None, history.evidence.forces)
+    )
+    assert require(find_seen_flight(forces_alone, 0.6).flight).start == 0
 
 
 def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None:
@@ -181,25 +205,25 @@ def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None
     file = put(
         tmp_path / "run.csv", f"time,internal energy,contact force\n{rows}".encode()
     )
-    found = answer("suggest", "--td", "0.6", str(file))
-    assert found["flight"]["source"] == "contact-force"
-    assert found["flight"]["start"] == pytest.approx(0.2, abs=1.1 * STEP)
-    assert found["flight"]["end"] == pytest.approx(0.8, abs=1.1 * STEP)
-    assert not found["flight"]["certain"]
-    assert "flight-uncertain" in codes(found)
-    listed = answer("info", str(file))["flights"][0]
+    suggestion = run_json("suggest", "--td", "0.6", str(file))
+    assert suggestion["flight"]["source"] == "contact-force"
+    assert suggestion["flight"]["start"] == pytest.approx(0.2, abs=1.1 * STEP)
+    assert suggestion["flight"]["end"] == pytest.approx(0.8, abs=1.1 * STEP)
+    assert not suggestion["flight"]["certain"]
+    assert "flight-uncertain" in list_warning_codes(suggestion)
+    listed = run_json("info", str(file))["flights"][0]
     assert (listed["source"], listed["start"]) == (
         "contact-force",
-        found["flight"]["start"],
+        suggestion["flight"]["start"],
     )
-    in_load = answer("suggest", "--td", "0.1", "--exit-zero", str(file))
+    in_load = run_json("suggest", "--td", "0.1", "--exit-zero", str(file))
     assert "the contact force shows no free flight at td = 0.1" in str(
         in_load["warnings"]
     )
 
 
-def pushed(*forces: ContactForce, velocity: bool = False) -> Momenta:
-    """Momentum of a model of 2 kg on which these forces work, and gravity."""
+def make_pushed_momenta(*forces: ContactForce, velocity: bool = False) -> Momenta:
+    """Return the momentum of a model of 2 kg under these forces and gravity."""
     momentum = sum(np.cumsum(force.impulses, axis=0) for force in forces) + np.outer(
         TIME, [0.0, 0.0, -19.62]
     )
@@ -212,15 +236,21 @@ def pushed(*forces: ContactForce, velocity: bool = False) -> Momenta:
 def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
     velocity: bool, side: int
 ) -> None:
-    """They are written with a force of one side, although none acts from outside."""
+    """Such contacts are written with the force of one side, although no external force acts."""
     ground, inner = (
-        contact((0.0, 0.2), (0.8, 0.9)),
-        contact((0.1, 0.6), name="with itself"),
+        make_contact((0.0, 0.2), (0.8, 0.9)),
+        make_contact((0.1, 0.6), name="with itself"),
     )
-    told = ground._replace(impulses=side * ground.impulses)
-    touches = sure(Touches.of((told, inner), pushed(ground, velocity=velocity)))
-    flight = sure(touches.flight_around(0.5))
+    ground_with_contact = ground._replace(impulses=side * ground.impulses)
+    touches = require(
+        Touches.of(
+            (ground_with_contact, inner), make_pushed_momenta(ground, velocity=velocity)
+        )
+    )
+    flight = require(touches.flight_around(0.5))
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
     assert flight.end == pytest.approx(0.8, abs=1.1 * STEP)
-    counted = sure(Touches.of((told, inner)))  # of an unknown momentum
+    counted = require(
+        Touches.of((ground_with_contact, inner))
+    )  # of an unknown momentum
     assert counted.flight_around(0.5) is None

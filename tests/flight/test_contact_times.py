@@ -1,4 +1,4 @@
-"""When something pushes, by momenta that fall and bounce as computed here."""
+"""Contact times from momenta, for a part that falls and bounces as computed here."""
 
 from dataclasses import replace
 
@@ -14,19 +14,22 @@ from d2rpick.histories.surroundings import Surroundings
 MASS, GRAVITY = 2.0, 9.81
 
 
-def bouncing(
+def make_bouncing_part(
     contacts: list[tuple[float, float]],
     end: float,
     interval: float,
     gravity: float = GRAVITY,
 ) -> Momenta:
-    """Momentum of a part that a constant force turns back in each contact; times of states are not those of forces."""
+    """Return the momentum of a part that a constant force turns back in each contact; no state is at its ends."""
     time = np.arange(0.0, end + interval / 2, interval)
-    impulses = [40.0 * MASS * (0.05 + 0.02 * at) for at in range(len(contacts))]
-    given = zip(contacts, impulses, strict=True)
+    impulses = [
+        40.0 * MASS * (0.05 + 0.02 * contact_number)
+        for contact_number in range(len(contacts))
+    ]
+    contacts_and_impulses = zip(contacts, impulses, strict=True)
     impulse = sum(
         size * (np.clip(time, *span) - span[0]) / (span[1] - span[0])
-        for span, size in given
+        for span, size in contacts_and_impulses
     )
     values = np.zeros((time.size, 1, 3))
     values[:, 0, 2] = -MASS * gravity * time + impulse - 1.0
@@ -49,36 +52,42 @@ def bouncing(
 def test_every_contact_is_seen_within_half_an_interval(
     shift: float, length: float
 ) -> None:
-    """A push that shows in one interval alone is placed in its middle third: two thirds off at most."""
+    """A contact inside one interval is placed in its middle third: the error is at most 2/3 of an interval."""
     interval = 1e-3
     sliver = 0.01 * interval  # so short a push in an interval does not show
     contacts = [
         (0.1 + shift * interval, 0.1 + (shift + length) * interval),
         (0.3037, 0.3115),
     ]
-    found = find_contact_times(bouncing(contacts, 0.6, interval))
-    assert found is not None
-    assert len(found.spans) == 2
-    for span, contact in zip(found.spans, contacts, strict=True):
+    contact_times = find_contact_times(make_bouncing_part(contacts, 0.6, interval))
+    assert contact_times is not None
+    assert len(contact_times.spans) == 2
+    for span, contact in zip(contact_times.spans, contacts, strict=True):
         is_short = contact[1] - contact[0] < interval + 2 * sliver
-        most = interval * (2 / 3 if is_short else 1 / 2) + sliver
-        assert span == pytest.approx(contact, abs=most)
-    assert found.interval == pytest.approx(interval)
+        tolerance = interval * (2 / 3 if is_short else 1 / 2) + sliver
+        assert span == pytest.approx(contact, abs=tolerance)
+    assert contact_times.interval == pytest.approx(interval)
 
 
 def test_without_gravity_a_push_is_seen_too() -> None:
-    found = find_contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
-    assert found is not None
-    assert np.array(found.spans) == pytest.approx(np.array([[0.1, 0.11]]), abs=1.1e-3)
+    contact_times = find_contact_times(
+        make_bouncing_part([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0)
+    )
+    assert contact_times is not None
+    assert np.array(contact_times.spans) == pytest.approx(
+        np.array([[0.1, 0.11]]), abs=1.1e-3
+    )
 
 
 def test_the_speed_is_that_at_the_end_of_the_longest_flight() -> None:
-    found = find_contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
-    assert found is not None
-    assert found.speed == pytest.approx(np.hypot(1.5, 40.0 * 0.05 - 0.5))
+    contact_times = find_contact_times(
+        make_bouncing_part([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0)
+    )
+    assert contact_times is not None
+    assert contact_times.speed == pytest.approx(np.hypot(1.5, 40.0 * 0.05 - 0.5))
 
 
 def test_of_what_never_flies_nothing_is_known() -> None:
-    momenta = bouncing([], 0.5, 1e-3)
+    momenta = make_bouncing_part([], 0.5, 1e-3)
     shaken = momenta.values + 5 * np.sin(momenta.time * 300)[:, np.newaxis, np.newaxis]
     assert find_contact_times(replace(momenta, values=shaken)) is None

@@ -1,4 +1,4 @@
-"""When a force acts, by forces and impulses that are written at states: within half an interval."""
+"""Contact times from forces and impulses at states: exact to half an interval."""
 
 import numpy as np
 import pytest
@@ -12,17 +12,17 @@ TIME = np.arange(101, dtype=np.float64) * np.float64(STEP)
 FORCE = 3.0
 
 
-def impulses(start: float, end: float) -> ContactForce:
-    """A constant force from ``start`` to ``end``, as its impulses since the start of the run."""
+def integrate_constant_force(start: float, end: float) -> ContactForce:
+    """Return a constant force from ``start`` to ``end``, as impulses since the start of the run."""
     pushed = FORCE * (np.clip(TIME, start, end) - start)
     return ContactForce.of_impulses("interface 1", TIME, np.outer(pushed, [0, 0, 1]))
 
 
 @given(start=st.floats(0.02, 0.6), length=st.floats(2.01 * STEP, 0.3))
 def test_ends_are_within_half_an_interval(start: float, length: float) -> None:
-    found = find_force_times(impulses(start, start + length))
-    assert found is not None
-    ((begins, ends),) = found.spans
+    force_times = find_force_times(integrate_constant_force(start, start + length))
+    assert force_times is not None
+    ((begins, ends),) = force_times.spans
     assert begins == pytest.approx(start, abs=0.501 * STEP)
     assert ends == pytest.approx(start + length, abs=0.501 * STEP)
 
@@ -31,22 +31,22 @@ def test_ends_are_within_half_an_interval(start: float, length: float) -> None:
 def test_a_short_force_has_a_time_within_its_intervals(
     start: float, length: float
 ) -> None:
-    found = find_force_times(impulses(start, start + length))
-    assert found is not None
-    ((begins, ends),) = found.spans
+    force_times = find_force_times(integrate_constant_force(start, start + length))
+    assert force_times is not None
+    ((begins, ends),) = force_times.spans
     assert begins < ends
     assert begins == pytest.approx(start, abs=STEP)
     assert ends == pytest.approx(start + length, abs=STEP)
 
 
 def test_a_force_at_the_ends_of_the_record_has_no_end_seen() -> None:
-    found = find_force_times(impulses(0.0, 1.0))
-    assert found is not None
-    assert found.spans == ((0.0, 1.0),)
+    force_times = find_force_times(integrate_constant_force(0.0, 1.0))
+    assert force_times is not None
+    assert force_times.spans == ((0.0, 1.0),)
 
 
 def test_only_a_force_above_the_least_counts() -> None:
-    force = impulses(0.2, 0.4)
+    force = integrate_constant_force(0.2, 0.4)
     above, below = find_force_times(force, 2.9), find_force_times(force, 3.1)
     assert above is not None
     assert below is not None

@@ -1,4 +1,4 @@
-"""When the parts fly, by everything that the files of computed runs tell, against what is known of these runs."""
+"""Flights found by all evidence in the files of computed runs, compared with the known flights of these runs."""
 
 import json
 from functools import cache
@@ -22,19 +22,28 @@ from d2rpick.histories.opening import open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from d2rpick.report.history_files import BOX_WRITERS
-from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run, unwrapped
-from tests.computed import columns, stored
-from tests.energies import sure
-from tests.json_schemas import checked
-from tests.records import table
-from tests.sample_box import t01
+from tests.command import (
+    BOX,
+    ENERGY,
+    ROLLOVER,
+    join_wrapped_lines,
+    list_warning_codes,
+    put,
+    run,
+    run_json,
+)
+from tests.computed import locate_stored, read_columns
+from tests.energies import require
+from tests.json_schemas import run_json_checked
+from tests.records import make_table
+from tests.sample_box import make_t01
 
 MILLISECOND = 1e-3
-CAR, DROP = stored("carT01.gz"), stored("drop2T01.gz")
+CAR, DROP = locate_stored("carT01.gz"), locate_stored("drop2T01.gz")
 
 
 class Rolled(NamedTuple):
-    """A computed run, and when it truly flies."""
+    """Computed rollover run, and its true flight."""
 
     record: Record
     folder: Path
@@ -42,11 +51,13 @@ class Rolled(NamedTuple):
     end: float
 
     def file(self, form: str) -> str:
-        """The run in a format."""
+        """Write the run in a format and return the file name."""
         path = self.folder / f"run.{form}"
         if not path.exists():
             path.write_bytes(
-                t01(self.record) if form == "T01" else BOX_WRITERS[form](self.record)
+                make_t01(self.record)
+                if form == "T01"
+                else BOX_WRITERS[form](self.record)
             )
         return str(path)
 
@@ -67,13 +78,13 @@ class Rolled(NamedTuple):
 def rolled(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Rolled:
-    """Runs that no threshold was set by."""
+    """Compute runs that were not used to set any threshold."""
     record = simulate(request.param, 0.5, interval=2e-4)
     return Rolled(
         record,
         tmp_path_factory.mktemp("rolled"),
-        sure(record.released),
-        sure(record.landed),
+        require(record.released),
+        require(record.landed),
     )
 
 
@@ -83,20 +94,20 @@ def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_
     rolled: Rolled, form: str
 ) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
-    asked = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
-    found = answer(*asked, str(round(rolled.end - 0.01, 3)))
-    flight = found["flight"]
+    arguments = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
+    document = run_json(*arguments, str(round(rolled.end - 0.01, 3)))
+    flight = document["flight"]
     assert (flight["certain"], flight["source"]) == (True, "momentum")
     assert (flight["start"], flight["end"]) == pytest.approx(
         (rolled.start, rolled.end), abs=MILLISECOND
     )
-    assert found["recommended"]["tr"] >= rolled.start - 2e-4
-    assert not codes(found) & {
+    assert document["recommended"]["tr"] >= rolled.start - 2e-4
+    assert not list_warning_codes(document) & {
         "contact-in-window",
         "work-in-window",
         "flight-sources-disagree",
     }
-    result = run(*asked, str(rolled.end + 0.02), "-f", "json")
+    result = run(*arguments, str(rolled.end + 0.02), "-f", "json")
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
     flight = json.loads(result.stdout)["flight"]
@@ -121,15 +132,18 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
         name: table[axis] / mass
         for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)
     }
-    kept = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
-    kept.to_csv(tmp_path / "run.csv", index=False)
+    velocity_table = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
+    velocity_table.to_csv(tmp_path / "run.csv", index=False)
     td = str(round(rolled.end - 0.01, 3))
-    found, expected = (
-        answer("suggest", "--no-verify", "--td", td, *asked, str(file))["flight"]
-        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.file("csv")))
+    flight_dict, expected = (
+        run_json("suggest", "--no-verify", "--td", td, *arguments, str(file))["flight"]
+        for arguments, file in (
+            (options, tmp_path / "run.csv"),
+            ((), rolled.file("csv")),
+        )
     )
-    assert found == expected
-    assert found["source"] == "momentum"
+    assert flight_dict == expected
+    assert flight_dict["source"] == "momentum"
 
 
 @pytest.mark.slow
@@ -137,28 +151,30 @@ def test_td_after_the_contact_is_refused_by_every_command(
     rolled: Rolled, tmp_path: Path
 ) -> None:
     file, td = rolled.file("glstat"), rolled.end + 0.02
-    judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
+    judged = run_json("verify", "--tr", "0.2", "--td", str(td), file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
-    rows = answer("study", "--td", str(td), file)["runs"]
+    rows = run_json("study", "--td", str(td), file)["runs"]
     assert [row["status"] for row in rows] == ["none"]
     assert "after the end of the flight" in rows[0]["message"]
     deck = put(
         tmp_path / "deck.k",
         run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout,
     )
-    found = answer("check", str(deck), "--history", file)
-    assert "D2R204" in {finding["rule"] for finding in found["findings"]}
+    check_report = run_json("check", str(deck), "--history", file)
+    assert "D2R204" in {finding["rule"] for finding in check_report["findings"]}
 
 
 @pytest.mark.slow
 def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("glstat"))
+    whole = read_history_of_parts(rolled.file("glstat"))
     written = {
         name: getattr(whole.balance, name) for name in ("sliding", "external_work")
     }
-    history = table(whole.time, whole.energy, balance=Balance(whole.time, **written))
+    history = make_table(
+        whole.time, whole.energy, balance=Balance(whole.time, **written)
+    )
     flight = examine(history, rolled.end - 0.01, Settings()).flight
     assert flight.source == "contact-energy"
     assert (flight.start, flight.end) == pytest.approx(
@@ -170,23 +186,23 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
 def test_the_energy_balance_tells_the_flight_where_there_is_neither(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("glstat"))
+    whole = read_history_of_parts(rolled.file("glstat"))
     time, energy = whole.time[::2], whole.energy[::2]
     written = {
         name: getattr(whole.balance, name)[::2]
         for name in ("internal", "kinetic", "external_work")
     }
-    history = table(
+    history = make_table(
         time,
         energy,
-        balance=Balance(time, **written, precision=sure(whole.balance).precision),
+        balance=Balance(time, **written, precision=require(whole.balance).precision),
     )
     flight = examine(
         history, (rolled.start + rolled.end) / 2, Settings(replay=False)
     ).flight
     assert flight.source == "energy-balance"
     # damping bends the parabola of the work of gravity: less than the flight is found then, never more
-    start, end = sure(flight.start), sure(flight.end)
+    start, end = require(flight.start), require(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
     assert find_seen_flight(history, rolled.end + 0.02).refusal
 
@@ -194,18 +210,18 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
 def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
     rolled: Rolled,
 ) -> None:
-    whole = history_of(rolled.file("csv"))
-    history = table(whole.time, whole.energy)
+    whole = read_history_of_parts(rolled.file("csv"))
+    history = make_table(whole.time, whole.energy)
     td = rolled.end - 0.01
-    found = suggest(history, td, Settings(replay=False))
-    if found.recommended:
-        assert found.recommended.tr >= rolled.start
-        assert not found.situation.flight.certain
+    suggestion = suggest(history, td, Settings(replay=False))
+    if suggestion.recommended:
+        assert suggestion.recommended.tr >= rolled.start
+        assert not suggestion.situation.flight.certain
     assert suggest(history, td, Settings(replay=False, strict=True)).recommended is None
 
 
 @cache
-def history_of(source: str, *parts: str) -> History:
+def read_history_of_parts(source: str, *parts: str) -> History:
     return open_run([source]).history(Selection(parts=parts))
 
 
@@ -224,54 +240,58 @@ def history_of(source: str, *parts: str) -> History:
 def test_all_flights_of_runs_of_a_solver_are_found(
     source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
 ) -> None:
-    found = [
+    flight_times = [
         (f.start, f.end)
-        for f in flights_of(history_of(source, *parts), Settings())
+        for f in flights_of(read_history_of_parts(source, *parts), Settings())
         if f.start is not None
     ]
     for start, end in flights:
         assert [
-            one
-            for one in found
-            if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4
+            flight
+            for flight in flight_times
+            if abs(flight[0] - start) <= 5e-4
+            and abs((flight[1] or np.inf) - end) <= 5e-4
         ]
 
 
 def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
-    history = history_of(CAR)
+    history = read_history_of_parts(CAR)
     assert (
         0.0385
-        <= sure(examine(history, 0.146, Settings(replay=False)).flight.start)
+        <= require(examine(history, 0.146, Settings(replay=False)).flight.start)
         <= 0.0390
     )
 
 
 @pytest.mark.slow
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
-    history = history_of(DROP)
-    found = suggest(history, 0.2838, Settings())
-    assert (sure(found.recommended).tr, found.candidates[0].kind) == (0.0, "start")
-    assert "at-rest" in {caution.code for caution in found.cautions}
-    assert sure(found.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
-    assert all(verify_at(found.situation, tr).verified for tr in (0.0, 0.1, 0.28))
-    alone = suggest(table(history.time, history.energy), 0.2838, Settings())
-    assert sure(alone.recommended).tr == 0.0
+    history = read_history_of_parts(DROP)
+    suggestion = suggest(history, 0.2838, Settings())
+    assert (require(suggestion.recommended).tr, suggestion.candidates[0].kind) == (
+        0.0,
+        "start",
+    )
+    assert "at-rest" in {caution.code for caution in suggestion.cautions}
+    assert require(suggestion.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
+    assert all(verify_at(suggestion.situation, tr).verified for tr in (0.0, 0.1, 0.28))
+    alone = suggest(make_table(history.time, history.energy), 0.2838, Settings())
+    assert require(alone.recommended).tr == 0.0
 
 
 @pytest.mark.parametrize(
     ("source", "energy", "start", "end"),
     [
         (ROLLOVER, "boxIE_J", 0.0908, 0.3819),
-        (stored("load_L1_ref.csv.gz"), "IE_J", 0.0200, 0.1),
-        (stored("load_L3_ref.csv.gz"), "IE_J", 0.0235, 0.1),
+        (locate_stored("load_L1_ref.csv.gz"), "IE_J", 0.0200, 0.1),
+        (locate_stored("load_L3_ref.csv.gz"), "IE_J", 0.0235, 0.1),
     ],
 )
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.9, 0.97])
 def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     source: str, energy: str, start: float, end: float, share: float
 ) -> None:
-    time, values = columns(source, energy)
-    quiet = find_quiet_time(table(time, values), start + share * (end - start))
+    time, values = read_columns(source, energy)
+    quiet = find_quiet_time(make_table(time, values), start + share * (end - start))
     assert quiet is None or quiet.start >= start
 
 
@@ -280,8 +300,8 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
 def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(
     part: str, share: float
 ) -> None:
-    whole = history_of(DROP, part)
-    history = table(whole.time, whole.energy)
+    whole = read_history_of_parts(DROP, part)
+    history = make_table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
         quiet = find_quiet_time(history, start + share * (end - start))
         assert quiet is None or quiet.start >= start
@@ -294,7 +314,9 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
         -(((time - 0.8) / 0.01) ** 2)
     )  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = sure(find_quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
+    quiet = require(
+        find_quiet_time(make_table(time, np.where(time < 0.1, 0, energy)), 0.95)
+    )
     assert quiet.start > 0.81
 
 
@@ -310,20 +332,24 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
         balance = Balance(
             time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0)
         )
-        history = table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
+        history = make_table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
         assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
 
 
 def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> (
     None
 ):
-    found = history_of(BOX, "box")
-    assert found.balance
-    longer = np.minimum(found.time, 0.15) + np.maximum(found.time - 0.3819, 0.0)
-    balance = Balance(
-        found.time, sliding=longer, external_work=found.balance.external_work
+    own_history = read_history_of_parts(BOX, "box")
+    assert own_history.balance
+    longer = np.minimum(own_history.time, 0.15) + np.maximum(
+        own_history.time - 0.3819, 0.0
     )
-    (of_parts, _) = found.momenta
+    balance = Balance(
+        own_history.time,
+        sliding=longer,
+        external_work=own_history.balance.external_work,
+    )
+    (of_parts, _) = own_history.momenta
     flown = of_parts.of((0, 1))[:, np.newaxis]
     whole = Momenta(
         of_parts.time,
@@ -336,12 +362,12 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
     for momenta, start in ((of_parts, 0.0908), (whole, 0.15)):
         evidence = Given((momenta,), balance)
         history = History(
-            found.time,
-            found.energy,
+            own_history.time,
+            own_history.energy,
             ("run",),
             "made",
             "E",
-            parts=found.parts,
+            parts=own_history.parts,
             evidence=evidence,
         )
         flight = examine(history, 0.37, Settings(replay=False)).flight
@@ -357,20 +383,26 @@ ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
     assert "(energy alone, not certain)" in run("suggest", *ALONE).stdout
-    found = answer("suggest", *ALONE)
-    assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
-    pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
+    suggestion = run_json("suggest", *ALONE)
+    assert (suggestion["flight"]["source"], suggestion["flight"]["certain"]) == (
+        "energy",
+        False,
+    )
+    pair = ("verify", "--tr", str(suggestion["recommended"]["tr"]), *ALONE)
     judged = run(*pair).stdout
     assert judged.startswith("use with care")
     assert (
         "how the deformations at tr and td lie to each other is unknown"
-        in unwrapped(judged)
+        in join_wrapped_lines(judged)
     )
     assert [
-        run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)
+        run(*arguments, "--strict").exit_code
+        for arguments in (("suggest", *ALONE), pair)
     ] == [1, 1]
     (message,) = (
-        w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy"
+        w["message"]
+        for w in suggestion["warnings"]
+        if w["code"] == "flight-from-energy"
     )
     assert "left unused for safety" in message
 
@@ -378,12 +410,16 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (
     None
 ):
-    found = checked("suggest", *ALONE)
-    windows = found["acceptable_windows"]
-    (own,) = (window for window in windows if window["recommended"])
-    assert own["start"] <= found["recommended"]["tr"] <= own["end"]
+    suggestion = run_json_checked("suggest", *ALONE)
+    windows = suggestion["acceptable_windows"]
+    (recommended_window,) = (window for window in windows if window["recommended"])
+    assert (
+        recommended_window["start"]
+        <= suggestion["recommended"]["tr"]
+        <= recommended_window["end"]
+    )
     assert all(
-        found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows
+        suggestion["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows
     )
     assert sum(w["share"] for w in windows) <= 1
     for window in windows[:3]:
@@ -392,9 +428,12 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
             (window["start"] + window["end"]) / 2,
             window["end"],
         ):
-            assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
-    assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
-    assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
+            assert run_json("verify", "--tr", repr(tr), *ALONE)["verified"]
+    assert (
+        f"{recommended_window['start']:.6g} to {recommended_window['end']:.6g}"
+        in run("suggest", *ALONE).stdout
+    )
+    assert run_json("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
 
 
 @pytest.mark.slow
@@ -409,9 +448,11 @@ def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes
 
     history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
-    seen = [find_seen_flight(history, td) for td in times]
-    assert seen == [find_seen_flight(fresh(), td) for td in times]
-    assert len({one.flight and one.flight[:2] for one in seen}) == 1
-    after = rolled.end + 0.02
-    assert find_seen_flight(history, after) == find_seen_flight(fresh(), after)
-    assert find_seen_flight(history, after).refusal
+    evidences = [find_seen_flight(history, td) for td in times]
+    assert evidences == [find_seen_flight(fresh(), td) for td in times]
+    assert len({evidence.flight and evidence.flight[:2] for evidence in evidences}) == 1
+    contact_time = rolled.end + 0.02
+    assert find_seen_flight(history, contact_time) == find_seen_flight(
+        fresh(), contact_time
+    )
+    assert find_seen_flight(history, contact_time).refusal

@@ -1,4 +1,4 @@
-"""Free flight found in the momentum: on motions made up of known pieces, and on runs that a solver computed."""
+"""Flights found by momentum, for motions of known pieces and for runs computed by a solver."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -28,11 +28,11 @@ from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Run, Selection, open_run
-from tests.command import BOX, ENERGY, GLSTAT, answer, refused, run
-from tests.computed import stored
-from tests.energies import sure
-from tests.reading import read, solved
-from tests.records import printed
+from tests.command import BOX, ENERGY, GLSTAT, read_refusal, run, run_json
+from tests.computed import locate_stored
+from tests.energies import require
+from tests.reading import read, read_solved
+from tests.records import round_as_printed
 from tests.written_runs import Written, as_momenta, as_momenta_alone, as_t01
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
@@ -43,30 +43,34 @@ TD = 0.25
 
 
 class Piece(NamedTuple):
-    """From ``begin`` on, ``force`` of shape (3,) acts on both bodies together, beside weight and damping."""
+    """External ``force`` (3,) on both bodies together from ``begin`` on, besides weight and damping."""
 
     begin: float
     force: tuple[float, float, float]
 
 
-def total(
+def compute_total_momentum(
     time: Samples, pieces: Sequence[Piece], alpha: float, gravity: float
 ) -> Samples:
-    """Momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
+    """Return the momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
     mass = MASSES.sum()
     p = np.zeros((time.size, 3))
-    now = np.array([mass * SPEED, 0.0, 0.0])
+    momentum = np.array([mass * SPEED, 0.0, 0.0])
     ends = [piece.begin for piece in pieces[1:]] + [np.inf]
     for piece, end in zip(pieces, ends, strict=True):
         rate = (
-            np.array(piece.force) - np.array([0.0, 0.0, mass * gravity]) - alpha * now
+            np.array(piece.force)
+            - np.array([0.0, 0.0, mass * gravity])
+            - alpha * momentum
         )
         inside = (time >= piece.begin) & (time < end)
-        p[inside] = now + _lasted(time[inside] - piece.begin, alpha) * rate
-        now = (
-            now
+        p[inside] = (
+            momentum + _integrate_decay(time[inside] - piece.begin, alpha) * rate
+        )
+        momentum = (
+            momentum
             + (
-                _lasted(np.array([end - piece.begin]), alpha)[0]
+                _integrate_decay(np.array([end - piece.begin]), alpha)[0]
                 if np.isfinite(end)
                 else 0.0
             )
@@ -75,24 +79,24 @@ def total(
     return p
 
 
-def _lasted(span: Samples, alpha: float) -> Samples:
-    """Integral of exp(-alpha t) over ``span``, shape (n, 1)."""
+def _integrate_decay(span: Samples, alpha: float) -> Samples:
+    """Return the integral of exp(-alpha t) over ``span``, shape (n, 1)."""
     return np.asarray(span if alpha == 0 else -np.expm1(-alpha * span) / alpha)[
         :, np.newaxis
     ]
 
 
-def flown(
+def make_momenta_in_flight(
     pieces: Sequence[Piece], *, alpha: float = 0.0, gravity: float = 9.81, states: int = 1000, frequency: float = 60.0,
     share: float = 0.1, digits: int = 17, sled: float = 0.0,
 ) -> Momenta:  # fmt: skip
-    """Box and step that vibrate against each other; a sled of momentum ``sled`` that stops at 0.08 if it has any.
+    """Return momenta of a box and a step vibrating against each other, and of a sled that stops at 0.08 (if ``sled``).
 
-    ``share``: amplitude of the momentum they exchange, relative to that of both.
+    ``share`` is the amplitude of the momentum they exchange, relative to their total; ``sled`` is its initial momentum.
     """
     time = np.linspace(0, END, states)
     p = (
-        total(time, pieces, alpha, gravity)[:, np.newaxis]
+        compute_total_momentum(time, pieces, alpha, gravity)[:, np.newaxis]
         * (MASSES / MASSES.sum())[:, np.newaxis]
     )
     phases = 2 * np.pi * frequency * time[:, np.newaxis] + np.array([0.3, 1.9, 4.0])
@@ -110,15 +114,15 @@ def flown(
         driven[:, 0, 0] = sled * np.maximum(0, 1 - time / 0.08)
         p = np.concatenate([p, driven], axis=1)
     if digits < EXACT.digits:
-        p = printed(p.ravel(), digits).reshape(p.shape)
+        p = round_as_printed(p.ravel(), digits).reshape(p.shape)
     masses = np.array([*MASSES, 50.0])[: p.shape[1]]
     return Momenta(
         time, p, PARTS[: p.shape[1]], Precision(digits), chosen=(0,), masses=masses
     )
 
 
-def trip(start: float = 0.08, end: float = 0.33) -> list[Piece]:
-    """A load until ``start``, flight, and a contact from ``end`` on."""
+def list_trip_pieces(start: float = 0.08, end: float = 0.33) -> list[Piece]:
+    """Return a load until ``start``, flight, and a contact from ``end`` on."""
     weight = MASSES.sum() * 9.81
     load = MASSES.sum() * SPEED / start
     return [
@@ -128,8 +132,8 @@ def trip(start: float = 0.08, end: float = 0.33) -> list[Piece]:
     ]
 
 
-def pulse(begin: float, end: float, force: float) -> list[Piece]:
-    """A force in x and z that changes four times and then ceases: a constant one is nothing but another gravity."""
+def list_pulse_pieces(begin: float, end: float, force: float) -> list[Piece]:
+    """Return a force in x and z that changes four times and ends; a constant one could not be told from gravity."""
     levels = np.array([1.0, 2.0, 1.5, 0.7])
     times = np.linspace(begin, end, 5)
     return [
@@ -138,8 +142,8 @@ def pulse(begin: float, end: float, force: float) -> list[Piece]:
     ]
 
 
-def alone(momenta: Momenta) -> Momenta:
-    """The same run of which only the box is written."""
+def keep_box_alone(momenta: Momenta) -> Momenta:
+    """Return the same run with the box only."""
     assert momenta.parts
     return replace(
         momenta,
@@ -150,13 +154,15 @@ def alone(momenta: Momenta) -> Momenta:
 
 
 def smooth(seed: int, waves: int, digits: int) -> Momenta:
-    """A load that never ends: one momentum of random waves."""
+    """Return a load that never ends: the momentum of one body as a sum of random waves."""
     random = np.random.default_rng(seed)
     time = np.linspace(0, 1, 1000)
     turns = np.arange(1, waves + 1) * random.uniform(0.7, 1, waves)
     phases = 2 * np.pi * np.outer(time, turns) + random.uniform(0, 2 * np.pi, waves)
     values = np.zeros((1000, 1, 3))
-    values[:, 0, 0] = printed(np.sin(phases) @ random.normal(size=waves), digits)
+    values[:, 0, 0] = round_as_printed(
+        np.sin(phases) @ random.normal(size=waves), digits
+    )
     return Momenta(time, values, None, Precision(digits), chosen=(0,))
 
 
@@ -195,17 +201,17 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     states: int,
     digits: int,
 ) -> None:
-    momenta = flown(
-        trip(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
+    momenta = make_momenta_in_flight(
+        list_trip_pieces(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
     )  # fmt: skip
-    found = sure(find_flight_around(momenta, td))
-    assert found.parts == PARTS[:2]
+    flight = require(find_flight_around(momenta, td))
+    assert flight.parts == PARTS[:2]
     # In these times the forces change the momentum by two thousandths of its range.
     load, contact = 5e-3 * start, 5e-4
-    few = 3 * END / (states - 1)
-    assert found.start == pytest.approx(start, abs=few + load)
-    assert found.end == pytest.approx(end, abs=few + contact)
-    assert found.end_seen
+    tolerance = 3 * END / (states - 1)
+    assert flight.start == pytest.approx(start, abs=tolerance + load)
+    assert flight.end == pytest.approx(end, abs=tolerance + contact)
+    assert flight.end_seen
 
 
 @given(
@@ -217,9 +223,11 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
 def test_a_part_alone_does_not_fly_while_another_is_attached(
     td: float, frequency: float, share: float, digits: int
 ) -> None:
-    momenta = flown(trip(), frequency=frequency, share=share, digits=digits, alpha=1.0)
+    momenta = make_momenta_in_flight(
+        list_trip_pieces(), frequency=frequency, share=share, digits=digits, alpha=1.0
+    )
     assert find_flight_of(momenta, (0,), td) is None
-    assert find_flight_around(alone(momenta), td) is None
+    assert find_flight_around(keep_box_alone(momenta), td) is None
 
 
 @pytest.mark.slow
@@ -233,46 +241,52 @@ def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight(
         for digits in (5, 17)
         for td in np.linspace(0.05, 0.95, 10)
     ]
-    assert sum(found is not None for found in tried) <= 0.01 * len(tried)
+    assert sum(flight is not None for flight in tried) <= 0.01 * len(tried)
 
 
 @pytest.mark.parametrize("sled", [1e3, 1e5])
 def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(
     sled: float,
 ) -> None:
-    momenta = flown(trip(), sled=sled)
-    assert find_flight_around(momenta, TD) == find_flight_around(flown(trip()), TD)
+    momenta = make_momenta_in_flight(list_trip_pieces(), sled=sled)
+    assert find_flight_around(momenta, TD) == find_flight_around(
+        make_momenta_in_flight(list_trip_pieces()), TD
+    )
 
 
 def test_the_set_that_flies_together_can_be_named() -> None:
-    named = replace(flown(trip(), sled=1e3), flying=(0, 1))
-    found = sure(find_flight_around(named, TD))
-    assert found.parts == PARTS[:2]
-    assert find_flight_around(replace(named, flying=(0,)), TD) is None
+    momenta_of_set = replace(
+        make_momenta_in_flight(list_trip_pieces(), sled=1e3), flying=(0, 1)
+    )
+    flight = require(find_flight_around(momenta_of_set, TD))
+    assert flight.parts == PARTS[:2]
+    assert find_flight_around(replace(momenta_of_set, flying=(0,)), TD) is None
     assert (
-        find_flight_around(replace(named, flying=(0, 1, 2)), TD) is None
+        find_flight_around(replace(momenta_of_set, flying=(0, 1, 2)), TD) is None
     )  # what stands does not fall with the others
 
 
 def test_attached_parts_are_found_among_many() -> None:
-    pair = flown(trip(), share=0.2)
-    others = np.zeros((pair.time.size, 30, 3))
-    others[:, :, 1] = np.cumsum(
+    pair = make_momenta_in_flight(list_trip_pieces(), share=0.2)
+    other_parts = np.zeros((pair.time.size, 30, 3))
+    other_parts[:, :, 1] = np.cumsum(
         np.random.default_rng(3).normal(size=(pair.time.size, 30)), axis=0
     )
-    values = np.concatenate([others[:, :15], pair.values, others[:, 15:]], axis=1)
+    values = np.concatenate(
+        [other_parts[:, :15], pair.values, other_parts[:, 15:]], axis=1
+    )
     parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
-    found = sure(
+    flight = require(
         find_flight_around(
             Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD
         )
     )
-    assert found.parts == (parts[15], parts[16])
+    assert flight.parts == (parts[15], parts[16])
 
 
 def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
-    """Whether a sum becomes less by it is a matter of rounding."""
+    """Rounding decides if such a part makes a sum smaller."""
     for seed in range(100):
         rests = np.random.default_rng(seed).normal(size=(3, 150)) * [
             [1.0],
@@ -284,8 +298,12 @@ def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
 
 
 def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> None:
-    momenta = flown(
-        [*pulse(0.0, 0.06, -4e3), *pulse(0.18, 0.20, 9e4), *pulse(0.30, 0.33, 4e4)]
+    momenta = make_momenta_in_flight(
+        [
+            *list_pulse_pieces(0.0, 0.06, -4e3),
+            *list_pulse_pieces(0.18, 0.20, 9e4),
+            *list_pulse_pieces(0.30, 0.33, 4e4),
+        ]
     )
     flights = find_all_flights(momenta)
     expected = [(0.06, 0.18), (0.20, 0.30), (0.33, END)]
@@ -293,16 +311,24 @@ def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> Non
         [(f.start, f.end) for f in flights], expected, atol=1.5e-3
     )
     assert [f.end_seen for f in flights] == [True, True, False]
-    assert all(one.end <= next_one.start for one, next_one in pairwise(flights))
+    assert all(
+        earlier_flight.end <= next_one.start
+        for earlier_flight, next_one in pairwise(flights)
+    )
     for flight in flights:
-        around = sure(find_flight_around(momenta, (flight.start + flight.end) / 2))
+        around = require(find_flight_around(momenta, (flight.start + flight.end) / 2))
         assert (around.start, around.end) == pytest.approx(
             (flight.start, flight.end), abs=1e-3
         )
 
 
-RESTING = replace(flown(trip()), values=0 * flown(trip()).values)
-BEFORE_AND_AFTER = flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)])
+RESTING = replace(
+    make_momenta_in_flight(list_trip_pieces()),
+    values=0 * make_momenta_in_flight(list_trip_pieces()).values,
+)
+BEFORE_AND_AFTER = make_momenta_in_flight(
+    [*list_pulse_pieces(0.0, 0.06, -2e4), *list_pulse_pieces(0.33, 0.37, 5e4)]
+)
 
 
 @pytest.mark.parametrize(
@@ -311,7 +337,9 @@ BEFORE_AND_AFTER = flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)])
         *(
             (BEFORE_AND_AFTER, td) for td in (0.03, 0.35)
         ),  # in the load, and in the contact
-        *((flown(trip()), td) for td in (-0.1, END + 0.1)),  # outside the record
+        *(
+            (make_momenta_in_flight(list_trip_pieces()), td) for td in (-0.1, END + 0.1)
+        ),  # outside the record
         (RESTING, TD),
     ],
 )
@@ -323,22 +351,22 @@ def test_there_is_no_flight_around_a_td_under_force_outside_the_record_or_at_res
 
 @pytest.mark.parametrize("digits", [5, 17])
 def test_a_momentum_that_never_changes_tells_of_flight_throughout(digits: int) -> None:
-    free = flown([Piece(0.0, (0, 0, 0))], gravity=0.0, digits=digits)
+    free = make_momenta_in_flight([Piece(0.0, (0, 0, 0))], gravity=0.0, digits=digits)
     assert find_flight_around(free, TD) == FreeFlight(
         0.0, END, PARTS[:2], end_seen=False
     )
 
 
 def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
-    """Its momentum is constant, but nothing."""
-    light = flown(trip())
+    """Its momentum is constant but zero."""
+    light = make_momenta_in_flight(list_trip_pieces())
     braked = np.zeros((light.time.size, 1, 3))
     braked[:, 0, 0] = np.where(
         light.time < 0.1, 50 + 50 * np.cos(np.pi * light.time / 0.1), 0.0
     )
     momenta = Momenta(
         light.time,
-        printed(braked.ravel(), 5).reshape(braked.shape),
+        round_as_printed(braked.ravel(), 5).reshape(braked.shape),
         PARTS[:1],
         Precision(5),
         (0,),
@@ -348,7 +376,7 @@ def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
 
 
 def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
-    light = flown(trip(), digits=5)
+    light = make_momenta_in_flight(list_trip_pieces(), digits=5)
     train = np.broadcast_to([1.2345e9, 0.0, 0.0], (light.time.size, 1, 3))
     values, masses = (
         np.concatenate([light.values, train], axis=1),
@@ -364,8 +392,13 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
         Piece(0.08, (0, 0, 0)),
         Piece(0.33, (2e3, 0, 0)),
     ]
-    assert find_flight_around(flown(pieces, gravity=0.0, digits=17), TD)
-    assert find_flight_around(flown(pieces, gravity=0.0, digits=4), TD) is None
+    assert find_flight_around(
+        make_momenta_in_flight(pieces, gravity=0.0, digits=17), TD
+    )
+    assert (
+        find_flight_around(make_momenta_in_flight(pieces, gravity=0.0, digits=4), TD)
+        is None
+    )
 
 
 # Runs that a solver computed.
@@ -373,17 +406,26 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
 
 def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
     run = read([BOX]).run
-    (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
+    (momenta,) = (
+        momenta_of_run
+        for momenta_of_run in run.momenta(run.parts[:1], None)
+        if momenta_of_run.parts
+    )
     assert [find_flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [
         None
     ] * 15
 
 
 def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
-    found = answer(
-        "suggest", "--td", "0.238", "--part", "1-2", stored("chain_referenceT01.gz")
+    suggestion = run_json(
+        "suggest",
+        "--td",
+        "0.238",
+        "--part",
+        "1-2",
+        locate_stored("chain_referenceT01.gz"),
     )
-    assert found["flight"] == {
+    assert suggestion["flight"] == {
         "start": 0.0,
         "end": None,
         "source": "momentum",
@@ -396,46 +438,50 @@ def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> No
 def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
     run: str, start: float
 ) -> None:
-    table = np.genfromtxt(stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True)
+    table = np.genfromtxt(
+        locate_stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True
+    )
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
-    found = sure(
+    flight = require(
         find_flight_around(
             Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1
         )
     )
-    assert found.start == pytest.approx(start, abs=1e-4)
-    assert not found.end_seen
+    assert flight.start == pytest.approx(start, abs=1e-4)
+    assert not flight.end_seen
 
 
-def titles(found: Run, *, flying: bool) -> set[str]:
+def list_titles(run_with_momenta: Run, *, flying: bool) -> set[str]:
     return {
         part.title
         for part in (
-            find_flying_parts(found) if flying else list_deformable_parts(found)
+            find_flying_parts(run_with_momenta)
+            if flying
+            else list_deformable_parts(run_with_momenta)
         )
     }
 
 
 def test_the_box_and_the_step_on_it_fly_and_the_sled_does_not() -> None:
-    assert titles(read([BOX]).run, flying=True) == {"box", "step"}
-    found = answer("suggest", "--part", "flying", "--td", "0.37", BOX)
+    assert list_titles(read([BOX]).run, flying=True) == {"box", "step"}
+    suggestion = run_json("suggest", "--part", "flying", "--td", "0.37", BOX)
     assert (
-        found["history"]["parts"]
-        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
+        suggestion["history"]["parts"]
+        == run_json("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
     )
     assert (
-        found["recommended"]
-        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
+        suggestion["recommended"]
+        == run_json("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
     )
 
 
 def test_all_parts_of_the_car_fly_but_the_ground() -> None:
-    car = solved("carT01.gz").run
-    everything = titles(car, flying=False)
+    car = read_solved("carT01.gz").run
+    everything = list_titles(car, flying=False)
     assert "ground" not in everything
     assert len(everything) == 17
-    assert titles(car, flying=True) == everything
+    assert list_titles(car, flying=True) == everything
 
 
 def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
@@ -448,7 +494,7 @@ def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
 @pytest.mark.parametrize("word", ["flying", "all"])
 def test_files_without_parts_say_so(word: str) -> None:
     for name in (ENERGY, GLSTAT):
-        assert "parts" in refused("suggest", "--part", word, "--td", "0.06", name)
+        assert "parts" in read_refusal("suggest", "--part", word, "--td", "0.06", name)
 
 
 def test_a_table_has_no_parts_that_could_fly() -> None:
@@ -469,8 +515,8 @@ def test_every_command_takes_the_words() -> None:
     )
 
 
-def car_on_a_curb() -> Written:
-    """A body of 280 flies for a fifth of the record; two wheels of 15 for twice as long before, and slide on then."""
+def make_car_on_curb() -> Written:
+    """Return a body of 280 that flies for 20 % of the record; two wheels of 15 fly twice as long, then slide."""
     time = np.linspace(0.0, 1.0, 501)
     masses = np.array([100.0, 60.0, 40.0, 80.0, 15.0, 15.0])
     lifted = np.where(
@@ -485,8 +531,8 @@ def car_on_a_curb() -> Written:
     ringing = 30 * np.sin(300 * time) * np.exp(-20 * np.abs(time - 0.55))
     momentum[:, :4, 1] += ringing[:, np.newaxis] * np.array([1.0, -0.5, -0.8, 0.3])
     momentum[:, :4, 0] = 8 * masses[:4]
-    for wheel, (before, after) in ((4, (60.0, 333.0)), (5, (46.0, 267.0))):
-        pushed = before * np.minimum(time, 0.1) + after * np.maximum(time - 0.5, 0.0)
+    for wheel, (start, end) in ((4, (60.0, 333.0)), (5, (46.0, 267.0))):
+        pushed = start * np.minimum(time, 0.1) + end * np.maximum(time - 0.5, 0.0)
         momentum[:, wheel] = masses[wheel] * np.stack(
             [0 * time + 9, pushed - 9.81 * time], axis=1
         )
@@ -505,10 +551,12 @@ def car_on_a_curb() -> Written:
 def test_the_body_that_matters_is_named_where_loose_wheels_fly_longer(
     tmp_path: Path,
 ) -> None:
-    made = car_on_a_curb()
+    momenta_of_car = make_car_on_curb()
     assert [
         part.id
-        for part in find_flying_parts(open_run([as_t01(made, tmp_path)], Selection()))
+        for part in find_flying_parts(
+            open_run([as_t01(momenta_of_car, tmp_path)], Selection())
+        )
     ] == [1, 2, 3, 4]
 
 
@@ -518,14 +566,14 @@ def test_the_momentum_of_body_and_wheels_together_shows_no_flight_while_wheels_a
     tmp_path: Path, write: Callable[..., str], kinetic: bool
 ) -> None:
     """The wheels are pushed throughout; the body without them flies from 0.55 to 0.75."""
-    made = car_on_a_curb()
-    body = made._replace(
-        momentum=made.momentum[:, :4],
-        kinetic=made.kinetic[:, :4],
-        internal=made.internal[:, :4],
-        masses=made.masses[:4],
+    momenta_of_car = make_car_on_curb()
+    body = momenta_of_car._replace(
+        momentum=momenta_of_car.momentum[:, :4],
+        kinetic=momenta_of_car.kinetic[:, :4],
+        internal=momenta_of_car.internal[:, :4],
+        masses=momenta_of_car.masses[:4],
     )
-    for car, flies in ((made, False), (body, True)):
+    for car, flies in ((momenta_of_car, False), (body, True)):
         reference = read([write(car, tmp_path, kinetic=kinetic)])
         (momenta,) = reference.history.momenta
         flight = find_flight_around(momenta, 0.65, reference.history.balance)

@@ -11,8 +11,8 @@ from d2rpick.histories.balance import find_spring_energy, find_springs
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from tests.computed import stored
-from tests.energies import sure
+from tests.computed import locate_stored
+from tests.energies import require
 from tests.reading import read
 
 TIME = np.linspace(0.0, 1.0, 50)
@@ -73,7 +73,7 @@ def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
     assert find_spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
 
 
-CAR = stored("carT01.gz")
+CAR = locate_stored("carT01.gz")
 
 
 def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
@@ -86,7 +86,7 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
     assert (
-        len(sure(parts.parts)) == 17
+        len(require(parts.parts)) == 17
     )  # the springs are switched although their energy is left out
     assert [
         note
@@ -94,7 +94,7 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
         if "mounts, suspension, latches was left out" in note
     ]
     answer = suggest(parts, 0.1464, Settings())
-    assert sure(answer.recommended).tr == pytest.approx(
+    assert require(answer.recommended).tr == pytest.approx(
         0.0386, abs=5e-4
     )  # with the springs the result is 0.0496 or, at another td, 0.0824
 

@@ -13,11 +13,11 @@ from d2rpick.choice.overview import survey
 from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.report import overview
-from tests.command import answer
+from tests.command import run_json
 from tests.made_binout import GLSTAT, LsdaWriter
 from tests.made_d3plot import D3plotWriter, State
-from tests.made_t01 import MadeGroup, MadePart, T01Writer, headed
-from tests.text_files import glstat_text
+from tests.made_t01 import MadeGroup, MadePart, T01Writer, write_head
+from tests.text_files import make_glstat_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ TIMES = np.arange(40) / 8
 ACTS = (TIMES >= 1) & (TIMES <= 2)  # forces at the states
 FORCE = np.where(ACTS, 3.0, 0.0)
 SEEN = ((0.875, 2.125),)  # to within one output interval
-ENERGY = glstat_text(TIMES, 1 + TIMES)
+ENERGY = make_glstat_text(TIMES, 1 + TIMES)
 
 
 def only(run: Run) -> ContactForce:
@@ -198,7 +198,7 @@ def test_a_binout_of_forces_alone_counts_beside_others(tmp_path: Path) -> None:
 def t01(groups: Sequence[MadeGroup], values: Samples) -> bytes:
     """States whose groups have these values (n, members, 6) each."""
     parts = (MadePart(3, "box", (1,)),)
-    writer: T01Writer = headed(parts, globals_=12, groups=groups)
+    writer: T01Writer = write_head(parts, globals_=12, groups=groups)
     for time, of_groups in zip(TIMES.tolist(), values.tolist(), strict=True):
         writer.state(
             time,
@@ -236,7 +236,7 @@ def test_a_group_of_other_things_has_no_forces(tmp_path: Path) -> None:
         MadeGroup(101, {1: "floor"}, variables=(7, 8)),
     ]
     values = np.zeros((TIMES.size, 1, 6))
-    writer = headed((MadePart(3, "box", (1,)),), globals_=12, groups=groups)
+    writer = write_head((MadePart(3, "box", (1,)),), globals_=12, groups=groups)
     for time in TIMES.tolist():
         writer.state(time, [1 + time] * 12, [1 + time], groups=[[0.0] * 6, [0.0] * 2])
     run = open_run(put(tmp_path, runT01=bytes(writer.data)))
@@ -315,7 +315,7 @@ def test_info_lists_them(tmp_path: Path) -> None:
         "rigid wall 1 never acts",
         "rigid wall 2 acts from 0.875 to 2.125",
     ]
-    assert answer("info", *names)["contact_forces"] == [
+    assert run_json("info", *names)["contact_forces"] == [
         {"name": "rigid wall 1", "acts": []},
         {"name": "rigid wall 2", "acts": [{"start": 0.875, "end": 2.125}]},
     ]

@@ -23,18 +23,20 @@ from d2rpick.histories.content import Content
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Run, Selection
 from tests.command import put
-from tests.hdf5_files import ENERGY, plain, written
+from tests.hdf5_files import ENERGY, plain, write_hdf5
 from tests.histories.test_source import CONTENTS, TIMES
-from tests.made_binout import binout
-from tests.made_d3plot import D3plotWriter, states
-from tests.made_t01 import t01
-from tests.reading import on_disk, read_history, run_of_file, run_on_disk
-from tests.text_files import glstat_text, matsum_text
+from tests.made_binout import make_binout
+from tests.made_d3plot import D3plotWriter, make_states
+from tests.made_t01 import make_t01
+from tests.reading import open_file, open_on_disk, open_run_on_disk, read_history
+from tests.text_files import make_glstat_text, make_matsum_text
 
 pytestmark = pytest.mark.usefixtures("new_files")
 
 STATES = np.arange(400)
-ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
+ONE, OTHER = (
+    make_glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0)
+)
 TABLES = [
     csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES})
     for energy in (1000.0, 2000.0)
@@ -42,7 +44,7 @@ TABLES = [
 
 
 OPENERS = pytest.mark.parametrize(
-    "opened", [run_of_file, run_on_disk], ids=["in memory", "on disk"]
+    "opened", [open_file, open_run_on_disk], ids=["in memory", "on disk"]
 )
 
 
@@ -62,7 +64,7 @@ def test_bytes_on_a_disk_are_those_in_memory(
     size: int,
 ) -> None:
     file = put(tmp_path_factory.getbasetemp() / "bytes", data)
-    held, disk_content = Content(data), on_disk(file)
+    held, disk_content = Content(data), open_on_disk(file)
     addresses = np.array(
         [place % (len(data) - width + 1) for place in places], dtype=np.int64
     )
@@ -94,7 +96,7 @@ def test_threads_that_read_one_file_together_get_each_what_it_asks_for(
     tmp_path: Path,
 ) -> None:
     data = np.random.default_rng(5).bytes(2000)
-    disk_content = on_disk(put(tmp_path / "bytes", data))
+    disk_content = open_on_disk(put(tmp_path / "bytes", data))
     starts = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:
@@ -123,7 +125,7 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(
     kind: str, tmp_path: Path
 ) -> None:
     file = put(tmp_path / "run", CONTENTS[kind])
-    held, disk_run = run_of_file(file), run_on_disk(file)
+    held, disk_run = open_file(file), open_run_on_disk(file)
     assert (held.notes, held.parts) == (disk_run.notes, disk_run.parts)
     for database, expected in zip(disk_run.databases, held.databases, strict=True):
         assert database.channels == expected.channels
@@ -141,7 +143,7 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(
 
 def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
     file = put(tmp_path / "glstat", ONE)
-    run = run_on_disk(file)
+    run = open_run_on_disk(file)
     with file.open("ab") as appending:
         appending.write(OTHER)
     history = run.history(Selection())
@@ -162,11 +164,11 @@ def test_a_file_that_is_appended_to_all_the_time_is_read_as_it_was_at_one_moment
 
     monkeypatch.setattr(os, "fstat", growing)
     assert (
-        run_on_disk(file).history(Selection()).energy.tolist()
+        open_run_on_disk(file).history(Selection()).energy.tolist()
         == (1000.0 + STATES).tolist()
     )
     assert (
-        run_of_file(file).history(Selection()).energy.tolist()
+        open_file(file).history(Selection()).energy.tolist()
         == (1000.0 + STATES).tolist()
     )
 
@@ -174,7 +176,7 @@ def test_a_file_that_is_appended_to_all_the_time_is_read_as_it_was_at_one_moment
 def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
     file, newer = tmp_path / "glstat", tmp_path / "newer"
     file.write_bytes(ONE)
-    run = run_on_disk(file)
+    run = open_run_on_disk(file)
     newer.write_bytes(OTHER)
     newer.replace(file)
     history = run.history(Selection())
@@ -194,7 +196,7 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(
     tmp_path: Path, rest: bytes, reason: str
 ) -> None:
     file = put(tmp_path / "glstat", ONE)
-    run = run_on_disk(file)
+    run = open_run_on_disk(file)
     file.write_bytes(rest)
     with pytest.raises(D2RPickError, match=reason):
         run.databases[0].channel("kinetic energy")
@@ -207,7 +209,7 @@ def test_a_write_under_way_is_no_file_written_anew(
 ) -> None:
     """The system updates the time of a file before its size."""
     file = put(tmp_path / "glstat", ONE)
-    disk_content = on_disk(file)
+    disk_content = open_on_disk(file)
     os.utime(file)
     monkeypatch.setattr(time, "sleep", lambda _: file.write_bytes(ONE + b" "))
     disk_content.check()
@@ -283,14 +285,16 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
 
 
 ANEW = {
-    "binout": bytes(binout([1, 2, 3], shift=1).data),
-    "radioss-th": bytes(t01(3, start=1).data),
-    "glstat": glstat_text(TIMES, [3, 2, 1]),
-    "matsum": matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
-    "hdf5": written(plain).getvalue().replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
+    "binout": bytes(make_binout([1, 2, 3], shift=1).data),
+    "radioss-th": bytes(make_t01(3, start=1).data),
+    "glstat": make_glstat_text(TIMES, [3, 2, 1]),
+    "matsum": make_matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
+    "hdf5": write_hdf5(plain)
+    .getvalue()
+    .replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
     "csv": b"time,IE\n0,2\n1,1\n",
-    "d3thdt": D3plotWriter(family=3).together(states(TIMES)[::-1]),
-    "d3plot": D3plotWriter(order=">").together(states(TIMES)),
+    "d3thdt": D3plotWriter(family=3).together(make_states(TIMES)[::-1]),
+    "d3plot": D3plotWriter(order=">").together(make_states(TIMES)),
 }
 
 
@@ -301,7 +305,7 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
     assert ANEW[kind] != CONTENTS[kind]
     file = put(tmp_path / "run", CONTENTS[kind])
     whole = read_history([str(file)]).energy.tolist()
-    run = run_on_disk(file)
+    run = open_run_on_disk(file)
     database = run.databases[0]
     assert (database.time if database.channels else database.part_time).size
     file.write_bytes(ANEW[kind])
@@ -316,7 +320,7 @@ def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(
     kind: str, tmp_path: Path
 ) -> None:
     file = put(tmp_path / "run", CONTENTS[kind])
-    run = run_on_disk(file)
+    run = open_run_on_disk(file)
     assert run.databases[0].span
     file.write_bytes(ANEW[kind])
     with pytest.raises(ChangedError, match="rewritten"):

@@ -7,7 +7,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
 from d2rpick.histories.samples import count_rows_per_time
-from tests.reading import history_of
+from tests.reading import read_contents
 
 TIMES = np.linspace(0.0, 0.3, 31)
 ENERGIES = {
@@ -20,7 +20,7 @@ ENERGIES = {
 def read_table(
     rows: list[str], head: str = "time,part_id,part_name,internal_energy"
 ) -> History:
-    return history_of(csv_table, "\n".join([head, *rows, ""]), name="table")
+    return read_contents(csv_table, "\n".join([head, *rows, ""]), name="table")
 
 
 def rows_by_time(parts: int = 3) -> list[str]:
@@ -104,7 +104,7 @@ def test_hdf5_is_refused_in_the_same_way() -> None:
     with pytest.raises(
         FormatError, match=r"column 'part' tells the parts apart \(7, 8, 9\)"
     ):
-        history_of(hdf5_file, hdf5_file.write(columns))
+        read_contents(hdf5_file, hdf5_file.write(columns))
 
 
 def test_few_states_are_not_judged() -> None:

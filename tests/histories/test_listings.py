@@ -13,7 +13,7 @@ from d2rpick.histories.listings import (
 )
 from d2rpick.histories.opening import open_run
 from tests.command import GLSTAT, put
-from tests.text_files import glstat_text
+from tests.text_files import make_glstat_text
 
 BAR = "*" * 72
 HEAD = """ CAR_0002.out
@@ -173,7 +173,7 @@ def test_smallest_steps_of_a_d3hsp_are_found_beside_the_deck(tmp_path: Path) -> 
 
 def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) -> None:
     (tmp_path / "glstat").write_bytes(
-        glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"0.00000E+00", b"2.50000E-06")
+        make_glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"0.00000E+00", b"2.50000E-06")
     )
     assert find_printed_steps(open_run([str(tmp_path / "glstat")])) == {
         10: (2.5e-6, "glstat")
@@ -181,7 +181,7 @@ def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) ->
 
 
 def test_times_per_zone_cycle_of_a_glstat(tmp_path: Path) -> None:
-    text = glstat_text([0.0, 0.5], [1.0, 2.0]).replace(
+    text = make_glstat_text([0.0, 0.5], [1.0, 2.0]).replace(
         b"(nanosec)..             0", b"(nanosec)..          5134"
     )
     zone_times = read_zone_times(str(put(tmp_path / "glstat", text)))

@@ -16,8 +16,8 @@ from d2rpick.histories.meaning import (
     is_time,
 )
 from d2rpick.histories.names import Selection
-from tests.hdf5_files import written
-from tests.reading import run_of
+from tests.hdf5_files import write_hdf5
+from tests.reading import open_contents
 
 # Internal and kinetic energy of the whole model, as one program or person writes them.
 SPELLINGS = [
@@ -186,7 +186,7 @@ def write_header_and_rows(*names: str) -> str:
 
 def notes_of(text: str, *energy: str) -> str:
     selection = Selection(energy=energy)
-    run = run_of(csv_table, text, selection=selection)
+    run = open_contents(csv_table, text, selection=selection)
     notes = run.history(selection).notes
     assert {*notes} == {*survey(run, selection).notes}
     return " ".join(notes)
@@ -259,7 +259,7 @@ def add_block(
 def test_hdf5_files_are_read_by_their_own_names(
     layout: Callable[[h5py.File], None],
 ) -> None:
-    run = run_of(hdf5_file, written(layout).getvalue())
+    run = open_contents(hdf5_file, write_hdf5(layout).getvalue())
     history = run.history(Selection())
     np.testing.assert_array_equal((history.time, history.energy), (TIME, TIME))
     quantities = run.quantities(history.time)
@@ -272,13 +272,13 @@ def test_a_quantity_at_other_times_than_the_energy_is_not_taken() -> None:
         h5md(file)
         file["observables/kinetic_energy/time"][...] = TIME + 0.5
 
-    run = run_of(hdf5_file, written(shifted).getvalue())
+    run = open_contents(hdf5_file, write_hdf5(shifted).getvalue())
     assert "kinetic_energy" not in run.quantities(run.history(Selection()).time)
 
 
 def test_the_parts_of_an_erf_file_are_chosen_by_number() -> None:
     path = "post/multistate/TIMESERIES1/multientityresults/PART/INTERNAL_ENERGY/9/value"
-    history = run_of(hdf5_file, written(erf).getvalue()).history(
+    history = open_contents(hdf5_file, write_hdf5(erf).getvalue()).history(
         Selection(energy=(path,))
     )
     np.testing.assert_array_equal(history.energy, TIME / 3)
@@ -309,7 +309,7 @@ def abaqus(artificial: float | None) -> str:
 def test_the_artificial_energy_of_abaqus_is_a_part_of_its_internal_energy() -> None:
     flights, shares = [], []
     for artificial in (None, 0.05, 0.2):
-        overview = survey(run_of(csv_table, abaqus(artificial)), Selection())
+        overview = survey(open_contents(csv_table, abaqus(artificial)), Selection())
         flights.append(overview.flights)
         shares.append(overview.health.hourglass_share if overview.health else None)
     assert flights[0]

@@ -30,16 +30,22 @@ from d2rpick.histories.opening import (
 )
 from d2rpick.histories.source import Source
 from tests.command import put
-from tests.computed import stored
-from tests.made_binout import binout as made_binout, values
-from tests.made_t01 import MadePart, t01, value
-from tests.reading import history_of, read_history, run_of, states_of
-from tests.text_files import HEAD, glstat_text, matsum_head, matsum_part, matsum_text
+from tests.computed import locate_stored
+from tests.made_binout import compute_value, make_binout as made_binout
+from tests.made_t01 import MadePart, make_t01, make_value
+from tests.reading import list_states, open_contents, read_contents, read_history
+from tests.text_files import (
+    HEAD,
+    make_glstat_text,
+    make_matsum_head,
+    make_matsum_part,
+    make_matsum_text,
+)
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 TIMES = np.arange(1, 9) / 8
-GLSTAT = glstat_text(TIMES, 10 * TIMES)
-MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
+GLSTAT = make_glstat_text(TIMES, 10 * TIMES)
+MATSUM = make_matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 
 
 def open_companions(
@@ -82,10 +88,10 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         ),
     )
     assert run.history(Selection()).energy.tolist() == [
-        values("internal_energy", state) for state in range(1, 8)
+        compute_value("internal_energy", state) for state in range(1, 8)
     ]
     assert run.part_energies(run.parts).tolist() == [
-        [values("internal_energy", state, id_) for id_ in (7, 3)]
+        [compute_value("internal_energy", state, id_) for id_ in (7, 3)]
         for state in range(1, 8)
     ]
     assert run.notes == (
@@ -96,8 +102,8 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
 def test_a_missing_branch_is_named_with_what_there_is() -> None:
     data = bytes(made_binout([1, 2]).data)
     no_parts, no_globals = (
-        run_of(binout, data.replace(b"matsum", b"nodout")),
-        run_of(binout, data.replace(b"glstat", b"nodout")),
+        open_contents(binout, data.replace(b"matsum", b"nodout")),
+        open_contents(binout, data.replace(b"glstat", b"nodout")),
     )
     with pytest.raises(
         FormatError,
@@ -114,12 +120,19 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
 
 def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     legs = [
-        glstat_text([3, 4, 5], [30, 40, 50]),
-        glstat_text([1, 2, 3, 4], [1, 2, 3, 4]),
-        glstat_text([5.5], [55]),
+        make_glstat_text([3, 4, 5], [30, 40, 50]),
+        make_glstat_text([1, 2, 3, 4], [1, 2, 3, 4]),
+        make_glstat_text([5.5], [55]),
     ]
-    history = history_of(glstat, *legs)
-    assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
+    history = read_contents(glstat, *legs)
+    assert list_states(history) == [
+        (1, 1),
+        (2, 2),
+        (3, 30),
+        (4, 40),
+        (5, 50),
+        (5.5, 55),
+    ]
     assert (
         "time steps back once (restart); if legs overlap the newer one is used"
         in history.notes[0]
@@ -128,10 +141,10 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
 
 def test_a_leg_that_gives_no_state_is_named() -> None:
     """Two files that start at the same time are hardly legs of one run."""
-    history = history_of(
-        glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4])
+    history = read_contents(
+        glstat, make_glstat_text([1, 2], [1, 2]), make_glstat_text([1, 2], [3, 4])
     )
-    assert states_of(history) == [(1, 3), (2, 4)]
+    assert list_states(history) == [(1, 3), (2, 4)]
     assert (
         "run1 was not used: a newer leg begins at or before its first time"
         in history.notes
@@ -139,18 +152,18 @@ def test_a_leg_that_gives_no_state_is_named() -> None:
 
 
 def test_a_leg_without_states_does_not_hide_the_others() -> None:
-    history = history_of(glstat, HEAD, GLSTAT)
+    history = read_contents(glstat, HEAD, GLSTAT)
     assert history.time.tolist() == TIMES.tolist()
     with pytest.raises(FormatError, match="no states; did the run"):
-        history_of(glstat, HEAD)
+        read_contents(glstat, HEAD)
 
 
 def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
     first, second = (
-        t01(3, [MadePart(1, "box"), MadePart(2, "step")]),
-        t01(3, [MadePart(1, "box")], start=3),
+        make_t01(3, [MadePart(1, "box"), MadePart(2, "step")]),
+        make_t01(3, [MadePart(1, "box")], start=3),
     )
-    run = run_of(radioss_th, bytes(first.data), bytes(second.data))
+    run = open_contents(radioss_th, bytes(first.data), bytes(second.data))
     assert [part.id for part in run.parts] == [1]
     assert "only some legs have part 2, which was left out" in run.notes[0]
     with pytest.raises(FormatError, match="no part 2; there are: 1 'box'"):
@@ -159,7 +172,7 @@ def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
 
 def test_a_column_that_a_leg_lacks_is_refused() -> None:
     with pytest.raises(FormatError, match="run2: no column 'IE', only heat"):
-        history_of(
+        read_contents(
             csv_table, "time,IE,x\n0,1,2\n1,2,3\n", "time,heat,x\n2,1,2\n3,2,3\n"
         )
 
@@ -169,9 +182,9 @@ def test_a_column_that_a_leg_lacks_is_refused() -> None:
 
 def test_companions_of_other_times_are_doubted() -> None:
     assert open_companions({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
-    coarse = matsum_text(TIMES[::2], [7, 3], np.ones((4, 2)))
+    coarse = make_matsum_text(TIMES[::2], [7, 3], np.ones((4, 2)))
     assert open_companions({"glstat": GLSTAT, "matsum": coarse}).notes == ()
-    shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
+    shifted = make_matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
     (note,) = open_companions({"glstat": GLSTAT, "matsum": shifted}).notes
     assert (
         note
@@ -179,7 +192,7 @@ def test_companions_of_other_times_are_doubted() -> None:
     )
     longer = np.arange(30) * (TIMES[1] - TIMES[0]) + TIMES[0]
     (note,) = open_companions(
-        {"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}
+        {"glstat": GLSTAT, "matsum": make_matsum_text(longer, [7, 3], np.ones((30, 2)))}
     ).notes
     assert note.startswith(
         f"glstat ends at {TIMES[-1]:.6g} and matsum at {longer[-1]:.6g}; are they from the same run"
@@ -189,16 +202,19 @@ def test_companions_of_other_times_are_doubted() -> None:
         match="glstat and matsum have no time in common, files of one run were expected",
     ):
         open_companions(
-            {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))}
+            {
+                "glstat": GLSTAT,
+                "matsum": make_matsum_text(TIMES + 5, [7], np.ones((8, 1))),
+            }
         )
 
 
 def test_companions_have_legs_of_their_own() -> None:
     run = open_companions(
         {
-            "glstat1": glstat_text([1, 2], [1, 2]),
-            "matsum": matsum_text([1, 2, 3], [7], [[0.5], [6.0], [7.0]]),
-            "glstat2": glstat_text([2, 3], [20, 30]),
+            "glstat1": make_glstat_text([1, 2], [1, 2]),
+            "matsum": make_matsum_text([1, 2, 3], [7], [[0.5], [6.0], [7.0]]),
+            "glstat2": make_glstat_text([2, 3], [20, 30]),
         }
     )
     assert run.history(Selection()).energy.tolist() == [1, 20, 30]
@@ -222,8 +238,8 @@ def test_parts_with_more_energy_than_the_model_are_of_another_run(
 ) -> None:
     run = open_companions(
         {
-            "glstat": glstat_text([1, 2, 3], [10, 20, 9]),
-            "matsum": matsum_text([1, 2, 3], [7, 3], parts),
+            "glstat": make_glstat_text([1, 2, 3], [10, 20, 9]),
+            "matsum": make_matsum_text([1, 2, 3], [7, 3], parts),
         }
     )
     if refused:
@@ -242,7 +258,10 @@ def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
     """A falling box has some 1e-18 J in its parts, and another 1e-18 J as a whole."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
     run = open_companions(
-        {"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])}
+        {
+            "csv": table,
+            "matsum": make_matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]]),
+        }
     )
     assert run.history(Selection(parts=("7",))).energy.size == 3
 
@@ -255,7 +274,7 @@ def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_prefe
 ):
     data = bytes(made_binout(range(1, 9)).data)
     run = open_companions({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
-    assert run.history(Selection()).energy[0] == values("internal_energy", 1)
+    assert run.history(Selection()).energy[0] == compute_value("internal_energy", 1)
     assert (
         run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
     )
@@ -263,7 +282,7 @@ def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_prefe
 
 
 def test_without_it_all_parts_are_added_with_a_note() -> None:
-    history = history_of(matsum, MATSUM)
+    history = read_contents(matsum, MATSUM)
     assert (history.channel, history.parts) == ("internal energy of all parts", None)
     assert history.energy.tolist() == TIMES.tolist()
     assert history.notes == (
@@ -273,10 +292,10 @@ def test_without_it_all_parts_are_added_with_a_note() -> None:
 
 
 def test_chosen_parts_are_added_and_named() -> None:
-    history = history_of(matsum, MATSUM, selection=Selection(parts=("part 7",)))
+    history = read_contents(matsum, MATSUM, selection=Selection(parts=("part 7",)))
     assert (history.channel, history.notes) == ("internal energy of Part 7", ())
     assert [part.id for part in history.parts or ()] == [7]
-    idle = history_of(matsum, MATSUM, selection=Selection(parts=("3,7",)))
+    idle = read_contents(matsum, MATSUM, selection=Selection(parts=("3,7",)))
     assert idle.energy.tolist() == TIMES.tolist()
     assert idle.notes == (
         "without any internal energy: part 3 'Part 3'; rigid, or without elements?",
@@ -302,7 +321,7 @@ def test_chosen_parts_are_added_and_named() -> None:
             "csv: this table has no parts; give the matsum",
         ),
         (
-            {"radioss-th": bytes(t01(2, []).data)},
+            {"radioss-th": bytes(make_t01(2, []).data)},
             Selection(parts=("7",)),
             "no parts with histories of their own",
         ),
@@ -333,8 +352,8 @@ def test_what_is_not_there_is_refused_with_what_there_is(
 def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
     file = tmp_path / "history"
     for content in (
-        glstat_text([5, 1, 4, 2, 3], np.ones(5)),
-        matsum_text([5, 1, 4, 2, 3], [7], np.ones((5, 1))),
+        make_glstat_text([5, 1, 4, 2, 3], np.ones(5)),
+        make_matsum_text([5, 1, 4, 2, 3], [7], np.ones((5, 1))),
     ):
         file.write_bytes(content)
         with pytest.raises(FormatError, match="time steps back at 2 of 4 states"):
@@ -356,14 +375,14 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     """A file without states, and curves of which none is meant."""
-    empty = survey(run_of(glstat, HEAD), Selection())
+    empty = survey(open_contents(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
         0,
         None,
         None,
         (),
     )
-    begun = survey(run_of(radioss_th, bytes(t01(0).data)), Selection())
+    begun = survey(open_contents(radioss_th, bytes(make_t01(0).data)), Selection())
     assert (begun.states, begun.time_start, begun.flights, begun.health) == (
         0,
         None,
@@ -371,7 +390,7 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
         None,
     )
     curves = survey(
-        run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"),
+        open_contents(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"),
         Selection(),
     )
     assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
@@ -380,7 +399,10 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
         in curves.notes[0]
     )
     doubtful = open_companions(
-        {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))}
+        {
+            "glstat": GLSTAT,
+            "matsum": make_matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2))),
+        }
     )
     assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
 
@@ -403,7 +425,7 @@ def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(
 
 
 def test_a_long_gap_between_legs_is_told() -> None:
-    legs = [stored(f"rollover_r100_{leg}.gz") for leg in ("T01", "T03")]
+    legs = [locate_stored(f"rollover_r100_{leg}.gz") for leg in ("T01", "T03")]
     assert any(
         "no states between 0.0999564 and 0.370008" in note
         for note in open_run(legs).history(Selection()).notes
@@ -421,11 +443,11 @@ def write_matsum(
     path: Path, parts: dict[int, tuple[float, float]], states: int = 4
 ) -> Path:
     """Write a matsum of parts with momentum and velocity along y at the end, half of both in the middle, and so on."""
-    text = matsum_head([*parts]).decode()
+    text = make_matsum_head([*parts]).decode()
     for state in range(states):
         text += f" time ={0.1 * state:13.4E}\n"
         for id_, (momentum, velocity) in parts.items():
-            block = matsum_part(id_, 1.0 + state).decode()
+            block = make_matsum_part(id_, 1.0 + state).decode()
             for name, number in (("y-mom", momentum), ("y-rbv", velocity)):
                 block = block.replace(
                     f"{name}={ZERO}", f"{name}={number * state / states:13.4E}"
@@ -449,16 +471,16 @@ def test_of_a_matsum_they_are_momentum_over_velocity(tmp_path: Path) -> None:
 
 def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
     (tmp_path / "RUNT01").write_bytes(
-        t01(3, (MadePart(3, "box"), MadePart(12, "step"))).data
+        make_t01(3, (MadePart(3, "box"), MadePart(12, "step"))).data
     )
     assert masses(tmp_path / "RUNT01") == pytest.approx(
-        [value(1, 3, 6), value(1, 12, 6)]
+        [make_value(1, 3, 6), make_value(1, 12, 6)]
     )  # the middle of all states is not the middle of the states with a mass
     (tmp_path / "ENERGYT01").write_bytes(
-        t01(3, (MadePart(3, "box", codes=(1, 2)),)).data
+        make_t01(3, (MadePart(3, "box", codes=(1, 2)),)).data
     )
     assert masses(tmp_path / "ENERGYT01") is None
     (tmp_path / "MOTIONT01").write_bytes(
-        t01(3, (MadePart(3, "box", codes=(1, 3, 4, 5)),)).data
+        make_t01(3, (MadePart(3, "box", codes=(1, 3, 4, 5)),)).data
     )
     assert masses(tmp_path / "MOTIONT01") is None

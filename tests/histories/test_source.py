@@ -17,25 +17,25 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.source import expand, find_later_legs, open_files
-from tests.command import refused
-from tests.computed import stored
-from tests.hdf5_files import plain, written
-from tests.made_binout import binout
-from tests.made_d3plot import D3plotWriter, states
-from tests.made_t01 import t01
+from tests.command import read_refusal
+from tests.computed import locate_stored
+from tests.hdf5_files import plain, write_hdf5
+from tests.made_binout import make_binout
+from tests.made_d3plot import D3plotWriter, make_states
+from tests.made_t01 import make_t01
 from tests.reading import read_history
-from tests.text_files import glstat_text, matsum_text
+from tests.text_files import make_glstat_text, make_matsum_text
 
 TIMES = [0.125, 0.25, 0.375]
 CONTENTS = {
-    "binout": bytes(binout([1, 2, 3]).data),
-    "radioss-th": bytes(t01(3).data),
-    "glstat": glstat_text(TIMES, [1, 2, 3]),
-    "matsum": matsum_text(TIMES, [7, 3], np.ones((3, 2))),
-    "hdf5": written(plain).getvalue(),
+    "binout": bytes(make_binout([1, 2, 3]).data),
+    "radioss-th": bytes(make_t01(3).data),
+    "glstat": make_glstat_text(TIMES, [1, 2, 3]),
+    "matsum": make_matsum_text(TIMES, [7, 3], np.ones((3, 2))),
+    "hdf5": write_hdf5(plain).getvalue(),
     "csv": b"time,IE\n0,1\n1,2\n",
-    "d3thdt": D3plotWriter(family=3).together(states(TIMES)),
-    "d3plot": D3plotWriter().together(states(TIMES)),
+    "d3thdt": D3plotWriter(family=3).together(make_states(TIMES)),
+    "d3plot": D3plotWriter().together(make_states(TIMES)),
 }
 
 
@@ -208,7 +208,7 @@ def test_legs_are_files_of_the_same_name_with_a_higher_number(
 
 
 def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
-    first = stored("rollover_r100_T01.gz")
-    assert first.replace("T01", "T02") in refused(
+    first = locate_stored("rollover_r100_T01.gz")
+    assert first.replace("T01", "T02") in read_refusal(
         "suggest", "--td", "0.4", "--part", "box", first
     )

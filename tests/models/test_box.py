@@ -28,7 +28,7 @@ from d2rpick.models.box_run import (
     scan_times,
     simulate,
 )
-from tests.energies import sure
+from tests.energies import require
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 5e-4
@@ -173,9 +173,9 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
         motion.box.internal_energy(motion.places),
         motion.box.forces(motion.places),
     )
-    turned = sure(motion.body).arms[0]
+    turned = require(motion.body).arms[0]
     run_to(motion, tr + rigid)
-    turned = sure(motion.body).arms[0] / turned
+    turned = require(motion.body).arms[0] / turned
     momenta_before = momenta(motion)
     motion.make_deformable()
     assert momenta(motion) == momenta_before
@@ -334,7 +334,7 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
             structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0)
         )
         points = structure.places + 1j * (level - depth)
-        push = sure(
+        push = require(
             contact.push(
                 1.0,
                 points - 1.0 + p.speed * p.braking / 2,
@@ -441,7 +441,7 @@ def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
     base, weak = (
         simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7)
     )
-    before_landing = base.time < sure(base.landed)
+    before_landing = base.time < require(base.landed)
     np.testing.assert_array_equal(
         weak.internal_energy[before_landing], base.internal_energy[before_landing]
     )

@@ -26,18 +26,22 @@ if TYPE_CHECKING:
 def trade_off() -> Figure:
     """Draw the residual of the best pair of each td against its rigid time."""
     figure, (axes,) = make_figure(3.4)
-    found = d2.explore(
+    exploration = d2.explore(
         sample_oscillator(), td=0.064, td_window=(0.055, 0.08)
     ).to_frame()
     for chosen, color, name in (
         (
-            ~found["unbeaten"].astype(bool),
+            ~exploration["unbeaten"].astype(bool),
             MUTED,
             "another td is at least as good in both",
         ),
-        (found["unbeaten"].astype(bool), REFERENCE, "no other td is as good in both"),
+        (
+            exploration["unbeaten"].astype(bool),
+            REFERENCE,
+            "no other td is as good in both",
+        ),
     ):
-        rows = found[chosen]
+        rows = exploration[chosen]
         axes.plot(
             rows["rigid_time"] * 1e3,
             rows["residual"],
@@ -46,10 +50,10 @@ def trade_off() -> Figure:
             label=name,
             markersize=5,
         )
-    asked = found.iloc[(found["td"] - 0.064).abs().argmin()]
+    offer_of_td = exploration.iloc[(exploration["td"] - 0.064).abs().argmin()]
     axes.annotate(
         "td = 64 ms",
-        (asked["rigid_time"] * 1e3, asked["residual"]),
+        (offer_of_td["rigid_time"] * 1e3, offer_of_td["residual"]),
         (0.5, 0.55),
         textcoords="axes fraction",
         arrowprops={"arrowstyle": "->"},
@@ -84,13 +88,15 @@ def sampling() -> Figure:
     """Draw an energy that is written often enough, and one that is written too seldom."""
     figure, panels = make_figure(4.0, rows=2)
     energy = oscillator()["internal_energy"].iloc[: 600 + 1]
-    for axes, every, text in (
+    for axes, stride, text in (
         (panels[0], 10, "a state every 1 ms: 12 for each period of the energy"),
         (panels[1], 100, "a state every 10 ms: the peaks are lost"),
     ):
         draw_curve(axes, energy.index * 1e3, energy, MUTED, "energy")
-        seen = energy.iloc[::every]
-        axes.plot(seen.index * 1e3, seen, ".-", color=REFERENCE, label="written states")
+        coarse = energy.iloc[::stride]
+        axes.plot(
+            coarse.index * 1e3, coarse, ".-", color=REFERENCE, label="written states"
+        )
         axes.set_title(text, fontsize=9)
         axes.set(ylim=(0, None), xlim=(0, 60))
         name_axes(axes, "", "energy [J]")
@@ -102,17 +108,19 @@ def sampling() -> Figure:
 def landings() -> Figure:
     """Draw by how much td lies before the landing of the switched run, for plans in steps and at once."""
     figure, (axes,) = make_figure(3.2)
-    for place, (name, label, color) in enumerate(
+    for row_number, (name, label, color) in enumerate(
         (
             ("drop_plans_at_once", "all windows\nfrom one run", SWITCHED),
             ("drop_plans", "window by\nwindow", RIGID),
         )
     ):
         table = validated(name)
-        before = (table["landing_s"] - table["td_s"]) * 1e3
-        spread = np.linspace(-0.2, 0.2, len(before))
-        axes.plot(before, place + spread, "o", color=color, markersize=5)
-        axes.text(-50, place, label, va="center", ha="right")
+        time_before_landing = (table["landing_s"] - table["td_s"]) * 1e3
+        spread = np.linspace(-0.2, 0.2, len(time_before_landing))
+        axes.plot(
+            time_before_landing, row_number + spread, "o", color=color, markersize=5
+        )
+        axes.text(-50, row_number, label, va="center", ha="right")
     axes.axvline(0, color="black", linewidth=0.8)
     axes.text(-1, 1.42, "rigid in the contact", ha="right", va="center")
     axes.text(1, 1.42, "deformable before the contact", ha="left", va="center")

@@ -103,9 +103,9 @@ def name_axes(axes: Axes, across: str, up: str) -> None:
     axes.set_ylabel(up)
 
 
-def show_names(axes: Axes, place: Any = "best") -> None:
+def show_names(axes: Axes, location: Any = "best") -> None:
     """Show the names of the curves."""
-    axes.legend(loc=place, frameon=False, fontsize=8)
+    axes.legend(loc=location, frameon=False, fontsize=8)
 
 
 def drawn(figure: Figure, name: str) -> bytes:

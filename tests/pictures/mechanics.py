@@ -148,11 +148,11 @@ def residual() -> Figure:
     table = oscillator()
     stretch, square = deformation(table), table["internal_energy"]
     at_td = float(np.interp(_PEAK, table.index, stretch))
-    before = table.index < _PEAK
+    before_peak = table.index < _PEAK
     draw_curve(energy, table.index * 1e3, square, REFERENCE)
     energy.set_ylim(0, 30)
-    distance = (stretch[before] - at_td).abs() / abs(at_td)
-    draw_curve(error, table.index[before] * 1e3, distance, REFERENCE)
+    distance = (stretch[before_peak] - at_td).abs() / abs(at_td)
+    draw_curve(error, table.index[before_peak] * 1e3, distance, REFERENCE)
     for limit, name in ((0.2, "good"), (0.5, "fair"), (1.0, "no vibration at all")):
         error.axhline(limit, color=MUTED, linewidth=0.8, linestyle=":")
         error.text(84, limit, name, ha="right", va="bottom", color=MUTED)

@@ -34,8 +34,8 @@ def browser() -> str | None:
 def take_screenshot(name: str, program: str) -> None:
     """Write ``docs/pictures/NAME.png``."""
     question, size = _PAGES[name]
-    with tempfile.TemporaryDirectory() as place:
-        page = Path(place) / "page.html"
+    with tempfile.TemporaryDirectory() as profile_folder:
+        page = Path(profile_folder) / "page.html"
         with contextlib.chdir(ROOT):
             run(*question, "--quiet", "--report", str(page))
         options = [

@@ -38,10 +38,10 @@ def workflow() -> Figure:
     figure, (axes,) = make_figure(1.7)
     axes.set(xlim=(0, 15), ylim=(0, 3))
     axes.axis("off")
-    for place, (title, text, color) in enumerate(_STEPS):
-        left = 3 * place + 0.1
+    for step_number, (title, text, color) in enumerate(_STEPS):
+        left_edge = 3 * step_number + 0.1
         box = FancyBboxPatch(
-            (left, 0.9),
+            (left_edge, 0.9),
             2.4,
             1.6,
             boxstyle="round,pad=0.08",
@@ -49,10 +49,10 @@ def workflow() -> Figure:
             edgecolor="none",
         )
         axes.add_patch(box)
-        axes.text(left + 1.2, 2.2, title, ha="center", va="center", weight="bold")
-        axes.text(left + 1.2, 1.4, text, ha="center", va="center", fontsize=8)
-        if place:
-            _draw_arrow(axes, (left - 0.45, 1.7), (left - 0.02, 1.7))
+        axes.text(left_edge + 1.2, 2.2, title, ha="center", va="center", weight="bold")
+        axes.text(left_edge + 1.2, 1.4, text, ha="center", va="center", fontsize=8)
+        if step_number:
+            _draw_arrow(axes, (left_edge - 0.45, 1.7), (left_edge - 0.02, 1.7))
     _draw_arrow(axes, (13.3, 0.75), (4.3, 0.75), bend=-0.08)
     axes.text(8.8, 0.05, "flights that were not switched yet", ha="center", fontsize=8)
     return figure

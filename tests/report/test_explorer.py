@@ -1,4 +1,4 @@
-"""The interactive part of a page in a real browser: what it shows of a td is what ``suggest --td`` prints."""
+"""The interactive part of a page in a real browser shows for each td what ``suggest --td`` prints."""
 
 import base64
 import json
@@ -55,21 +55,21 @@ return [...document.body.querySelectorAll("*")]
 """
 
 
-def in_browser(test: Test) -> Test:
-    """Mark a test that takes a browser, and so its time."""
+def mark_for_browser(test: Test) -> Test:
+    """Mark a test that needs a browser and is slow."""
     for mark in (pytest.mark.slow, _NEEDED):
         mark(test)
     return test
 
 
 class Browser:
-    """A browser, and what a reader of a page does in it."""
+    """Browser with the actions of a reader of a page."""
 
     def __init__(self, driver: "webdriver.Chrome") -> None:
         self.driver = driver
 
     def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
-        """Show a page at a width [px], with what the reader prefers: ``prefers_color_scheme="dark"``."""
+        """Open a page at a width [px], with media preferences of the reader such as ``prefers_color_scheme="dark"``."""
         size = {
             "width": width,
             "height": 900,
@@ -85,7 +85,7 @@ class Browser:
         self.driver.get(page.as_uri())
 
     def ask(self, command: str, **arguments: Any) -> Any:
-        """Ask the browser itself, by its developer tools."""
+        """Send a command of the developer tools."""
         return self.driver.execute_cdp_cmd(command, arguments)
 
     def find(self, selector: str) -> "WebElement":
@@ -93,17 +93,17 @@ class Browser:
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
     def shown(self, selector: str) -> bool:
-        """Whether the first such element takes up room."""
+        """Return True if the first such element has a visible size."""
         return self.find(selector).is_displayed()
 
     def value(self, name: str) -> str:
-        """What the interactive part says under a name."""
+        """Return the text of the interactive part under a name."""
         return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
 
     def spoken(
         self, roles: set[str], value: float | None = None
     ) -> list[dict[str, Any]]:
-        """Elements with these roles, and this value, as a screen reader finds them, which is told a little later."""
+        """Return the elements with these roles and this value that a screen reader finds, after a short delay."""
 
         from selenium.webdriver.support.wait import WebDriverWait  # slow
 
@@ -124,21 +124,21 @@ class Browser:
         return WebDriverWait(self.driver, timeout=20).until(found)
 
     def cut(self) -> list[str]:
-        """What is cut at the right edge, and whether the page is wider than the screen."""
-        found: list[str] = self.driver.execute_script(_CUT)
+        """Return the texts cut at the right edge, and a note if the page is wider than the screen."""
+        cut_texts: list[str] = self.driver.execute_script(_CUT)
         wide = self.driver.execute_script(
             "return document.documentElement.scrollWidth > document.documentElement.clientWidth"
         )
-        return [*found, *["the page itself"] * bool(wide)]
+        return [*cut_texts, *["the page itself"] * bool(wide)]
 
     def pdf(self) -> bytes:
-        """Print the page."""
+        """Print the page to PDF."""
         return base64.b64decode(
             self.ask("Page.printToPDF", preferCSSPageSize=True)["data"]
         )
 
     def complaints(self) -> list[dict[str, Any]]:
-        """What stands in the console since the last call."""
+        """Return the console messages since the last call."""
         return list(self.driver.get_log("browser"))  # type: ignore[no-untyped-call]
 
 
@@ -157,7 +157,7 @@ return { ...Object.fromEntries(values.reverse()), typed: document.getElementById
 WIDTHS = (390, 768, 1280)
 
 
-def written(folder: Path, *args: str) -> Path:
+def write_page(folder: Path, *args: str) -> Path:
     """Write the page of a command."""
     page = folder / "page.html"
     result = run(*args, "-q", "--report", str(page))
@@ -168,7 +168,7 @@ def written(folder: Path, *args: str) -> Path:
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     window = ("--td-window", "0.05", "0.09")
-    return written(
+    return write_page(
         tmp_path_factory.mktemp("paper"),
         "explore",
         "--td",
@@ -184,14 +184,14 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
     window = ("--td-window", "0.33", "0.37", "--after", "0.0910048")
     energy = ("--no-verify", "--energy", "boxIE_J", ROLLOVER)
-    return written(
+    return write_page(
         tmp_path_factory.mktemp("box"), "explore", *window, "--steps", "4", *energy
     )
 
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser that keeps what it writes in a folder of its own."""
+    """Start a browser that writes into its own folder."""
     options = webdriver.ChromeOptions()
     options.binary_location = str(CHROMIUM)
     for option in (
@@ -209,79 +209,89 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture
 def browser(started: Browser) -> Iterator[Browser]:
-    """A browser, in whose console nothing may stand afterwards."""
+    """Return the browser; its console must be empty after the test."""
     yield started
     assert started.complaints() == []
 
 
-def content(page: Path) -> dict[str, Any]:
-    """What the script reads."""
+def read_content(page: Path) -> dict[str, Any]:
+    """Return the data that the script of a page reads."""
     text = re.findall(
         r'<script type="application/json" id="explorer-data">(.*?)</script>',
         page.read_text("utf-8"),
     )[0]
-    found: dict[str, Any] = json.loads(text)
-    return found
+    document: dict[str, Any] = json.loads(text)
+    return document
 
 
-def numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
-    """Numbers of each td of a flight."""
-    found = content(page)["flights"][flight]
+def list_numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
+    """Return the numbers of each td of a flight."""
+    rows_found = read_content(page)["flights"][flight]
     return [
-        dict(zip(found["numbers"], values, strict=True)) for values, _ in found["rows"]
+        dict(zip(rows_found["numbers"], values, strict=True))
+        for values, _ in rows_found["rows"]
     ]
 
 
 @cache
-def suggested(command: str) -> dict[str, Any]:
-    """What the command prints that the page names."""
+def run_suggested(command: str) -> dict[str, Any]:
+    """Run the command that the page names and return its answer."""
     program, *args = shlex.split(command)
     assert program == "d2rpick"
-    found: dict[str, Any] = json.loads(run(*args, "-q", "-f", "json").stdout)
-    return found
+    document: dict[str, Any] = json.loads(run(*args, "-q", "-f", "json").stdout)
+    return document
 
 
 def check(browser: Browser) -> float:
-    """Hold what is shown against the command that is shown beside it; give the td in sight."""
-    said = browser.driver.execute_script(SAID)
-    found = suggested(said["command"])
-    best = next((one for one in found["candidates"] if one["recommended"]), None)
+    """Compare the page with the command it names; return the td shown."""
+    said_by_page = browser.driver.execute_script(SAID)
+    suggestion = run_suggested(said_by_page["command"])
+    best = next(
+        (
+            candidate
+            for candidate in suggestion["candidates"]
+            if candidate["recommended"]
+        ),
+        None,
+    )
     expected = {
-        "td": short(found["td"]),
+        "td": short(suggestion["td"]),
         "tr": short(best["tr"]) if best else "none",
-        "exact_td": repr(found["td"]),
+        "exact_td": repr(suggestion["td"]),
     }
     if best:
         expected["residual"] = measure(best["residual"])
-        expected["kinetic"] = measure(found["kinetic_share"])
+        expected["kinetic"] = measure(suggestion["kinetic_share"])
         expected["tolerance"] = f"{best['timing_tolerance']:.1e}"
-    expected["level"] = short(found["energy_td"])
-    assert {name: said[name] for name in expected} == expected
-    assert said["typed"] == expected["td"]
-    assert said["spoken"].startswith(f"td {expected['td']}, tr {expected['tr']}")
-    td: float = found["td"]
+    expected["level"] = short(suggestion["energy_td"])
+    assert {name: said_by_page[name] for name in expected} == expected
+    assert said_by_page["typed"] == expected["td"]
+    assert said_by_page["spoken"].startswith(
+        f"td {expected['td']}, tr {expected['tr']}"
+    )
+    td: float = suggestion["td"]
     return td
 
 
-@in_browser
+@mark_for_browser
 def test_td_typed_at_some_places_shows_the_digits_of_suggest(
     paper: Path, browser: Browser
 ) -> None:
     browser.open(paper)
-    known = np.array([row["td"] for row in numbers(paper)])
+    td_known = np.array([row["td"] for row in list_numbers(paper)])
     field = browser.find("#explorer-td")
     for td in np.random.default_rng(1).uniform(0.05, 0.09, 6).round(5).tolist():
         field.clear()
         field.send_keys(
             repr(td).replace(".", ",") if td > 0.07 else repr(td), Keys.ENTER
         )
-        assert check(browser) == known[np.abs(known - td).argmin()]
+        assert check(browser) == td_known[np.abs(td_known - td).argmin()]
         assert f"{td}: this td was not computed" in browser.find(".said").text.replace(
             ",", ".", 1
         )
 
 
-@in_browser
+@mark_for_browser
 def test_td_dragged_to_some_places_shows_the_digits_of_suggest(
     paper: Path, browser: Browser
 ) -> None:
@@ -293,20 +303,20 @@ def test_td_dragged_to_some_places_shows_the_digits_of_suggest(
     mouse.click_and_hold(browser.find(".handle")).perform()
     over = browser.find(".energy .u-over")
     first, last = browser.driver.execute_script(ENDS)
-    seen = set()
-    for place in np.linspace(first, last, 8).astype(int).tolist():
+    shown_sentences = set()
+    for td_index in np.linspace(first, last, 8).astype(int).tolist():
         mouse.move_to_element_with_offset(
-            over, place - over.size["width"] // 2, -9
+            over, td_index - over.size["width"] // 2, -9
         ).perform()
-        seen.add(check(browser))
+        shown_sentences.add(check(browser))
     mouse.release().perform()
-    assert len(seen) > 6
+    assert len(shown_sentences) > 6
     last = browser.value("td")
     mouse.move_to_element(over).perform()
     assert browser.value("td") == last
 
 
-@in_browser
+@mark_for_browser
 def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     browser.open(paper, width=390)
     browser.driver.execute_script(
@@ -315,34 +325,34 @@ def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     x, y = browser.driver.execute_script(
         "const box = document.querySelector('.handle').getBoundingClientRect(); return [box.x + 22, box.y + 99]"
     )
-    before = check(browser)
+    check_report = check(browser)
     for kind, points in (
         ("Start", [{"x": x, "y": y}]),
         ("Move", [{"x": x + 25, "y": y + 9}]),
         ("End", []),
     ):
         browser.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
-    assert check(browser) > before
+    assert check(browser) > check_report
 
 
-@in_browser
+@mark_for_browser
 def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     browser.open(paper)
-    rows = numbers(paper)
-    known = [row["td"] for row in rows]
+    rows = list_numbers(paper)
+    td_known = [row["td"] for row in rows]
     handle, field = browser.find(".handle"), browser.find("#explorer-td")
     handle.send_keys(Keys.HOME)
-    assert check(browser) == known[0]
-    for keys, place in (
+    assert check(browser) == td_known[0]
+    for keys, td_index in (
         ((Keys.ARROW_RIGHT,) * 3, 3),
         ((Keys.ARROW_LEFT,), 2),
         ((Keys.PAGE_DOWN,), 0),
         ((Keys.END,), -1),
     ):
         handle.send_keys(*keys)
-        assert check(browser) == known[place]
+        assert check(browser) == td_known[td_index]
     field.send_keys(Keys.ARROW_DOWN)
-    assert check(browser) == known[-2]
+    assert check(browser) == td_known[-2]
     browser.find(".earlier").click()
     assert check(browser) == [row["td"] for row in rows if row["peak"]][-1]
     browser.find(".back").click()
@@ -352,11 +362,11 @@ def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     assert field.get_attribute("aria-invalid") == "true"
     field.clear()
     field.send_keys("7", Keys.ENTER)
-    assert check(browser) == known[-1]
+    assert check(browser) == td_known[-1]
     assert "td was computed from" in browser.find(".said").text
 
 
-@in_browser
+@mark_for_browser
 def test_a_click_on_a_point_of_the_trade_off_selects_it(
     paper: Path, browser: Browser
 ) -> None:
@@ -369,39 +379,45 @@ def test_a_click_on_a_point_of_the_trade_off_selects_it(
         over, over.size["width"] // 2 - 9, over.size["height"] // 2 - 9
     ).click().perform()
     td = check(browser)
-    chosen = next(row for row in numbers(paper) if row["td"] == td)
+    chosen = next(row for row in list_numbers(paper) if row["td"] == td)
     assert chosen["error"] < 0.3
     assert chosen["unbeaten"]
 
 
-def words(found: dict[str, Any]) -> str:
-    """What is said of a td instead of its number."""
-    (best,) = (one for one in found["candidates"] if one["recommended"])
-    return f"td {short(found['td'])}, tr {short(best['tr'])}, residual {measure(best['residual'])}"
+def describe_td(suggestion: dict[str, Any]) -> str:
+    """Return the texts that the page shows for a td instead of numbers."""
+    (best,) = (
+        candidate for candidate in suggestion["candidates"] if candidate["recommended"]
+    )
+    return f"td {short(suggestion['td'])}, tr {short(best['tr'])}, residual {measure(best['residual'])}"
 
 
-@in_browser
+@mark_for_browser
 def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     nodes = browser.spoken({"slider", "textbox", "button", "image", "region"})
     assert all(node["name"]["value"] for node in nodes)
-    known = [row["td"] for row in numbers(paper)]
+    td_known = [row["td"] for row in list_numbers(paper)]
     handle = browser.find(".handle")
-    for keys, td in (("", 0.064), (Keys.END, known[-1]), (Keys.HOME, known[0])):
+    for keys, td in (("", 0.064), (Keys.END, td_known[-1]), (Keys.HOME, td_known[0])):
         handle.send_keys(keys)  # which it takes, so it can be reached
         (slider,) = browser.spoken({"slider"}, td)
-        told = {one["name"]: one["value"].get("value") for one in slider["properties"]}
-        assert (told["valuemin"], told["valuemax"]) == pytest.approx(
-            (known[0], known[-1]), rel=1e-6
-        )
-        assert told["focusable"]
+        property_values = {
+            property_["name"]: property_["value"].get("value")
+            for property_ in slider["properties"]
+        }
+        assert (
+            property_values["valuemin"],
+            property_values["valuemax"],
+        ) == pytest.approx((td_known[0], td_known[-1]), rel=1e-6)
+        assert property_values["focusable"]
         # the words instead of the number: the tree of some versions passes over them, what speaks it does not
-        assert handle.get_attribute("aria-valuetext") == words(
-            suggested(browser.value("command"))
+        assert handle.get_attribute("aria-valuetext") == describe_td(
+            run_suggested(browser.value("command"))
         )
 
 
-@in_browser
+@mark_for_browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_nothing_is_cut_with_and_without_scripts(
     paper: Path, box: Path, browser: Browser, width: int
@@ -414,8 +430,8 @@ def test_nothing_is_cut_with_and_without_scripts(
             ),
             "utf-8",
         )
-        for shown, scripts in ((page, True), (plain, False)):
-            browser.open(shown, width=width)
+        for page_shown, scripts in ((page, True), (plain, False)):
+            browser.open(page_shown, width=width)
             assert browser.cut() == []
             assert browser.shown("#explorer") == scripts
             assert browser.shown("figure.drawn") == (not scripts)
@@ -423,7 +439,7 @@ def test_nothing_is_cut_with_and_without_scripts(
             assert browser.shown(".hint") == (width < 960)
 
 
-@in_browser
+@mark_for_browser
 def test_it_prints_as_the_static_page_also_where_it_is_dark(
     paper: Path, browser: Browser
 ) -> None:
@@ -441,22 +457,30 @@ def test_it_prints_as_the_static_page_also_where_it_is_dark(
     assert browser.shown(".sign")
 
 
-@in_browser
+@mark_for_browser
 def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None:
     browser.open(box)
     for _ in range(3):
         browser.find(".handle").send_keys(Keys.ARROW_LEFT)
-        found = suggested(browser.value("command"))
-        (kept,) = (one for one in found["acceptable_windows"] if one["recommended"])
-        assert format_window(kept["start"], kept["end"]) in browser.value("windows")
-        share = [f"{found[end]:.0%}" for end in ("mean_energy_low", "mean_energy_high")]
+        suggestion = run_suggested(browser.value("command"))
+        (recommended_window,) = (
+            window
+            for window in suggestion["acceptable_windows"]
+            if window["recommended"]
+        )
+        assert format_window(
+            recommended_window["start"], recommended_window["end"]
+        ) in browser.value("windows")
+        share = [
+            f"{suggestion[end]:.0%}" for end in ("mean_energy_low", "mean_energy_high")
+        ]
         assert browser.value("after").startswith(
             f"{share[0]} to {share[1]} of what the reference has"
         )
     assert not browser.driver.find_elements("css selector", ".motion")
 
 
-@in_browser
+@mark_for_browser
 def test_each_flight_of_a_plan_can_be_explored(
     tmp_path: Path, browser: Browser
 ) -> None:
@@ -479,13 +503,13 @@ def test_each_flight_of_a_plan_can_be_explored(
         ).exit_code
         == 0
     )
-    page = written(tmp_path, "plan", "--no-verify", "--part", "box", motion)
+    page = write_page(tmp_path, "plan", "--no-verify", "--part", "box", motion)
     browser.open(page)
-    flights = content(page)["flights"]
+    flights = read_content(page)["flights"]
     assert len(flights) > 1
     Select(browser.find("#explorer-flight")).select_by_index(1)
     assert browser.value("exact_td") == repr(
-        numbers(page, 1)[flights[1]["start"]]["td"]
+        list_numbers(page, 1)[flights[1]["start"]]["td"]
     )
 
 
@@ -501,7 +525,7 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
         header="time,internal_energy",
         comments="",
     )
-    page = written(
+    page = write_page(
         tmp_path,
         "explore",
         "--no-verify",
@@ -514,9 +538,9 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
         "2",
         str(table),
     )
-    (flight,) = content(page)["flights"]
-    least = energy[(time > 0.001) & (time < 0.149)]
-    assert max(flight["energy"][1]) == pytest.approx(least.max(), rel=0.05)
+    (flight,) = read_content(page)["flights"]
+    least_energy = energy[(time > 0.001) & (time < 0.149)]
+    assert max(flight["energy"][1]) == pytest.approx(least_energy.max(), rel=0.05)
     assert max(flight["whole"][1]) == pytest.approx(energy.max(), rel=1e-5)
     row = len(json.dumps(flight["rows"])) / len(flight["rows"])
     assert (
@@ -524,8 +548,8 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
     )  # the most td that a page explores
 
 
-def contrast(one: str, other: str) -> float:
-    """Contrast of two colours by WCAG 2, from 1 to 21."""
+def compute_contrast(first_colour: str, second_colour: str) -> float:
+    """Return the contrast of two colours by WCAG 2, from 1 to 21."""
 
     def luminance(colour: str) -> float:
         parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
@@ -535,7 +559,7 @@ def contrast(one: str, other: str) -> float:
         ]
         return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
 
-    dark, light = sorted((luminance(one), luminance(other)))
+    dark, light = sorted((luminance(first_colour), luminance(second_colour)))
     return (light + 0.05) / (dark + 0.05)
 
 
@@ -548,7 +572,10 @@ def test_letters_and_marks_stand_out_in_light_and_dark() -> None:
     for colours in themes:
         for ground in ("ground", "panel"):
             for name in ("ink", "soft", "good", "bad"):
-                assert contrast(colours[name], colours[ground]) >= 4.5, (name, ground)
+                assert compute_contrast(colours[name], colours[ground]) >= 4.5, (
+                    name,
+                    ground,
+                )
         for name in ("switched", "good", "ink", "focus"):
-            assert contrast(colours[name], colours["ground"]) >= 3
-            assert contrast(colours[name], colours["flight"]) >= 3
+            assert compute_contrast(colours[name], colours["ground"]) >= 3
+            assert compute_contrast(colours[name], colours["flight"]) >= 3

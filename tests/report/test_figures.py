@@ -1,4 +1,4 @@
-"""Figures say one thing each: the flight, what is acceptable in it, runs told apart."""
+"""Each figure has one message: the flight, the acceptable times in it, or the differences of runs."""
 
 from dataclasses import replace
 
@@ -16,10 +16,10 @@ from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
 from d2rpick.report.study import short_names
 from tests.command import BOX, ENERGY, ROOT
-from tests.energies import sure
+from tests.energies import require
 
 
-def texts(axes: Axes) -> list[str]:
+def list_texts(axes: Axes) -> list[str]:
     return [text.get_text() for text in axes.texts]
 
 
@@ -31,18 +31,20 @@ def test_load_and_landing_are_both_cut_with_a_mark() -> None:
         .plot()
         .axes
     )
-    assert [text for text in texts(axes) if "\u2191" in text] == [
+    assert [text for text in list_texts(axes) if "\u2191" in text] == [
         "load, up to 70.09 \u2191",
         "landing, up to 52.09 \u2191",
     ]
 
 
-def marks(axes: Axes) -> list[int]:
-    return [len(np.asarray(one.get_offsets())) for one in axes.collections]
+def list_marks(axes: Axes) -> list[int]:
+    return [
+        len(np.asarray(collection.get_offsets())) for collection in axes.collections
+    ]
 
 
-def extents(patch: Patch) -> Bbox:
-    """Give its width and height in its own coordinates: older versions of matplotlib draw a span as a polygon."""
+def find_extents(patch: Patch) -> Bbox:
+    """Return width and height in the coordinates of the patch; older matplotlib draws a span as a polygon."""
     path = patch.get_path().transformed(patch.get_patch_transform())
     return path.get_extents()
 
@@ -53,36 +55,40 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     (axes,) = answer.plot().axes
     assert axes.get_ylim()[1] < 4
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
-    assert "landing, up to 1248 \u2191" in texts(axes)
-    assert marks(axes) == [1]  # the recommended one alone
-    drawn_patches = map(extents, axes.patches)
-    bands = [one for one in drawn_patches if one.height < 0.1]
-    drawn = sum(one.width for one in bands)
+    assert "landing, up to 1248 \u2191" in list_texts(axes)
+    assert list_marks(axes) == [1]  # the recommended one alone
+    drawn_patches = map(find_extents, axes.patches)
+    bands = [drawn_patch for drawn_patch in drawn_patches if drawn_patch.height < 0.1]
+    drawn = sum(drawn_patch.width for drawn_patch in bands)
     assert drawn == pytest.approx(
-        sum(one.end - one.start for one in sure(answer.windows)), rel=0.03
+        sum(
+            drawn_patch.end - drawn_patch.start
+            for drawn_patch in require(answer.windows)
+        ),
+        rel=0.03,
     )
-    assert len(bands) < len(sure(answer.windows))  # gaps that nobody sees are closed
+    assert len(bands) < len(require(answer.windows))  # gaps that nobody sees are closed
 
 
 @pytest.mark.parametrize("replay", [True, False])
 def test_the_band_is_known_on_every_basis(replay: bool) -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534, replay=replay)
     windows = answer.acceptable_windows
-    assert any(start <= sure(answer.recommended).tr <= end for start, end in windows)
+    assert any(start <= require(answer.recommended).tr <= end for start, end in windows)
     assert all(start <= end < answer.situation.td for start, end in windows)
 
 
 def test_few_candidates_are_marks_acceptable_or_not() -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
     energy, motion = answer.plot().axes
-    acceptable = sum(one.acceptable for one in answer.candidates)
-    assert marks(energy) == [acceptable, len(answer.candidates) - acceptable]
+    acceptable = sum(candidate.acceptable for candidate in answer.candidates)
+    assert list_marks(energy) == [acceptable, len(answer.candidates) - acceptable]
     assert len(motion.lines) == 4  # both motions, tr and td
 
 
 def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.064)
-    better = sure(answer.clearly_better)
+    better = require(answer.clearly_better)
     figure = draw_suggestion(answer, page=True)
     energy, motion = figure.axes
     lines = [
@@ -125,7 +131,7 @@ def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(
 
 
 def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
-    """Round-off of 1e-21 J before a landing of 40 J; where nothing ever comes, beside the energy it is measured by."""
+    """Round-off of 1e-21 J is flat beside a landing of 40 J, or beside the scale of the energy if nothing lands."""
     time = np.linspace(0, 1, 501)
     energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
     answer = suggest(
@@ -136,15 +142,15 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
         axes = draw_suggestion(answer, page=page).axes[0]
         assert axes.get_yscale() == "linear"
         assert axes.get_ylim() == pytest.approx((-3.2, 43.2))
-    best = sure(answer.chosen)
+    best = require(answer.chosen)
     assert (best.level_error, best.level_ratio) == (0.0, None)
     resting = replace(
-        row("run", 0.01),
+        make_row("run", 0.01),
         curve=np.stack([time, energy]),
         energy_td=1e-21,
         warnings=("at-rest",),
     )
-    assert draw_study(study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
+    assert draw_study(make_study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
 
 
 @pytest.mark.slow
@@ -152,50 +158,56 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
 def test_the_first_and_the_last_td_of_a_trade_off_stand_clear_of_the_edge(
     page: bool,
 ) -> None:
-    found = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.0687534), replay=False)
-    offers = found.offers
-    for axes in draw_trade_off(found, page=page).axes:
+    exploration = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.0687534), replay=False)
+    offers = exploration.offers
+    for axes in draw_trade_off(exploration, page=page).axes:
         low, high = axes.get_xlim()
         room = 0.01 * (high - low)
         assert low + room < offers[0].td <= offers[-1].td < high - room
 
 
-def row(name: str, tr: float, level: float = 1.0) -> StudyRow:
+def make_row(name: str, tr: float, level: float = 1.0) -> StudyRow:
     time = np.linspace(0, 1, 50)
     energy = level * (1 + 0.1 * np.sin(20 * time)) + 500 * (time > 0.95)
     return StudyRow(name, "ok", tr=tr, energy_td=level, curve=np.stack([time, energy]))
 
 
-def study(*rows: StudyRow) -> Study:
+def make_study(*rows: StudyRow) -> Study:
     return Study(0.8, None, rows, None, None, Common(None, None, "made"), ())
 
 
 def test_up_to_ten_runs_have_a_name_and_a_look_of_their_own() -> None:
     (axes,) = draw_study(
-        study(*(row(f"runs/{i}/glstat", 0.2 + i / 100, 1 + i) for i in range(10)))
+        make_study(
+            *(make_row(f"runs/{i}/glstat", 0.2 + i / 100, 1 + i) for i in range(10))
+        )
     ).axes
     lines = axes.lines[:10]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 10
-    assert {*texts(axes)} >= {str(i) for i in range(10)}
+    assert {*list_texts(axes)} >= {str(i) for i in range(10)}
     assert axes.get_ylim()[1] < 20  # the landing is cut
     heights = sorted(text.xyann[1] for text in axes.texts if text.get_text().isdigit())  # type: ignore[attr-defined]
     assert min(np.diff(heights)) > 0.05
 
 
 def test_of_many_runs_those_that_stand_out_are_named() -> None:
-    rows = [row(f"run{i}", 0.2 + i / 1000) for i in range(30)]
-    (axes,) = draw_study(study(*rows, row("odd", 0.5))).axes
-    assert "odd" in texts(axes)
-    assert "run3" not in texts(axes)
+    rows = [make_row(f"run{i}", 0.2 + i / 1000) for i in range(30)]
+    (axes,) = draw_study(make_study(*rows, make_row("odd", 0.5))).axes
+    assert "odd" in list_texts(axes)
+    assert "run3" not in list_texts(axes)
     assert axes.collections[0].get_label() == "internal energy of 31 runs"
 
 
 @pytest.mark.parametrize("page", [False, True])
 def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
-    rows = [row("zero", 0.2, 0.0), row("one", 0.2), row("large", 0.3, 1e6)]
-    figure = draw_study(study(*rows), page=page)
+    rows = [
+        make_row("zero", 0.2, 0.0),
+        make_row("one", 0.2),
+        make_row("large", 0.3, 1e6),
+    ]
+    figure = draw_study(make_study(*rows), page=page)
     figure.canvas.draw()
-    assert draw_study(study()).axes
+    assert draw_study(make_study()).axes
 
 
 def test_short_names_tell_runs_apart() -> None:
@@ -211,10 +223,14 @@ def test_short_names_tell_runs_apart() -> None:
 
 def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:
     reference = d2.read(ENERGY)
-    found = d2.verify(reference, tr=0.0135867, td=0.0687534, switched=reference)
-    (energy,) = found.plot().axes
-    (line,) = (one for one in energy.lines if one.get_label() == SWITCHED_RUN)
-    assert np.array_equal(line.get_ydata(), sure(found.computed).energy)
+    verdict = d2.verify(reference, tr=0.0135867, td=0.0687534, switched=reference)
+    (energy,) = verdict.plot().axes
+    (line,) = (
+        energy_line
+        for energy_line in energy.lines
+        if energy_line.get_label() == SWITCHED_RUN
+    )
+    assert np.array_equal(line.get_ydata(), require(verdict.computed).energy)
 
 
 SWITCHED_RUN = "switched run, as computed"
@@ -224,6 +240,6 @@ def test_a_plan_names_no_negative_energies_and_the_times_of_its_windows() -> Non
     plan = d2.plan(d2.read(ENERGY))
     (axes,) = plan.plot().axes
     assert min(axes.get_yticks()) >= 0
-    (label,) = (one.get_text() for one in axes.texts if one.get_text()[:1] == "1")
+    (label,) = (text.get_text() for text in axes.texts if text.get_text()[:1] == "1")
     ((tr, td),) = plan.windows
     assert label == f"1: tr = {tr:.4g}, td = {td:.4g}"

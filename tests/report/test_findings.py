@@ -1,4 +1,4 @@
-"""Reports of findings, each against its published schema."""
+"""Reports of findings, each validated by its published schema."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
 from tests.deck.test_radioss_run import write_run
 from tests.decks import write
-from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
+from tests.json_schemas import check_by_schema, check_junit, check_sarif
 
 BAD = (
     HEAD
@@ -34,7 +34,7 @@ def results(tmp_path: Path) -> list[Checked]:
     ]
 
 
-def written(
+def write_findings(
     form: str, results: list[Checked], root: Path, fail_on: Severity = Severity.ERROR
 ) -> str:
     return formats.write(
@@ -46,7 +46,7 @@ def written(
 
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
-    lines = written("table", results, tmp_path).split("\n")
+    lines = write_findings("table", results, tmp_path).split("\n")
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
@@ -61,12 +61,12 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
     deck = write_run(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
-    lines = written("table", [check_deck(deck)], tmp_path).split("\n")
+    lines = write_findings("table", [check_deck(deck)], tmp_path).split("\n")
     assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
-    content = json.loads(written("json", results, tmp_path))
+    content = json.loads(write_findings("json", results, tmp_path))
     check_by_schema(content)
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
@@ -75,7 +75,7 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
-    lines = written("github", results, tmp_path).split("\n")
+    lines = write_findings("github", results, tmp_path).split("\n")
     assert lines[1].startswith(
         "::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5"
     )
@@ -83,8 +83,8 @@ def test_github(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
-    text = written("junit", results, tmp_path)
-    junit_is_valid(text)
+    text = write_findings("junit", results, tmp_path)
+    check_junit(text)
     suites = ET.fromstring(text)
     assert [
         (suite.get("name"), suite.get("tests"), suite.get("failures"))
@@ -94,13 +94,15 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
         ("good/main.k", "1", "0"),
     ]
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
-    strict = ET.fromstring(written("junit", results, tmp_path, fail_on=Severity.INFO))
+    strict = ET.fromstring(
+        write_findings("junit", results, tmp_path, fail_on=Severity.INFO)
+    )
     assert len(list(strict.iter("failure"))) == 2
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:
-    text = written("sarif", results, tmp_path)
-    sarif_is_valid(text)
+    text = write_findings("sarif", results, tmp_path)
+    check_sarif(text)
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
     for result in run["results"]:
@@ -108,8 +110,8 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
             run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"]
             == result["ruleId"]
         )
-    place = run["results"][1]["locations"][0]["physicalLocation"]
-    assert place == {
+    location = run["results"][1]["locations"][0]["physicalLocation"]
+    assert location == {
         "artifactLocation": {"uri": "main.k"},
         "region": {"startLine": 23, "startColumn": 28},
     }
@@ -117,8 +119,10 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
     elsewhere = tmp_path / "else where"
-    assert f"::error file={tmp_path}/main.k" in written("github", results, elsewhere)
-    assert f"file://{tmp_path}/main.k" in written("sarif", results, elsewhere)
+    assert f"::error file={tmp_path}/main.k" in write_findings(
+        "github", results, elsewhere
+    )
+    assert f"file://{tmp_path}/main.k" in write_findings("sarif", results, elsewhere)
 
 
 @pytest.mark.slow
@@ -128,25 +132,25 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
     result = [Checked(name, (), (finding,))]
     root = Path("/some folder")
-    ET.fromstring(written("junit", result, root).encode("utf-8", "replace"))
-    sarif_is_valid(written("sarif", result, root))
-    assert written("github", result, root).count("\n") == 0
-    json.loads(written("json", result, root))
+    ET.fromstring(write_findings("junit", result, root).encode("utf-8", "replace"))
+    check_sarif(write_findings("sarif", result, root))
+    assert write_findings("github", result, root).count("\n") == 0
+    json.loads(write_findings("json", result, root))
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
-    sarif_is_valid(written("sarif", [], tmp_path))
-    junit_is_valid(written("junit", [], tmp_path))
-    assert written("github", [], tmp_path) == ""
+    check_sarif(write_findings("sarif", [], tmp_path))
+    check_junit(write_findings("junit", [], tmp_path))
+    assert write_findings("github", [], tmp_path) == ""
 
 
 def test_only_a_deck_of_another_name_is_named() -> None:
-    named = [
+    deck_names = [
         name
         for rule in RULES.values()
         for name in re.findall(
             r"^\w+, as (\S+):$", report.as_text(rule, 100), re.MULTILINE
         )
     ]
-    assert named
-    assert "main.k" not in named
+    assert deck_names
+    assert "main.k" not in deck_names

@@ -1,4 +1,4 @@
-"""Every form of every result can be written, and the commands offer just these."""
+"""Every format of every result can be written, and the commands offer exactly these formats."""
 
 import click
 import pytest

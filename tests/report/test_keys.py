@@ -1,18 +1,18 @@
-"""The public keys: the schemas that ship say what the fields of the results say."""
+"""The public keys: the schemas of the package agree with the fields of the results."""
 
 import pytest
 
 from d2rpick.report import keys
 from d2rpick.vibration.measures import Measured
-from tests.generated_schemas import documents, schema_of, shipped
+from tests.generated_schemas import list_documents, make_schema, read_shipped
 
 
 def test_every_measure_of_the_vibration_is_shown_as_one() -> None:
     assert {*Measured._fields} <= {*keys.MEASURES} <= {*keys.CANDIDATE.keys}
 
 
-@pytest.mark.parametrize("name", documents())
+@pytest.mark.parametrize("name", list_documents())
 def test_the_schema_that_ships_is_made_from_the_fields(name: str) -> None:
-    assert schema_of(documents()[name]) == shipped(name), (
+    assert make_schema(list_documents()[name]) == read_shipped(name), (
         "run python -m tests.generated_schemas"
     )

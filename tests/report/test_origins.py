@@ -1,4 +1,4 @@
-"""JSON documents and pages name every file that an answer rests on, with its SHA-256."""
+"""JSON documents and pages name every file behind an answer, with its SHA-256."""
 
 import hashlib
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from tests.command import MATSUM, answer, run
-from tests.json_schemas import checked
+from tests.command import MATSUM, run, run_json
+from tests.json_schemas import run_json_checked
 from tests.sample_deck import DECK
 
 WEIGHTS = 'source = "our cluster"\n[per_element]\nBT = 1\nQBAT = 2\n'
@@ -20,13 +20,13 @@ ASKED = {
 }
 
 
-def digest(file: Path | str) -> str:
+def compute_digest(file: Path | str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @pytest.fixture(autouse=True)
 def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A deck of two files, of which one is included twice, and weights."""
+    """Write a deck of two files, one of which is included twice, and weights."""
     monkeypatch.chdir(tmp_path)
     main = DECK.read_text("utf-8").replace(
         "*END", "*INCLUDE\nnote.k\n*INCLUDE\nnote.k\n*END"
@@ -40,47 +40,47 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("command", ASKED)
 def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
     args = (command, *ASKED[command], "--deck", "main.k", MATSUM)
-    named = {
+    deck_origin = {
         "source": ["main.k", "note.k"],
-        "sha256": [digest("main.k"), digest("note.k")],
+        "sha256": [compute_digest("main.k"), compute_digest("note.k")],
     }
     by_file = {
         "source": "our cluster",
         "file": "site.toml",
-        "sha256": digest("site.toml"),
+        "sha256": compute_digest("site.toml"),
     }
-    found = checked(*args, "--weights", "site.toml")
-    assert {key: found["deck"][key] for key in named} == named
-    assert {key: found["weights"][key] for key in by_file} == by_file
+    document = run_json_checked(*args, "--weights", "site.toml")
+    assert {key: document["deck"][key] for key in deck_origin} == deck_origin
+    assert {key: document["weights"][key] for key in by_file} == by_file
     run(*args, "--weights", "site.toml", "--report", "page.html")
     page = Path("page.html").read_text("utf-8")
     for file in (MATSUM, "main.k", "note.k", "site.toml"):
-        assert page.count(f"{file}: {digest(file)}") == 1
+        assert page.count(f"{file}: {compute_digest(file)}") == 1
 
 
 @pytest.mark.parametrize("command", ASKED)
 def test_without_a_deck_none_is_named(command: str) -> None:
-    found = answer(command, *ASKED[command], MATSUM)
-    assert (found["deck"], found["weights"]) == (None, None)
+    document = run_json(command, *ASKED[command], MATSUM)
+    assert (document["deck"], document["weights"]) == (None, None)
 
 
 def test_what_took_no_part_is_not_named() -> None:
-    weights = answer("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)[
+    weights = run_json("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)[
         "weights"
     ]
     assert (weights["file"], weights["sha256"]) == (None, None)  # those that ship
-    asked = ("suggest", "--td", "0.37", "--deck", "main.k", MATSUM)
-    assert answer(*asked)["deck"] is None  # without parts a deck tells nothing
-    given = answer(
-        *asked, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5"
+    arguments = ("suggest", "--td", "0.37", "--deck", "main.k", MATSUM)
+    assert run_json(*arguments)["deck"] is None  # without parts a deck tells nothing
+    document = run_json(
+        *arguments, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5"
     )
-    assert given["deck"]["source"] == ["main.k", "note.k"]
-    assert given["weights"] is None
+    assert document["deck"]["source"] == ["main.k", "note.k"]
+    assert document["weights"] is None
 
 
 @pytest.mark.slow
 def test_the_library_names_them_too() -> None:
-    found = d2.suggest(
+    suggestion = d2.suggest(
         d2.read(MATSUM),
         td=0.37,
         parts="all",
@@ -88,8 +88,8 @@ def test_the_library_names_them_too() -> None:
         deck="main.k",
         weights="site.toml",
     )
-    assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
-    assert digest("note.k") in found.report("page.html").read_text("utf-8")
+    assert suggestion.to_dict()["weights"]["sha256"] == compute_digest("site.toml")
+    assert compute_digest("note.k") in suggestion.report("page.html").read_text("utf-8")
 
 
 @pytest.mark.slow
@@ -101,8 +101,8 @@ def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
     Path("main.k").write_text(
         DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8"
     )
-    asked = ("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)
-    assert answer(*asked, "--report", "page.html")["deck"]["source"] == [
+    arguments = ("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)
+    assert run_json(*arguments, "--report", "page.html")["deck"]["source"] == [
         "main.k",
         *names,
     ]

@@ -1,4 +1,4 @@
-"""The HTML report: whole, self-contained, safe, and readable in a browser at any width and on paper."""
+"""The HTML report: complete, self-contained, safe, and readable at any width and on paper."""
 
 import base64
 import hashlib
@@ -16,8 +16,8 @@ import pytest
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.cli import one_run
-from tests.command import ENERGY, GLSTAT, ROOT, put, replayed, run
-from tests.computed import stored, unpacked
+from tests.command import ENERGY, GLSTAT, ROOT, make_replay_file, put, run
+from tests.computed import locate_stored, read_unpacked
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
@@ -25,7 +25,7 @@ VOID = {"meta", "br", "hr", "link", "input"}
 
 
 class Page(HTMLParser):
-    """What a page consists of; fails where an element is not closed."""
+    """Parser of the contents of a page; fails if an element is not closed."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -56,23 +56,26 @@ class Page(HTMLParser):
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.names.add(tag)
-        given = {key: value or "" for key, value in attrs}
+        attributes = {key: value or "" for key, value in attrs}
         self.headings += [int(tag[1])] if tag in {"h1", "h2", "h3"} else []
         self.unnamed += (
             [tag]
-            if given.get("role") in {"img", "region"} and not given.get("aria-label")
+            if attributes.get("role") in {"img", "region"}
+            and not attributes.get("aria-label")
             else []
         )
-        self.unnamed += ["th"] if tag == "th" and given.get("scope") != "col" else []
-        self.ids += [given["id"]] if "id" in given else []
+        self.unnamed += (
+            ["th"] if tag == "th" and attributes.get("scope") != "col" else []
+        )
+        self.ids += [attributes["id"]] if "id" in attributes else []
         self.targets += [
-            given[key]
+            attributes[key]
             for key in ("href", "src", "xlink:href", "action", "data")
-            if key in given
+            if key in attributes
         ]
         self.targets += [
             f"#{name}"
-            for value in given.values()
+            for value in attributes.values()
             for name in re.findall(r"url\(#([^)]*)\)", value)
         ]
 
@@ -86,7 +89,7 @@ class Page(HTMLParser):
             self.text += data
 
     def last_command(self) -> list[str]:
-        """Words of the last command on the page, behind the name of the program."""
+        """Return the words of the last command on the page, without the name of the program."""
         return shlex.split(
             html.unescape(
                 re.findall(r"<pre[^>]*>d2rpick ([^<]*)</pre>", self.source)[-1]
@@ -94,7 +97,7 @@ class Page(HTMLParser):
         )
 
 
-def page_of(
+def read_page_of(
     folder: Path,
     *args: str,
     command: str = "suggest",
@@ -119,7 +122,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def paper(folder: Path) -> Page:
-    return page_of(folder, *PAPER)
+    return read_page_of(folder, *PAPER)
 
 
 def test_it_tells_the_choice_what_was_read_and_how_to_repeat_it(paper: Page) -> None:
@@ -151,12 +154,12 @@ def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(
 
 @pytest.mark.slow
 def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> None:
-    asked = ("--tr", "0.1", "--td", "0.2838", stored("drop2T01.gz"))
-    page = page_of(tmp_path, *asked, command="verify")
+    arguments = ("--tr", "0.1", "--td", "0.2838", locate_stored("drop2T01.gz"))
+    page = read_page_of(tmp_path, *arguments, command="verify")
     assert "<dt>level error</dt><dd>0</dd>" in page.source
     assert "<dt>energy ratio</dt>" not in page.source
-    found = json.loads(page.data[0])["flights"][0]
-    assert (found["log"], found["heights"][1] > 40) == (False, True)
+    document = json.loads(page.data[0])["flights"][0]
+    assert (document["log"], document["heights"][1] > 40) == (False, True)
 
 
 def test_it_needs_nothing_but_itself(paper: Page) -> None:
@@ -204,7 +207,7 @@ def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(
         tmp_path / "growing.csv",
         "time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)),
     )
-    page = page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
+    page = read_page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
     assert not page.scripts
     assert not page.data
     assert "script-src 'none'" in html.unescape(page.source)
@@ -217,7 +220,10 @@ def test_ids_are_unique_and_all_that_is_referred_to_is_there(paper: Page) -> Non
 
 def test_who_does_not_see_it_can_follow_it(paper: Page) -> None:
     assert paper.headings[0] == 1
-    assert all(after <= before + 1 for before, after in pairwise(paper.headings))
+    assert all(
+        inner_level <= outer_level + 1
+        for outer_level, inner_level in pairwise(paper.headings)
+    )
     assert paper.source.count('role="img"') == 4  # a figure and three charts
     assert not paper.unnamed
 
@@ -228,10 +234,10 @@ def test_it_is_signed_where_the_times_stand(paper: Page) -> None:
 
 def test_it_is_the_same_every_time(paper: Page, folder: Path) -> None:
     (folder / "report.html").unlink()
-    assert page_of(folder, *PAPER).source == paper.source
+    assert read_page_of(folder, *PAPER).source == paper.source
 
 
-CHAIN = stored("chain_referenceT01.gz")
+CHAIN = locate_stored("chain_referenceT01.gz")
 BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
 # Of a command with its arguments: the exit code, what its page says, and what it must not say.
 TOLD = {
@@ -267,16 +273,18 @@ TOLD = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("asked", "code", "said", "unsaid"), TOLD.values(), ids=TOLD)
+@pytest.mark.parametrize(
+    ("arguments", "code", "message", "unsaid"), TOLD.values(), ids=TOLD
+)
 def test_it_tells_what_is_known_and_nothing_else(
-    asked: tuple[str, ...],
+    arguments: tuple[str, ...],
     code: int,
-    said: tuple[str, ...],
+    message: tuple[str, ...],
     unsaid: tuple[str, ...],
     tmp_path: Path,
 ) -> None:
-    page = page_of(tmp_path, *asked[1:], command=asked[0], code=code)
-    assert [text for text in said if text not in page.text] == []
+    page = read_page_of(tmp_path, *arguments[1:], command=arguments[0], code=code)
+    assert [text for text in message if text not in page.text] == []
     assert [text for text in unsaid if text in page.text or text in page.source] == []
     assert page.source.count("<figure ") == 1
     assert len(page.ids) == len({*page.ids})
@@ -294,7 +302,7 @@ def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(
     evil.write_text(
         f" {NASTY}\n{Path(GLSTAT).read_text('ascii').partition(chr(10))[2]}", "ascii"
     )
-    page = page_of(tmp_path, "--td", "0.064", str(evil))
+    page = read_page_of(tmp_path, "--td", "0.064", str(evil))
     assert NASTY in page.text
     assert "evil\ufffd.glstat" in page.text
     assert (len(page.scripts), len(page.data)) == (2, 1)
@@ -309,7 +317,7 @@ def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
         head.replace("internal_energy", f"'{name}'") + "".join(rows[::5])
     )
     energy = ("--no-verify", "--energy", f"'{name}'")
-    page = page_of(
+    page = read_page_of(
         tmp_path, "--td", "0.064", *energy, str(tmp_path / "energy & <i>.csv")
     )
     assert name in page.text
@@ -330,7 +338,7 @@ def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(
     (tmp_path / "energy.csv").write_text(
         Path(ENERGY).read_text("utf-8").replace("internal_energy", name), "utf-8"
     )
-    page = page_of(
+    page = read_page_of(
         tmp_path,
         "--td",
         "0.064",
@@ -348,7 +356,9 @@ def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(
 def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
     tmp_path: Path,
 ) -> None:
-    head, *rows = unpacked(stored("chain_ref.csv.gz")).splitlines(keepends=True)
+    head, *rows = read_unpacked(locate_stored("chain_ref.csv.gz")).splitlines(
+        keepends=True
+    )
     source = str(tmp_path / "chain.csv")
     Path(source).write_bytes(head + b"".join(rows[::10]))
     energies = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
@@ -362,7 +372,7 @@ def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
         "--tolerance",
         "0.1",
     )
-    words = page_of(
+    words = read_page_of(
         tmp_path, "--td", "0.13505", *energies, *options, source
     ).last_command()
     assert words[5:] == [
@@ -380,7 +390,7 @@ def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
 
 @pytest.mark.slow
 def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
-    words = page_of(
+    words = read_page_of(
         tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01
     ).last_command()
     assert words[-6:] == [
@@ -401,9 +411,9 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(
     choosing = shlex.split(
         "--after 0.001 --tolerance 0.1 --fit-window 0.01 0.1 --max-residual 2.5 --strict"
     )
-    page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
-    before, behind = json.loads(page.data[0])["command"]
-    assert (before, sorted(shlex.split(behind))) == (
+    page = read_page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
+    command_start, command_end = json.loads(page.data[0])["command"]
+    assert (command_start, sorted(shlex.split(command_end))) == (
         "d2rpick suggest --td ",
         sorted([*choosing, ENERGY]),
     )
@@ -442,10 +452,11 @@ def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> Non
     motion, earlier = tmp_path / "motion.matsum", re.compile(r"(?<=time =)[^\n]*")
     motion.write_text(
         earlier.sub(
-            lambda time: f"{float(time[0]) - 0.02:13.4E}", replayed("matsum").decode()
+            lambda time: f"{float(time[0]) - 0.02:13.4E}",
+            make_replay_file("matsum").decode(),
         )
     )
-    page = page_of(tmp_path, "--td", "0.044", "--part", "3", str(motion))
+    page = read_page_of(tmp_path, "--td", "0.044", "--part", "3", str(motion))
     assert "No card can be printed for these times: tr is -0.00" in page.text
 
 
@@ -472,15 +483,15 @@ def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
     reference, *legs = (
         ROLLOVER_T01,
-        *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)),
+        *(locate_stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)),
     )
-    asked = ("--tr", "0.1", "--td", "0.37", "--no-verify", "--part", "box")
-    page = page_of(
+    arguments = ("--tr", "0.1", "--td", "0.37", "--no-verify", "--part", "box")
+    page = read_page_of(
         tmp_path,
-        *asked,
+        *arguments,
         reference,
         "--switched",
-        stored("rollover_r100_T0*.gz"),
+        locate_stored("rollover_r100_T0*.gz"),
         command="verify",
         code=1,
     )
@@ -489,11 +500,11 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
             f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}"
             in page.text
         )
-    told = (
+    texts = (
         "The switched run",
         "mean energy after td",
         "hourglass energy of box",
         "The window is 0.1 to 0.37",
     )
-    for text in (*told, "0.66 times that of the reference"):
+    for text in (*texts, "0.66 times that of the reference"):
         assert text in page.text

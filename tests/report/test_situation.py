@@ -1,4 +1,4 @@
-"""Lines that say what was read."""
+"""Lines about the input that was read."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from d2rpick.report.situation import energy_name, what_was_read
 PARTS = tuple(Part(number, f"p{number}") for number in range(1, 9))
 
 
-def of_parts(parts: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
+def describe_parts(parts: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
     channel = "internal energy of " + ", ".join(
         part.title for part in parts if part not in springs
     )
@@ -20,7 +20,7 @@ def of_parts(parts: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History
 
 
 def test_of_many_parts_the_first_are_named() -> None:
-    history = of_parts(PARTS, springs=PARTS[1:2])
+    history = describe_parts(PARTS, springs=PARTS[1:2])
     assert energy_name(history) == "internal energy of p1, p3, p4, p5, p6 and 2 more"
     assert (
         what_was_read(history)
@@ -29,7 +29,13 @@ def test_of_many_parts_the_first_are_named() -> None:
 
 
 def test_few_parts_and_channels_are_named_as_they_are() -> None:
-    few = of_parts(PARTS[:6], springs=PARTS[:1])
-    assert energy_name(few) == few.channel == "internal energy of p2, p3, p4, p5, p6"
-    whole = History(few.time, few.energy, ("run",), "glstat", "internal energy")
+    few_text = describe_parts(PARTS[:6], springs=PARTS[:1])
+    assert (
+        energy_name(few_text)
+        == few_text.channel
+        == "internal energy of p2, p3, p4, p5, p6"
+    )
+    whole = History(
+        few_text.time, few_text.energy, ("run",), "glstat", "internal energy"
+    )
     assert energy_name(whole) == "internal energy"

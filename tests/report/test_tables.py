@@ -1,4 +1,4 @@
-"""What is narrowed loses no word but columns that may be left out, and is as wide as asked for where words allow it."""
+"""A narrowed table loses only optional columns, and keeps the requested width if its words allow it."""
 
 import csv
 import io
@@ -18,7 +18,9 @@ WORDS = st.lists(st.text("abc-1", min_size=1, max_size=9), max_size=6).map(" ".j
     )
 )
 def test_a_narrow_table_keeps_every_word_below_its_name(rows: list[list[str]]) -> None:
-    head = [f"{chr(ord('P') + at)} name" for at in range(len(rows[0]))]
+    head = [
+        f"{chr(ord('P') + column_number)} name" for column_number in range(len(rows[0]))
+    ]
     plain, narrow = as_text(head, rows).split("\n"), as_text(head, rows, 40).split("\n")
     if max(map(len, plain)) <= 40:
         assert narrow == plain
@@ -31,8 +33,8 @@ def test_a_narrow_table_keeps_every_word_below_its_name(rows: list[list[str]]) -
     for column, start, end in zip(
         zip(head, *rows, strict=True), starts, starts[1:], strict=False
     ):
-        shown = " ".join(line[start:end] for line in narrow).split()
-        assert shown == " ".join(column).split()
+        shown_words = " ".join(line[start:end] for line in narrow).split()
+        assert shown_words == " ".join(column).split()
 
 
 @given(
@@ -43,15 +45,19 @@ def test_words_that_are_too_long_are_broken_and_numbers_are_not(
     width: int, names: list[str]
 ) -> None:
     number = -1.23456e-05
-    shown = as_text(
-        [f"name {at}" for at in range(len(names))] + ["td"], [[*names, number]], width
+    shown_text = as_text(
+        [f"name {name_number}" for name_number in range(len(names))] + ["td"],
+        [[*names, number]],
+        width,
     )
-    assert max(map(len, shown.split("\n"))) <= max(
+    assert max(map(len, shown_text.split("\n"))) <= max(
         width, 12 * len(names) + 2 * len(names) + 12
     )
-    assert f"{number:.6g}" in shown
+    assert f"{number:.6g}" in shown_text
     if len(names) == 1:
-        assert "".join(line.split()[0] for line in shown.split("\n")[1:]) == names[0]
+        assert (
+            "".join(line.split()[0] for line in shown_text.split("\n")[1:]) == names[0]
+        )
 
 
 def test_a_long_word_breaks_behind_what_joins_its_parts() -> None:
@@ -86,8 +92,8 @@ def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(
     )
 
 
-def cell_of(value: Cell) -> str:
-    """What a reader of csv gets for a value."""
+def read_cell(value: Cell) -> str:
+    """Return what a csv reader gets for a value."""
     ((cell, last),) = csv.reader(
         io.StringIO(as_csv([], [[value, "last"]]).removeprefix("\n")), strict=True
     )
@@ -97,15 +103,15 @@ def cell_of(value: Cell) -> str:
 
 @given(st.text("=+-@＝＋－＠ ;1.eEa", max_size=9))
 def test_no_text_of_a_csv_is_a_formula(text: str) -> None:
-    for piece in cell_of(text).split(";"):
+    for piece in read_cell(text).split(";"):
         begin = piece.strip()[:1]
         if begin in "=+-@＝＋－＠":
             assert not begin or isinstance(float(piece), float)
-    assert cell_of(text).replace("'", "") == text
+    assert read_cell(text).replace("'", "") == text
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
 def test_a_number_in_a_csv_reads_back_to_itself(number: float) -> None:
     kind = type(number)  # no float holds an integer of 17 digits
-    assert kind(cell_of(number)) == number == kind(cell_of(str(number)))
-    assert cell_of(f"{number}; {number}") == f"{number}; {number}"
+    assert kind(read_cell(number)) == number == kind(read_cell(str(number)))
+    assert read_cell(f"{number}; {number}") == f"{number}; {number}"

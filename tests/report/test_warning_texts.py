@@ -5,22 +5,24 @@ import re
 import pytest
 
 from d2rpick.report.warning_texts import EXPLANATIONS
-from tests.command import ROOT, run, unwrapped
+from tests.command import ROOT, join_wrapped_lines, run
 
 
-def codes() -> set[str]:
-    """Codes of all warnings in the source: what stands first in a Caution, or names one."""
-    found: set[str] = set()
+def find_codes() -> set[str]:
+    """Return the codes of all warnings in the source: first arguments of Caution, and codes in tables of warnings."""
+    codes_found: set[str] = set()
     for path in (ROOT / "d2rpick").rglob("*.py"):
         text = path.read_text()
-        found.update(re.findall(r'Caution\(\s*"([a-z-]+)"', text))
-        found.update(re.findall(r'^\s+\("([a-z-]+)", lambda h', text, re.MULTILINE))
-    return found
+        codes_found.update(re.findall(r'Caution\(\s*"([a-z-]+)"', text))
+        codes_found.update(
+            re.findall(r'^\s+\("([a-z-]+)", lambda h', text, re.MULTILINE)
+        )
+    return codes_found
 
 
 def test_every_warning_is_explained() -> None:
-    assert len(codes()) > 50
-    assert codes() - {*EXPLANATIONS} == set()
+    assert len(find_codes()) > 50
+    assert find_codes() - {*EXPLANATIONS} == set()
 
 
 @pytest.mark.parametrize("code", EXPLANATIONS)
@@ -31,8 +33,8 @@ def test_an_explanation_has_short_sentences(code: str) -> None:
 
 
 def test_the_command_explains_a_warning_by_its_code() -> None:
-    shown = unwrapped(run("rule", "poor-td").stdout)
-    assert shown.startswith("poor-td (warning): More than half of the vibration energy")
-    assert " Fix: Choose the td that is named as better" in shown
+    text = join_wrapped_lines(run("rule", "poor-td").stdout)
+    assert text.startswith("poor-td (warning): More than half of the vibration energy")
+    assert " Fix: Choose the td that is named as better" in text
     refused = run("rule", "no-such-code")
     assert refused.exit_code == 2

@@ -9,8 +9,8 @@ import pytest
 import d2rpick as d2
 from d2rpick.rules import RULES
 from d2rpick.rules.rule import write_engine_files, write_starter_deck
-from tests.command import answer, put, run
-from tests.decks import wide, write
+from tests.command import put, run, run_json
+from tests.decks import pad, write
 from tests.histories.test_contact_forces import TIMES, t01
 from tests.made_t01 import MadeGroup
 
@@ -42,8 +42,8 @@ def list_windows(report: dict[str, object]) -> list[tuple[float, float | None]]:
 
 def test_a_pair_is_followed_through_the_contacts(bounces: str, tmp_path: Path) -> None:
     deck = write(tmp_path, write_pair())
-    assert list_windows(answer("check", deck)) == []
-    report = answer("check", deck, "--history", bounces)
+    assert list_windows(run_json("check", deck)) == []
+    report = run_json("check", deck, "--history", bounces)
     flights = [
         (entry.start, entry.end)
         for entry in d2.plan(d2.read(bounces), parts=1, replay=False).flights
@@ -77,7 +77,7 @@ def test_of_several_contacts_nobody_knows_which_one_pushes(
         f"*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n{entry:10d}floor\n"
         for entry in (7, 8)
     )
-    report = answer(
+    report = run_json(
         "check", write(tmp_path, write_pair(contacts)), "--history", bounces
     )
     assert list_windows(report) == []
@@ -90,7 +90,7 @@ def write_radioss_run(
     for name, text in write_engine_files(("1.2", "")).items():
         put(folder / name, text)
     deck = write_starter_deck(more=sensor + further_cards).replace(
-        wide(1808, 0)[:-1], wide(1808, 5)[:-1]
+        pad(1808, 0)[:-1], pad(1808, 5)[:-1]
     )
     return str(put(folder / "box_0000.rad", deck))
 
@@ -98,14 +98,14 @@ def write_radioss_run(
 def write_force_sensor(
     kind: str = "RWALL", wait: float = 0.05, highest: float = 0.0
 ) -> str:
-    row = wide(3, "NF")[:-1] + wide(-1.0, highest, 0.0, width=20)
-    return f"/SENSOR/{kind}/5\nforce\n{wide(wait, width=20)}{row}"
+    row = pad(3, "NF")[:-1] + pad(-1.0, highest, 0.0, width=20)
+    return f"/SENSOR/{kind}/5\nforce\n{pad(wait, width=20)}{row}"
 
 
 def test_a_sensor_of_a_force_is_followed_through_the_contacts(
     bounces: str, tmp_path: Path
 ) -> None:
-    report = answer(
+    report = run_json(
         "check", write_radioss_run(tmp_path, write_force_sensor()), "--history", bounces
     )
     spans = list_windows(report)
@@ -118,7 +118,9 @@ def test_a_sensor_of_a_force_is_followed_through_the_contacts(
         if end - start > 0.06:
             assert any(abs(tr - start - 0.05) < 0.002 for tr, _ in spans)
     assert (
-        list_windows(answer("check", write_radioss_run(tmp_path, write_force_sensor())))
+        list_windows(
+            run_json("check", write_radioss_run(tmp_path, write_force_sensor()))
+        )
         == []
     )
 
@@ -136,7 +138,7 @@ def test_of_several_that_push_the_force_of_the_named_one_is_followed(
     history.write_bytes(t01(groups, values))
     both = "/RWALL/PLANE/3\nground\n/INTER/TYPE7/3\nfloor\n"
     deck = write_radioss_run(tmp_path, write_force_sensor(kind), both)
-    found = answer("check", deck, "--history", str(history))
+    found = run_json("check", deck, "--history", str(history))
     ends = [time for pair in list_windows(found) for time in pair]
     assert ends == pytest.approx([0.0, start])
 
@@ -153,7 +155,7 @@ def test_of_several_that_push_the_force_of_the_named_one_is_followed(
 def test_sensors_that_momenta_do_not_show_are_told(
     bounces: str, tmp_path: Path, sensor: str, more: str
 ) -> None:
-    report = answer(
+    report = run_json(
         "check", write_radioss_run(tmp_path, sensor, more), "--history", bounces
     )
     assert list_windows(report) == []
@@ -165,6 +167,6 @@ def test_each_window_of_a_pair_has_its_line(bounces: str, tmp_path: Path) -> Non
     output = run("check", deck, "--history", bounces).stdout
     assert (
         output.count("part 1: rigid from")
-        == len(list_windows(answer("check", deck, "--history", bounces)))
+        == len(list_windows(run_json("check", deck, "--history", bounces)))
         > 2
     )

@@ -17,7 +17,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.rules import check_deck
 from d2rpick.rules.judgement import HistoryJudge
 from tests.deck.test_openradioss import run_solver
-from tests.decks import wide
+from tests.decks import pad
 
 WIDE = 20  # columns of a real number
 MAIN, SENSOR, ENTITY, END, INTERVAL = 9999, 5, 3, 0.25, 5e-4
@@ -73,70 +73,68 @@ def generate_bounces() -> list[Bounce]:
 
 
 def write_reals(*values: float) -> str:
-    return wide(*values, width=WIDE)
+    return pad(*values, width=WIDE)
 
 
 def write_bounce_deck(run: Bounce, *, switched: bool) -> str:
     """Write the starter deck; its body has the sensor where the run is ``switched``."""
     corners = range(_CELLS + 1)
     nodes = {(i, j): 1 + i * (_CELLS + 1) + j for i in corners for j in corners}
-    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(2023, 0)}" + 2 * wide(
+    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{pad(2023, 0)}" + 2 * pad(
         "kg", "m", "s", width=WIDE
     )
     text += f"/TITLE\nplate\n/MAT/ELAST/1\nsteel\n{write_reals(7850.0)}{write_reals(run.modulus, 0.3)}"
-    text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{write_reals(run.thickness)}/NODE\n"
+    text += f"/PROP/SHELL/1\nshell\n{pad(24, 0, 0, 0)}\n{pad(3, 0)[:-1]}{write_reals(run.thickness)}/NODE\n"
     for (i, j), node in nodes.items():
         x, y = i / _CELLS, j / _CELLS
-        text += wide(node)[:-1] + write_reals(x, y, run.height + GAP + run.slope * x)
+        text += pad(node)[:-1] + write_reals(x, y, run.height + GAP + run.slope * x)
     text += (
-        wide(MAIN)[:-1]
+        pad(MAIN)[:-1]
         + write_reals(0.5, 0.5, run.height + 0.2)
-        + f"/PART/1\nplate\n{wide(1, 1)}/SHELL/1\n"
+        + f"/PART/1\nplate\n{pad(1, 1)}/SHELL/1\n"
     )
     cells = [(i, j) for i in range(_CELLS) for j in range(_CELLS)]
     for number, (i, j) in enumerate(cells, start=1):
-        text += wide(
+        text += pad(
             number, nodes[i, j], nodes[i + 1, j], nodes[i + 1, j + 1], nodes[i, j + 1]
         )
     node_ids = [*nodes.values(), MAIN]
-    text += f"/GRNOD/PART/1\nplate\n{wide(1)}/GRNOD/NODE/6\nall\n"
-    text += "".join(wide(*node_ids[at : at + 10]) for at in range(0, len(node_ids), 10))
-    text += f"/INIVEL/TRA/1\nthrown\n{write_reals(0.0, 0.0, -run.speed)[:-1]}{wide(6)}"
+    text += f"/GRNOD/PART/1\nplate\n{pad(1)}/GRNOD/NODE/6\nall\n"
+    text += "".join(pad(*node_ids[at : at + 10]) for at in range(0, len(node_ids), 10))
+    text += f"/INIVEL/TRA/1\nthrown\n{write_reals(0.0, 0.0, -run.speed)[:-1]}{pad(6)}"
     text += f"/FUNCT/1\ngravity\n{write_reals(0.0, -9.81)}{write_reals(10.0, -9.81)}"
-    text += f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 6)[:-1]}{write_reals(1.0, 1.0)}"
+    text += f"/GRAV/1\ngravity\n{pad(1, 'Z', 0, 0, 6)[:-1]}{write_reals(1.0, 1.0)}"
     text += write_wall() if run.wall else write_contact()
     kind = "RWALL" if run.wall else "INTER"
-    force = wide(ENTITY, "NF")[:-1] + write_reals(-1.0, 0.0, 0.0)
+    force = pad(ENTITY, "NF")[:-1] + write_reals(-1.0, 0.0, 0.0)
     text += f"/SENSOR/{kind}/{SENSOR}\nforce\n{write_reals(run.wait)}{force}"
-    text += f"/RBODY/1\nbody\n{wide(MAIN, SENSOR * switched, 0, 0)[:-1]}{write_reals(0.0)[:-1]}{wide(1, 1, 0, 0)}"
-    text += 2 * write_reals(0.0, 0.0, 0.0) + wide(0, 0, 0)
-    text += (
-        f"/TH/PART/1\nparts\nDEF       XMOM      YMOM      ZMOM      MASS\n{wide(1)}"
-    )
+    text += f"/RBODY/1\nbody\n{pad(MAIN, SENSOR * switched, 0, 0)[:-1]}{write_reals(0.0)[:-1]}{pad(1, 1, 0, 0)}"
+    text += 2 * write_reals(0.0, 0.0, 0.0) + pad(0, 0, 0)
+    text += f"/TH/PART/1\nparts\nDEF       XMOM      YMOM      ZMOM      MASS\n{pad(1)}"
     if run.forces:
-        text += f"/TH/{kind}/2\nforces\nDEF\n{wide(ENTITY)}"
+        text += f"/TH/{kind}/2\nforces\nDEF\n{pad(ENTITY)}"
     return f"{text}/END\n"
 
 
 def write_wall() -> str:
     plane = write_reals(0.0, 0.0, 0.0) + write_reals(0.0, 0.0, 1.0)
-    return f"/RWALL/PLANE/{ENTITY}\nground\n{wide(0, 0, 1, 0)}{write_reals(0.0)}{plane}"
+    return f"/RWALL/PLANE/{ENTITY}\nground\n{pad(0, 0, 1, 0)}{write_reals(0.0)}{plane}"
 
 
 def write_contact() -> str:
     corners = ((-1.0, -1.0), (2.0, -1.0), (2.0, 2.0), (-1.0, 2.0))
     ids = range(1001, 1005)
     text = "/NODE\n" + "".join(
-        wide(node)[:-1] + write_reals(*corner, 0.0)
+        pad(node)[:-1] + write_reals(*corner, 0.0)
         for node, corner in zip(ids, corners, strict=True)
     )
-    text += f"/PART/2\nground\n{wide(1, 1)}/SHELL/2\n{wide(900, *ids)}/GRNOD/NODE/2\nground\n{wide(*ids)}"
-    text += f"/BCS/1\nfixed\n   111 111{wide(0, 2)}/SURF/PART/7\nground\n{wide(2)}"
-    text += f"/INTER/TYPE7/{ENTITY}\nplate on ground\n{wide(1, 7, 4, 0, 0)}{wide('', 0, 0, 0, 0)}"
+    text += f"/PART/2\nground\n{pad(1, 1)}/SHELL/2\n{pad(900, *ids)}/GRNOD/NODE/2\nground\n{pad(*ids)}"
+    text += f"/BCS/1\nfixed\n   111 111{pad(0, 2)}/SURF/PART/7\nground\n{pad(2)}"
+    text += f"/INTER/TYPE7/{ENTITY}\nplate on ground\n{pad(1, 7, 4, 0, 0)}{pad('', 0, 0, 0, 0)}"
     text += 2 * write_reals(0.0, 0.0) + write_reals(1.0, 0.0, GAP, 0.0, 0.0)
     return (
         text
-        + f"{'000':>10}{'':10}{0:10d}{write_reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{write_reals(0.0)[:-1]}{wide(0)}"
+        + f"{'000':>10}{'':10}{0:10d}{write_reals(0.05, 0.0, 0.0)}{pad(0, 0)[:-1]}{write_reals(0.0)[:-1]}{pad(0)}"
     )
 
 

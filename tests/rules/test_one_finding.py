@@ -7,7 +7,7 @@ import pytest
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.rules import RULES, Configuration, check_deck, find_rules
 from d2rpick.rules.rule import HEAD, PARTS, write_automatic_card
-from tests.command import answer, run
+from tests.command import run, run_json
 from tests.decks import write
 
 OSCILLATOR = (
@@ -36,7 +36,7 @@ def test_a_mistake_of_units_is_one_finding(
 ) -> None:
     history = str(tmp_path / "energy.csv")
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
-    findings = answer(
+    findings = run_json(
         "check",
         write_timed_deck(tmp_path, *times),
         "--history",
@@ -53,7 +53,7 @@ def test_a_time_after_the_run_is_one_finding(tmp_path: Path) -> None:
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
     options = (write_timed_deck(tmp_path, "0.0135867", "68.7534"), "--history", history)
     for ignored, rule in (("D2R111", "D2R101"), ("D2R111,D2R101", "D2R205")):
-        found = answer("check", *options, "--ignore", ignored)["findings"]
+        found = run_json("check", *options, "--ignore", ignored)["findings"]
         assert [one["rule"] for one in found] == [rule]
 
 

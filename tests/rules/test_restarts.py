@@ -8,7 +8,7 @@ import d2rpick as d2
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.restarts import is_restart, join_restarts
 from d2rpick.rules import check_deck
-from tests.command import answer, put, run
+from tests.command import put, run, run_json
 
 MAIN = """\
 *KEYWORD
@@ -63,7 +63,7 @@ def test_the_command_takes_them_together_in_any_order_and_from_a_folder(
     legs: list[str],
 ) -> None:
     for names in (legs, legs[::-1], [str(Path(legs[0]).parent)]):
-        report = answer("check", *names)
+        report = run_json("check", *names)
         assert report["decks"] == [legs[0]]
         assert [
             (window["part"], window["tr"], window["td"]) for window in report["windows"]
@@ -78,7 +78,7 @@ def test_their_windows_are_judged_by_a_history(legs: list[str], tmp_path: Path) 
     history = str(tmp_path / "energy.csv")
     options = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
     assert run("replay", *options.split(), "-o", history).exit_code == 0
-    report = answer("check", *legs, "--history", history)
+    report = run_json("check", *legs, "--history", history)
     judged = {finding["rule"]: finding for finding in report["findings"]}
     assert judged.keys() & {"D2R201", "D2R202"}
     assert {finding["file"] for finding in judged.values()} <= {*legs}
@@ -138,7 +138,7 @@ def test_of_two_runs_nobody_knows_whose_restart_it_is(
     legs: list[str], tmp_path: Path
 ) -> None:
     second_main = str(put(tmp_path / "other.k", MAIN.format(0.3)))
-    checked = answer("check", *legs, second_main)
+    checked = run_json("check", *legs, second_main)
     assert checked["windows"] == []
     assert sorted(checked["decks"]) == sorted([*legs, second_main])
 

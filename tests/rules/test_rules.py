@@ -28,8 +28,8 @@ from d2rpick.rules.rule import (
     Rule,
     write_automatic_card,
 )
-from tests.command import answer, run
-from tests.decks import found, write
+from tests.command import run, run_json
+from tests.decks import count_findings, write
 
 PASSING = [(rule, example) for rule in RULES.values() for example in rule.passing]
 FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]
@@ -59,7 +59,7 @@ def find_findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, 
             run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout
         )["findings"]
     else:
-        report = answer("check", path, *options)["findings"]
+        report = run_json("check", path, *options)["findings"]
     return [finding for finding in report if finding["rule"] == rule.id]
 
 
@@ -111,12 +111,14 @@ def test_a_comment_before_the_card_silences_a_rule_for_it(
 ) -> None:
     card = "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     first, second = (match.start() for match in re.finditer(re.escape(card), SWAPPED))
-    assert found(tmp_path, SWAPPED) == {"D2R102": 1}
-    assert not found(tmp_path, f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}")
-    assert found(tmp_path, f"{SWAPPED[:first]}{comment}\n{SWAPPED[first:]}") == {
-        "D2R102": 1
-    }
-    assert found(
+    assert count_findings(tmp_path, SWAPPED) == {"D2R102": 1}
+    assert not count_findings(
+        tmp_path, f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"
+    )
+    assert count_findings(
+        tmp_path, f"{SWAPPED[:first]}{comment}\n{SWAPPED[first:]}"
+    ) == {"D2R102": 1}
+    assert count_findings(
         tmp_path, f"{SWAPPED[:second]}{comment}\n*NODE\n{SWAPPED[second:]}"
     ) == {"D2R102": 1}
 
@@ -175,7 +177,12 @@ def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:
         + write_automatic_card(1, "0.3", deformable=["1"])
         + END
     )
-    assert found(tmp_path, deck) == {"D2R106": 1, "D2R101": 1, "D2R004": 1, "D2R104": 1}
+    assert count_findings(tmp_path, deck) == {
+        "D2R106": 1,
+        "D2R101": 1,
+        "D2R004": 1,
+        "D2R104": 1,
+    }
 
 
 def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
@@ -307,7 +314,7 @@ def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
     for problem, remaining_lines in without.items():
         deck = HEAD + PARTS + "\n".join(remaining_lines) + "\n" + END
         assert problem in find_message(tmp_path, "D2R001", deck)
-        assert not found(tmp_path, deck)["D2R002"]
+        assert not count_findings(tmp_path, deck)["D2R002"]
 
 
 @pytest.mark.parametrize(

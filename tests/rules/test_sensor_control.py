@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from d2rpick.deck.ls_dyna_sensors import follow_control, read_controls
 from d2rpick.deck.reader import read_deck
 from d2rpick.rules.rule import HEAD, PARTS, make_deck, write_automatic_card
-from tests.command import answer, put, refused, run
+from tests.command import put, read_refusal, run, run_json
 from tests.rules.test_by_force import list_windows
 
 END = 1.0
@@ -64,7 +64,7 @@ def write(folder: Path, *cards: str, switch_set: str = SET) -> str:
 
 def history(place: Path, spans: list[tuple[float, float]]) -> str:
     """Write a run in which contact 7 pushes in some spans, and contact 8 all the time."""
-    from tests.text_files import glstat_text
+    from tests.text_files import make_glstat_text
 
     acts = np.zeros(TIMES.size, bool)
     for start, end in spans:
@@ -78,13 +78,15 @@ def history(place: Path, spans: list[tuple[float, float]]) -> str:
     folder = place / "run"
     folder.mkdir()
     (folder / "rcforc").write_text(" made for tests\n\n" + "".join(lines))
-    (folder / "glstat").write_bytes(glstat_text(TIMES, 1 + np.sin(40 * TIMES) ** 2))
+    (folder / "glstat").write_bytes(
+        make_glstat_text(TIMES, 1 + np.sin(40 * TIMES) ** 2)
+    )
     return str(folder)
 
 
 def test_a_control_by_time_needs_no_history(tmp_path: Path) -> None:
     cards = control("1 2") + by_time(1, "GT", 0.2) + by_time(2, "GT", 0.5, delay=0.1)
-    found = answer("check", write(tmp_path, cards))
+    found = run_json("check", write(tmp_path, cards))
     assert flat(found) == pytest.approx([0.2, 0.6])
     told = next(one for one in found["findings"] if one["rule"] == "D2R302")
     assert "off at 0, on at 0.2, off at 0.6" in told["message"]
@@ -92,8 +94,8 @@ def test_a_control_by_time_needs_no_history(tmp_path: Path) -> None:
 
 def test_a_control_that_begins_on_is_rigid_from_the_start(tmp_path: Path) -> None:
     cards = control("1", initial="ON") + by_time(1, "GT", 0.3)
-    assert list_windows(answer("check", write(tmp_path, cards))) == [(0.0, 0.3)]
-    assert list_windows(answer("check", write(tmp_path, control("", "ON")))) == [
+    assert list_windows(run_json("check", write(tmp_path, cards))) == [(0.0, 0.3)]
+    assert list_windows(run_json("check", write(tmp_path, control("", "ON")))) == [
         (0.0, None)
     ]
 
@@ -102,11 +104,11 @@ def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> 
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6), (0.605, 0.7)])
     cards = control("1 2", repeats=-1) + force_of()
     cards += by_force(1, "LT", 1e-3, duration=0.05) + by_force(2, "GT", 1e-3)
-    found = answer("check", write(tmp_path, cards), "--history", folder)
+    found = run_json("check", write(tmp_path, cards), "--history", folder)
     assert flat(found) == pytest.approx(
         [0.05, 0.105, 0.245, 0.505, 0.745, None], abs=0.011
     )
-    assert list_windows(answer("check", write(tmp_path, cards))) == []
+    assert list_windows(run_json("check", write(tmp_path, cards))) == []
 
 
 def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
@@ -115,7 +117,7 @@ def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
         20, "0.0", deformable=["1"], code=5
     )
     cards = control("1") + by_force(1, "GT", 1.0) + force_of()
-    found = answer(
+    found = run_json(
         "check", write(tmp_path, cards, switch_set=sets), "--history", folder
     )
     assert flat(found) == pytest.approx([0.1, 0.505], abs=0.006)
@@ -133,7 +135,7 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
             for text in (there, back)
         )
         path = write(tmp_path, switch_set=pair)
-        found[contact] = answer("check", path, "--history", folder)
+        found[contact] = run_json("check", path, "--history", folder)
     assert flat(found[7]) == pytest.approx(
         [0.0, 0.105, 0.195, 0.505, 0.595, None], abs=0.011
     )
@@ -156,7 +158,7 @@ def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
     )
     path = Path(write(tmp_path, switch_set=there))
     path.write_text(path.read_text().replace("SURFACE_TO_SURFACE", "GENERAL"))
-    found = answer("check", str(path), "--history", folder)
+    found = run_json("check", str(path), "--history", folder)
     assert list_windows(found) == []
     assert "D2R008" in {one["rule"] for one in found["findings"]}
 
@@ -169,10 +171,10 @@ def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> No
     printed = run(*card, *options, "--contact", "7")
     assert "after the end of the flight" not in printed.stderr  # it ends at the contact
     path = write(tmp_path, switch_set=printed.stdout)
-    assert flat(answer("check", path, "--history", run_folder)) == pytest.approx(
+    assert flat(run_json("check", path, "--history", run_folder)) == pytest.approx(
         [0.25, 0.505], abs=0.006
     )  # no momenta show a speed, so there is no OFFSET
-    told = refused(*card, *options, "--contact", "9")
+    told = read_refusal(*card, *options, "--contact", "9")
     assert "needs a history with the force of that contact" in told
 
 
@@ -201,7 +203,7 @@ def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> No
     ],
 )
 def test_what_is_not_followed_is_named(cards: str, why: str, tmp_path: Path) -> None:
-    found = answer("check", write(tmp_path, cards))
+    found = run_json("check", write(tmp_path, cards))
     assert list_windows(found) == []
     told = [one["message"] for one in found["findings"] if one["rule"] == "D2R302"]
     assert why in told[0]

@@ -1,4 +1,4 @@
-"""A run that switches itself, with a solver that is a script: what is left of it, also after what ends it early."""
+"""A run that switches itself, with a script as solver: its results, also after an early end."""
 
 import errno
 import json
@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,24 +34,24 @@ from d2rpick.running.sequence import (
     find_window,
     windows,
 )
-from tests.command import ROOT, put, refused, run
+from tests.command import ROOT, put, read_refusal, run
 from tests.deck.test_openradioss import ENGINE, write_starter
-from tests.decks import wide
+from tests.decks import pad
 
 FAKE = Path(__file__).with_name("fake_solver.py")
 GRAVITY = (
-    f"/FUNCT/1\ngravity\n{wide(0.0, -9.81, width=20)}{wide(10.0, -9.81, width=20)}"
-    f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 1)[:-1]}{wide(1.0, 1.0, width=20)}"
+    f"/FUNCT/1\ngravity\n{pad(0.0, -9.81, width=20)}{pad(10.0, -9.81, width=20)}"
+    f"/GRAV/1\ngravity\n{pad(1, 'Z', 0, 0, 1)[:-1]}{pad(1.0, 1.0, width=20)}"
 )
-WALL = "/RWALL/PLANE/8\nground\n" + wide(0, 0, 0, 0) + 3 * wide(0.0, 0.0, 1.0, width=20)
+WALL = "/RWALL/PLANE/8\nground\n" + pad(0, 0, 0, 0) + 3 * pad(0.0, 0.0, 1.0, width=20)
 WAIT, END, LANDS, LOADED = 0.02, 0.22, 0.17, 0.03
 
 
-def command(kind: str) -> str:
+def give_solver_command(kind: str) -> str:
     return shlex.join([sys.executable, str(FAKE), kind, "{deck}"])
 
 
-def asked(folder: Path, *more: str) -> list[str]:
+def prepare_drive(folder: Path, *options: str) -> list[str]:
     deck = folder / "deck"
     if not deck.exists():
         deck.mkdir()
@@ -63,18 +64,26 @@ def asked(folder: Path, *more: str) -> list[str]:
         (deck / "strip_0001.rad").write_text(text)
     return [
         "drive", str(deck / "strip_0000.rad"), "-o", str(folder / "run"), "--wait", str(WAIT),
-        "--starter", command("starter"), "--engine", command("engine"), "-f", "json", *more,
+        "--starter", give_solver_command("starter"), "--engine", give_solver_command("engine"), "-f", "json", *options,
     ]  # fmt: skip
 
 
-def drives(folder: Path) -> Driving:
-    commands = {kind: command(kind) for kind in ("starter", "engine")}
-    return Driving(asked(folder)[1], folder / "run", print, wait=WAIT, **commands)  # type: ignore[arg-type]
+def make_driving(folder: Path) -> Driving:
+    return Driving(
+        prepare_drive(folder)[1],
+        folder / "run",
+        print,
+        wait=WAIT,
+        starter=give_solver_command("starter"),
+        engine=give_solver_command("engine"),
+    )
 
 
-def check(found: dict[str, object], folder: Path) -> None:
-    """What must hold of every run that came to its end: it is whole, and rigid in the flight alone."""
-    switched = [one for one in found["windows"] if one["reason"] is None]  # type: ignore[attr-defined]
+def check_finished_run(report: dict[str, Any], folder: Path) -> None:
+    """Check what must hold for every finished run: it is complete, and rigid in the flight only."""
+    switched = [
+        window_row for window_row in report["windows"] if window_row["reason"] is None
+    ]
     joined = open_run(
         [str(path) for path in sorted((folder / "run").glob("stripT??"))]
     ).databases[0]
@@ -94,7 +103,7 @@ def check(found: dict[str, object], folder: Path) -> None:
     assert rigid[-1] == pytest.approx(window["td"], abs=0.0021)
 
 
-def histories(folder: Path) -> dict[str, bytes]:
+def read_histories(folder: Path) -> dict[str, bytes]:
     return {
         path.name: path.read_bytes()
         for path in sorted((folder / "run").glob("stripT??"))
@@ -103,39 +112,39 @@ def histories(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
-    """A run that nothing disturbed, and what was said of it."""
+    """Return an undisturbed run, and the answer about it."""
     folder = tmp_path_factory.mktemp("whole")
     return folder, json.loads(
-        run(*asked(folder, "--report", str(folder / "page.html"), "-q")).stdout
+        run(*prepare_drive(folder, "--report", str(folder / "page.html"), "-q")).stdout
     )
 
 
 def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     whole: tuple[Path, dict[str, object]],
 ) -> None:
-    folder, found = whole
-    check(found, folder)
-    legs: list[dict[str, object]] = found["legs"]  # type: ignore[assignment]
+    folder, outcome = whole
+    check_finished_run(outcome, folder)
+    legs: list[dict[str, object]] = outcome["legs"]  # type: ignore[assignment]
     assert {"load", "probe"} <= {str(leg["kind"]) for leg in legs}
     assert all(leg["cpu"] == 1.0 for leg in legs)
     assert "First run: strip" in (folder / "page.html").read_text()
     assert (
         len(list((folder / "run").glob("*.rst"))) <= 4
     )  # the starter's, and those that may be needed
-    shown = run(*asked(folder, "--resume", "-q", "-f", "table")).stdout
-    assert "switched" in shown
-    assert "no level at td is matched" in shown
-    assert "--resume" in refused(*asked(folder))
-    over = run(*asked(folder, "--resume"))
+    result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
+    assert "switched" in result
+    assert "no level at td is matched" in result
+    assert "--resume" in read_refusal(*prepare_drive(folder))
+    over = run(*prepare_drive(folder, "--resume"))
     assert f"resumed: legs that are over: {len(legs)}, the last at {END}" in over.stderr
-    assert json.loads(over.stdout)["windows"] == found["windows"]
+    assert json.loads(over.stdout)["windows"] == outcome["windows"]
     journal = (folder / "run" / "drive.ndjson").read_text()
     switched = [
-        one for one in json.loads(over.stdout)["windows"] if one["reason"] is None
+        row for row in json.loads(over.stdout)["windows"] if row["reason"] is None
     ]
     written = read_windows(journal, "drive.ndjson")
     assert np.array(written) == pytest.approx(
-        np.array([(one["tr"], one["td"]) for one in switched]), abs=0.0021
+        np.array([(row["tr"], row["td"]) for row in switched]), abs=0.0021
     )
 
 
@@ -147,31 +156,31 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
     whole: tuple[Path, dict[str, object]],
     fault: str,
 ) -> None:
-    """A disk that was full, a machine that is busy, a solver that fails once: its history is the same, bit by bit."""
+    """After a full disk, on a slow machine, or after a solver error, the history is the same bit by bit."""
     monkeypatch.setenv("D2RPICK_FAKE", fault)
-    found = run(*asked(tmp_path))
+    result = run(*prepare_drive(tmp_path))
     if fault == "fail":
-        assert found.exit_code == 2
-        assert "strip_0002.out: the solver failed" in found.stderr
-        assert "NEGATIVE VOLUME" in found.stderr
+        assert result.exit_code == 2
+        assert "strip_0002.out: the solver failed" in result.stderr
+        assert "NEGATIVE VOLUME" in result.stderr
         monkeypatch.delenv("D2RPICK_FAKE")
-        found = run(*asked(tmp_path, "--resume"))
+        result = run(*prepare_drive(tmp_path, "--resume"))
     if (
         fault == "damaged"
     ):  # leg 4 fails on its restart, and only a second time tells that this is why
-        assert "strip_0004.out: the solver failed" in found.stderr
-        found = run(*asked(tmp_path, "--resume"))
+        assert "strip_0004.out: the solver failed" in result.stderr
+        result = run(*prepare_drive(tmp_path, "--resume"))
         assert (
             "leg 4 failed again before its first state: the leg before it is computed again"
-            in found.stderr
+            in result.stderr
         )
     if fault in ("empty", "cut"):
         assert (
             "leg 3: it left no whole restart or history, and is begun again"
-            in found.stderr
+            in result.stderr
         )
-    check(json.loads(found.stdout), tmp_path)
-    assert histories(tmp_path) == histories(whole[0])
+    check_finished_run(json.loads(result.stdout), tmp_path)
+    assert read_histories(tmp_path) == read_histories(whole[0])
 
 
 @pytest.mark.slow
@@ -184,7 +193,7 @@ def test_a_driver_that_is_ended_loses_nothing_but_its_leg(
     tmp_path: Path, ended: signal.Signals, whole: tuple[Path, dict[str, object]]
 ) -> None:
     words, slow = (
-        [sys.executable, "-m", "d2rpick", *asked(tmp_path)],
+        [sys.executable, "-m", "d2rpick", *prepare_drive(tmp_path)],
         {**os.environ, "D2RPICK_FAKE": "slow"},
     )
     begun, lock = tmp_path / "run" / "stripT03", tmp_path / "run" / ".solver.lock"
@@ -197,16 +206,16 @@ def test_a_driver_that_is_ended_loses_nothing_but_its_leg(
     if ended is not signal.SIGKILL:
         with pytest.raises(ProcessLookupError):  # the solver has ended with it
             os.killpg(int(lock.read_text()), 0)
-    found = run(*asked(tmp_path, "--resume", "-q"))
-    assert not found.stderr
-    check(json.loads(found.stdout), tmp_path)
-    assert histories(tmp_path) == histories(whole[0])
+    result = run(*prepare_drive(tmp_path, "--resume", "-q"))
+    assert not result.stderr
+    check_finished_run(json.loads(result.stdout), tmp_path)
+    assert read_histories(tmp_path) == read_histories(whole[0])
 
 
 @pytest.mark.slow
 def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
     words, hangs = (
-        [sys.executable, "-m", "d2rpick", *asked(tmp_path)],
+        [sys.executable, "-m", "d2rpick", *prepare_drive(tmp_path)],
         {**os.environ, "D2RPICK_FAKE": "hang"},
     )
     begun, lock = tmp_path / "run" / "strip_0002.out", tmp_path / "run" / ".solver.lock"
@@ -223,22 +232,26 @@ def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
 def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     tmp_path: Path, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    """Restarts that are damaged meanwhile: it goes on from an earlier one, in the end from that of the starter."""
+    """If restart files are damaged, the run continues from an earlier one, in the end from that of the starter."""
     shutil.copytree(whole[0] / "deck", tmp_path / "deck")
     shutil.copytree(whole[0] / "run", tmp_path / "run")
     journal = tmp_path / "run" / "drive.ndjson"
     lines = journal.read_bytes().splitlines(keepends=True)
-    ends = [place for place, line in enumerate(lines) if b'"event": "ended"' in line]
+    ends = [
+        line_number
+        for line_number, line in enumerate(lines)
+        if b'"event": "ended"' in line
+    ]
     journal.write_bytes(b"".join(lines[: ends[-2] + 1]))
     for path in (tmp_path / "run").glob("strip_00[0-9][1-9]_0001.rst"):
         path.write_bytes(b"")
-    found = run(*asked(tmp_path, "--resume"))
+    result = run(*prepare_drive(tmp_path, "--resume"))
     assert (
         "the restart of the last leg is not whole: the run goes back to 0"
-        in found.stderr
+        in result.stderr
     )
-    check(json.loads(found.stdout), tmp_path)
-    assert histories(tmp_path) == histories(whole[0])
+    check_finished_run(json.loads(result.stdout), tmp_path)
+    assert read_histories(tmp_path) == read_histories(whole[0])
 
 
 def test_silence_is_measured_by_what_the_solver_writes(tmp_path: Path) -> None:
@@ -274,15 +287,15 @@ def test_a_leg_is_not_begun_on_a_full_disk(
 
 def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
     deck = "a b; rm -rf x_0001.rad"
-    given = engine.Commands(
+    commands = engine.Commands(
         engine="mpirun -np 2 'my engine' -i {deck} -nt {threads}", threads=4
     )
-    assert given.words("engine", deck) == [
+    assert commands.words("engine", deck) == [
         "mpirun", "-np", "2", "my engine", "-i", deck, "-nt", "4",
     ]  # fmt: skip
-    for wrong in ("engine", "engine '{deck}"):
+    for template in ("engine", "engine '{deck}"):
         with pytest.raises(D2RPickError):
-            engine.Commands(engine=wrong).words("engine", deck)
+            engine.Commands(engine=template).words("engine", deck)
 
 
 def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_first(
@@ -295,17 +308,17 @@ def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_firs
     assert solver.whole(0)
     assert solver.whole(1)
     assert not solver.whole(2)
-    own = (tmp_path / "strip_0001_0001.rst").read_bytes()
-    for wrong in (
+    content = (tmp_path / "strip_0001_0001.rst").read_bytes()
+    for bad_content in (
         b"",
-        own[:100],
-        own[: size // 2],
+        content[:100],
+        content[: size // 2],
         bytes(size),
-        own.replace(b"0001_", b"0002_"),
+        content.replace(b"0001_", b"0002_"),
     ):
-        (tmp_path / "strip_0001_0001.rst").write_bytes(wrong)
+        (tmp_path / "strip_0001_0001.rst").write_bytes(bad_content)
         assert not solver.whole(1)
-    (tmp_path / "strip_0001_0001.rst").write_bytes(own)
+    (tmp_path / "strip_0001_0001.rst").write_bytes(content)
     put(
         tmp_path / "strip_0000_0002.rst", b"strip_0000_0002.rst".ljust(size)
     )  # of two domains, one is missing
@@ -329,20 +342,20 @@ def test_of_a_listing_the_lines_with_the_error_are_told(tmp_path: Path) -> None:
         *(f" more {n}" for n in range(99)),
     ]
     put(tmp_path / "strip_0000.out", "\n".join(lines).encode())
-    told = engine.Solver(tmp_path, "strip").last_words(0)
-    assert told.startswith("** ERROR IN INPUT | LINE 12: NODE 7 IS NOT DEFINED")
+    last_words = engine.Solver(tmp_path, "strip").last_words(0)
+    assert last_words.startswith("** ERROR IN INPUT | LINE 12: NODE 7 IS NOT DEFINED")
 
 
 def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
     driving = Driving(
-        asked(tmp_path)[1],
+        prepare_drive(tmp_path)[1],
         tmp_path / "run",
         print,
         wait=WAIT,
-        starter=command("starter"),
-        engine=command("engine"),
+        starter=give_solver_command("starter"),
+        engine=give_solver_command("engine"),
     )
-    for wrong, message in (
+    for fault, message in (
         (errno.ENOSPC, "run: No space left on device; make room, then --resume"),
         (errno.EIO, "Input"),
     ):
@@ -350,17 +363,17 @@ def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
             pytest.raises((D2RPickError, OSError), match=message),
             driving.driver(resume=True),
         ):
-            raise OSError(wrong, os.strerror(wrong))
+            raise OSError(fault, os.strerror(fault))
 
 
 def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
     with Driving(
-        asked(tmp_path)[1],
+        prepare_drive(tmp_path)[1],
         tmp_path / "run",
         print,
         wait=WAIT,
-        starter=command("starter"),
-        engine=command("engine"),
+        starter=give_solver_command("starter"),
+        engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
         assert driver.progress(3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
@@ -375,11 +388,13 @@ WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
 
-@pytest.mark.parametrize(("seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)])
+@pytest.mark.parametrize(
+    ("swing_seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)]
+)
 def test_the_margin_is_the_least_one_where_nothing_vibrates(
-    seen: Findings, margin: float
+    swing_seen: Findings, margin: float
 ) -> None:
-    flown = Leg(Order(LOAD, 1, 0.0, 0.1), seen, 1000)
+    flown = Leg(Order(LOAD, 1, 0.0, 0.1), swing_seen, 1000)
     probe = Leg(Order(PROBE, 2, 0.1, 1.0), Findings(contact=0.4), 100)
     assert find_window([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
         0.4 - margin
@@ -389,7 +404,7 @@ def test_the_margin_is_the_least_one_where_nothing_vibrates(
     ).td == pytest.approx(0.35)
 
 
-def probes(*ends: float, contact: float) -> list[Leg]:
+def make_probes(*ends: float, contact: float) -> list[Leg]:
     starts = [0.1, *ends[:-1]]
     orders = [
         Order(PROBE, number, *span)
@@ -399,25 +414,25 @@ def probes(*ends: float, contact: float) -> list[Leg]:
         FLOWN,
         *(
             Leg(
-                one,
-                Findings(contact=contact if one.until > contact else None),
+                order,
+                Findings(contact=contact if order.until > contact else None),
                 100,
                 0.1,
             )
-            for one in orders
+            for order in orders
         ),
     ]
 
 
 def test_a_run_goes_on_from_the_last_leg_of_a_probe_that_ended_before_td() -> None:
-    assert choose_next_leg(probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
+    assert choose_next_leg(make_probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
         RIGID, 4, 0.3, 0.39
     )
-    legs = probes(0.2, 0.39, 0.45, contact=0.4)  # which ended at td
-    after = choose_next_leg(legs, WITHIN)
-    assert after
-    assert (after.kind, after.number, after.start) == (LOAD, 4, 0.39)
-    assert choose_next_leg(probes(0.45, contact=0.4), WITHIN) == Order(
+    legs = make_probes(0.2, 0.39, 0.45, contact=0.4)  # which ended at td
+    next_leg = choose_next_leg(legs, WITHIN)
+    assert next_leg
+    assert (next_leg.kind, next_leg.number, next_leg.start) == (LOAD, 4, 0.39)
+    assert choose_next_leg(make_probes(0.45, contact=0.4), WITHIN) == Order(
         RIGID, 2, 0.1, 0.39
     )
 
@@ -430,9 +445,9 @@ def test_a_probe_goes_on_from_its_own_restarts_to_the_end_of_the_run() -> None:
         legs.append(Leg(order, Findings(), 100, 0.1))
     assert legs[-1].order.until == WITHIN.end
     assert len(legs) < 12
-    assert [(one.tr, one.td, one.contact) for one in windows(legs, WITHIN)] == [
-        (0.1, 1.0, None)
-    ]
+    assert [
+        (window.tr, window.td, window.contact) for window in windows(legs, WITHIN)
+    ] == [(0.1, 1.0, None)]
 
 
 def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have_become_rigid() -> (
@@ -443,13 +458,13 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
         (0.09, "half swings"),
         (0.109, "begins before tr"),
     ):
-        legs = probes(0.2, contact=contact)
+        legs = make_probes(0.2, contact=contact)
         (window,) = windows(legs, WITHIN)
         assert reason in str(window.reason)
-        after = choose_next_leg(legs, WITHIN)
-        assert after
-        assert (after.kind, after.number, after.start) == (LOAD, 2, 0.1)
-        again = Leg(after, SWINGS, 1000, 1.0)  # the same flight is not tried again
+        next_leg = choose_next_leg(legs, WITHIN)
+        assert next_leg
+        assert (next_leg.kind, next_leg.number, next_leg.start) == (LOAD, 2, 0.1)
+        again = Leg(next_leg, SWINGS, 1000, 1.0)  # the same flight is not tried again
         following = choose_next_leg([*legs, again], WITHIN)
         assert following
         assert following.kind == LOAD
@@ -457,13 +472,13 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
 
 @given(
     wait=floats(1e-3, 0.3),
-    shown=lists(tuples(floats(0.0, 1.0), booleans()), min_size=200, max_size=200),
+    evidence=lists(tuples(floats(0.0, 1.0), booleans()), min_size=200, max_size=200),
 )
 def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_solver_has(
-    wait: float, shown: list[tuple[float, bool]]
+    wait: float, evidence: list[tuple[float, bool]]
 ) -> None:
     legs: list[Leg] = []
-    for share, flies in shown:
+    for share, flies in evidence:
         order = choose_next_leg(legs, WITHIN)
         if order is None:
             break
@@ -491,7 +506,7 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "more", "message"),
+    ("old", "new", "options", "message"),
     [
         (
             "/RWALL/PLANE/8",
@@ -535,31 +550,31 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
     ],
 )
 def test_what_a_run_lacks_is_told_before_anything_is_computed(
-    tmp_path: Path, old: str, new: str, more: list[str], message: str
+    tmp_path: Path, old: str, new: str, options: list[str], message: str
 ) -> None:
-    words, deck = asked(tmp_path), tmp_path / "deck" / "strip_0000.rad"
+    words, deck = prepare_drive(tmp_path), tmp_path / "deck" / "strip_0000.rad"
     text = deck.read_text()
     assert not old or old in text
     deck.write_text(text.replace(old, new) if old else text)
-    assert message in refused(*words, *more)
+    assert message in read_refusal(*words, *options)
     assert not (tmp_path / "run").exists()
-    if "--engine" in more:
-        assert "missing   /no/such/engine" in run(*words, *more, "--dry-run").stdout
+    if "--engine" in options:
+        assert "missing   /no/such/engine" in run(*words, *options, "--dry-run").stdout
     else:
-        assert message in refused(*words, *more, "--dry-run")
+        assert message in read_refusal(*words, *options, "--dry-run")
 
 
 def test_a_command_that_is_corrected_is_not_one_that_has_begun(tmp_path: Path) -> None:
     broken = put(tmp_path / "broken", b"#!/bin/sh\nexit 3\n")
     broken.chmod(0o755)
-    failed = run(*asked(tmp_path), "--starter", f"{broken} {{deck}}")
+    failed = run(*prepare_drive(tmp_path), "--starter", f"{broken} {{deck}}")
     assert "the starter failed" in failed.stderr
     with Driving(
-        asked(tmp_path)[1],
+        prepare_drive(tmp_path)[1],
         tmp_path / "run",
         print,
         wait=WAIT,
-        starter=command("starter"),
-        engine=command("engine"),
+        starter=give_solver_command("starter"),
+        engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
         assert not driver.legs

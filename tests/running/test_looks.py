@@ -1,4 +1,4 @@
-"""What a look adds to those before: new states alone, or all of them where files were written anew."""
+"""What a look at growing files adds: only new states, or all states if files were written again."""
 
 import gzip
 from pathlib import Path
@@ -63,15 +63,17 @@ def test_files_that_were_written_anew_are_read_as_a_whole(
         first.write_bytes(LEGS[0][: len(LEGS[0]) // 2])
     elif changed == "other":
         first.write_bytes(LEGS[1])
-    left = names[:1]
-    states, follows = looks.new_states(left)
+    remaining_names = names[:1]
+    states, follows = looks.new_states(remaining_names)
     assert not follows
     assert states is not None
-    assert np.array_equal(states.time, open_run(left).history(Selection()).time)
+    assert np.array_equal(
+        states.time, open_run(remaining_names).history(Selection()).time
+    )
 
 
-def pushed_and_falling() -> Written:
-    """Three masses that are pushed for a tenth of the record and fall then, while they vibrate."""
+def make_falling_masses() -> Written:
+    """Return three vibrating masses that are pushed for 10 % of the record and then fall."""
     time = np.linspace(0.0, 1.0, 401)
     masses = np.array([3.0, 2.0, 1.0])
     swing = np.outer(np.sin(60 * time), [1.0, -1.0, 0.0])
@@ -88,7 +90,7 @@ SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
 
 
 def _find_state(data: bytes, share: float) -> int:
-    """End of a state of a glstat near a share of its length; of other contents the length itself."""
+    """Return the end of a glstat state near a share of the length; for other contents, the length itself."""
     size = int(share * len(data))
     end = data.find(b"\n dt of cycle", size)
     return end if end > 0 else size
@@ -98,7 +100,7 @@ def _find_state(data: bytes, share: float) -> int:
 def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
     tmp_path: Path, form: str
 ) -> None:
-    path = Path(FORMS[form](pushed_and_falling(), tmp_path))
+    path = Path(FORMS[form](make_falling_masses(), tmp_path))
     data, looks = path.read_bytes(), Looks(Selection())
     whole = open_run([str(path)]).history(Selection())
     times, energies = list[Samples](), list[Samples]()
@@ -125,8 +127,8 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
     tmp_path: Path,
 ) -> None:
-    """Its numbers are others than before, so that what was made of them does not count."""
-    run, looks = pushed_and_falling(), Looks(Selection())
+    """Its numbers change, so results derived from it are discarded."""
+    run, looks = make_falling_masses(), Looks(Selection())
     for last_energy in (7.0, 8.0):
         internal = run.internal[:200].copy()
         internal[-1] = last_energy
@@ -148,14 +150,24 @@ def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
 def test_the_events_of_a_file_that_grows_are_those_of_the_whole_file(
     tmp_path: Path, form: str
 ) -> None:
-    path = Path(FORMS[form](pushed_and_falling(), tmp_path))
+    path = Path(FORMS[form](make_falling_masses(), tmp_path))
     data = path.read_bytes()
-    whole = [one for one in Watch([str(path)], Selection()).news() if one.seen]
+    whole = [
+        watch_event
+        for watch_event in Watch([str(path)], Selection()).news()
+        if watch_event.seen
+    ]
     watch, events = Watch([str(path)], Selection()), list[Event]()
     first = data[: _find_state(data, 0.3)]
     for content in (first, *(data[: int(share * len(data))] for share in SHARES)):
         path.write_bytes(content)
         events += watch.news()
-    told = [one for one in events if one.event not in ("begun", "restart")]
-    assert told == [one for one in whole if one.event != "begun"]
-    assert "flight" in {one.event for one in told}
+    watch_events = [
+        watch_event
+        for watch_event in events
+        if watch_event.event not in ("begun", "restart")
+    ]
+    assert watch_events == [
+        watch_event for watch_event in whole if watch_event.event != "begun"
+    ]
+    assert "flight" in {watch_event.event for watch_event in watch_events}

@@ -1,4 +1,4 @@
-"""What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
+"""Warnings about parts that still vibrate when a body becomes rigid, from the flight so far and without td."""
 
 from functools import cache
 
@@ -11,42 +11,46 @@ from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.running.swing import find_swing
 from tests.command import ENERGY, ROOT, run
-from tests.energies import sure
-from tests.reading import read_history, solved
-from tests.records import table
+from tests.energies import require
+from tests.reading import read_history, read_solved
+from tests.records import make_table
 
 CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
 
 
 @cache
-def car() -> tuple[History, Drift]:
-    """A computed run, and how its bodies drift in its flight."""
-    history = solved("carT01.gz").history
-    (momenta,) = (one for one in history.momenta if one.parts is not None)
-    moving = tuple(sure(momenta.parts)[i] for i in momenta.moving)
-    return history, sure(
+def read_car_with_drift() -> tuple[History, Drift]:
+    """Return a computed run, and the drift of its bodies in the flight."""
+    history = read_solved("carT01.gz").history
+    (momenta,) = (
+        part_momenta
+        for part_momenta in history.momenta
+        if part_momenta.parts is not None
+    )
+    moving = tuple(require(momenta.parts)[i] for i in momenta.moving)
+    return history, require(
         find_drift_in_flight(history, Flight(FREE, TD, "momentum", moving))
     )
 
 
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
-    history, whole = car()
+    history, whole = read_car_with_drift()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
-    found = sure(find_swing(history, FREE, tr))
-    assert found.name == "engine"
-    assert error <= found.error <= 1.3 * error
+    swing = require(find_swing(history, FREE, tr))
+    assert swing.name == "engine"
+    assert error <= swing.error <= 1.3 * error
     # a flight of that length has a path of a hundred times the error, at the speed so far
     mean = float(np.interp(tr, whole.time, whole.path)) / (tr - float(whole.time[0]))
-    assert found.flight * mean == pytest.approx(100 * found.error, rel=0.05)
+    assert swing.flight * mean == pytest.approx(100 * swing.error, rel=0.05)
 
 
 @pytest.mark.parametrize("swings", [0.0, 0.004])
 def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     swings: float,
 ) -> None:
-    """They swing against each other at 25 Hz, fall, and do not turn; from an end of the swing it is twice as far."""
+    """The parts vibrate against each other at 25 Hz, fall, and do not rotate; from an extremum the error is doubled."""
     time, masses = np.linspace(0.0, 0.06, 241), np.array([30.0, 10.0])
     values = np.zeros((time.size, 2, 3))
     values[:, :, 2] = np.outer(-9.81 * time - 1.0, masses)
@@ -55,10 +59,12 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     momenta = Momenta(
         time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses
     )
-    found = sure(find_swing(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
-    assert found.name == "block"
-    assert found.error == pytest.approx(2 * swings, abs=1e-5)
-    assert "at most" in found.told
+    first_swing = require(
+        find_swing(make_table(time, np.zeros(time.size), momenta), 0.0, 0.06)
+    )
+    assert first_swing.name == "block"
+    assert first_swing.error == pytest.approx(2 * swings, abs=1e-5)
+    assert "at most" in first_swing.told
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
@@ -67,6 +73,6 @@ def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
 
 
 def test_an_advised_switch_says_it() -> None:
-    told = run("follow", "--once", "--exit-zero", "--wait", "0.024", str(CAR)).stdout
-    (switch,) = (line for line in told.splitlines() if "  switch  " in line)
+    result = run("follow", "--once", "--exit-zero", "--wait", "0.024", str(CAR)).stdout
+    (switch,) = (line for line in result.splitlines() if "  switch  " in line)
     assert "engine still swings" in switch

@@ -1,4 +1,4 @@
-"""A run that is watched: it has not begun, grows, is cut in a record, goes silent, starts again, ends."""
+"""Watching a run that has not begun, grows, is cut within a record, goes silent, restarts, or ends."""
 
 import gzip
 import os
@@ -20,11 +20,11 @@ LEGS = [
 WHOLE = Selection()
 
 
-def told(watch: Watch) -> list[str]:
-    return [one.event for one in watch.news()]
+def list_news(watch: Watch) -> list[str]:
+    return [event.event for event in watch.news()]
 
 
-def lasting(folder: Path) -> list[Event]:
+def watch_to_end(folder: Path) -> list[Event]:
     return list(follow([str(folder)], WHOLE, lasting=0.0))
 
 
@@ -43,39 +43,41 @@ def test_a_run_that_has_not_begun_says_so(folder: Path) -> None:
             "has not begun",
         )
     (folder / "runT01").write_bytes(b"")
-    assert lasting(folder)[-1].message == "has not begun"
+    assert watch_to_end(folder)[-1].message == "has not begun"
     (folder / "runT01").write_bytes(LEGS[0][:200])
-    assert lasting(folder)[-1].message.startswith("cannot be read yet")
+    assert watch_to_end(folder)[-1].message.startswith("cannot be read yet")
 
 
 def test_a_growing_family_is_told_once_and_as_a_whole(folder: Path) -> None:
-    watch, found = Watch([str(folder / "runT01")], WHOLE), list[str]()
+    watch, messages = Watch([str(folder / "runT01")], WHOLE), list[str]()
     for leg, data in enumerate(LEGS[:2], 1):
         for share in (0.37, 0.371, 0.8, 1.0):  # in the middle of records
             (folder / f"runT0{leg}").write_bytes(data[: int(share * len(data))])
-            found += told(watch)
-            assert told(watch) == []  # nothing new, nothing told
-    whole = [one.event for one in lasting(folder)[:-1]]
-    assert found == whole
-    assert found.count("flight") == 3
-    assert found.count("contact") == 2
+            messages += list_news(watch)
+            assert list_news(watch) == []  # nothing new, nothing told
+    whole = [event.event for event in watch_to_end(folder)[:-1]]
+    assert messages == whole
+    assert messages.count("flight") == 3
+    assert messages.count("contact") == 2
 
 
 def test_a_restart_is_told_with_the_contact_that_it_takes_back(folder: Path) -> None:
     watch = Watch([str(folder)], WHOLE)
     (folder / "runT01").write_bytes(LEGS[0])
     (folder / "runT02").write_bytes(LEGS[1])
-    before = list(watch.news())
+    events_before = list(watch.news())
     (folder / "runT02").unlink()
     (folder / "runT01").write_bytes(LEGS[0][: len(LEGS[0]) // 2])
-    after = list(watch.news())
-    assert [one.event for one in after] == ["restart", "expected"]
-    assert after[1].time == next(one.time for one in before if one.event == "contact")
+    events_after = list(watch.news())
+    assert [event.event for event in events_after] == ["restart", "expected"]
+    assert events_after[1].time == next(
+        event.time for event in events_before if event.event == "contact"
+    )
     (folder / "runT01").write_bytes(LEGS[0])
     (folder / "runT02").write_bytes(LEGS[1])
     again = list(watch.news())
     assert again[0].event == "contact"
-    assert again == before[-len(again) :]
+    assert again == events_before[-len(again) :]
 
 
 def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(
@@ -83,12 +85,12 @@ def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(
 ) -> None:
     watch = Watch([str(folder)], WHOLE)
     (folder / "runT01").write_bytes(LEGS[0])
-    assert "silent" not in told(watch)
+    assert "silent" not in list_news(watch)
     for age, expected in ((50, []), (70, ["silent"]), (100, []), (150, ["silent"])):
         then = time.time() - age
         os.utime(folder / "runT01", (then, then))
         watch._files = [(name, os.stat(name)) for name, _ in watch._files]  # noqa: PTH116  written then
-        assert told(watch) == expected
+        assert list_news(watch) == expected
 
 
 @pytest.mark.parametrize(
@@ -104,14 +106,16 @@ def test_the_listing_says_how_a_run_has_ended(
 ) -> None:
     (folder / "runT01").write_bytes(LEGS[0])
     (folder / "run_0001.out").write_text(listing)
-    events = [one.event for one in lasting(folder)]
-    assert [one for one in events if one in ("ended", "failed")] == [event] * (
-        event is not None
-    )
+    events = [watch_event.event for watch_event in watch_to_end(folder)]
+    assert [
+        watch_event for watch_event in events if watch_event in ("ended", "failed")
+    ] == [event] * (event is not None)
     (folder / "run_0002.rad").write_text(
         "/RUN/run/2\n1.0\n"
     )  # a leg that is still to come
-    assert not {*(one.event for one in lasting(folder))} & {"ended"}
+    assert not {*(watch_event.event for watch_event in watch_to_end(folder))} & {
+        "ended"
+    }
 
 
 def test_looks_cost_one_percent_of_a_core(folder: Path) -> None:
@@ -124,7 +128,7 @@ def test_looks_cost_one_percent_of_a_core(folder: Path) -> None:
             (folder / "run_0001.out").write_text("NORMAL TERMINATION")
             (folder / "runT01").write_bytes(LEGS[0][:-1])
 
-    assert [one.event for one in follow([str(folder)], WHOLE, rest=rest)][-2:] == [
+    assert [event.event for event in follow([str(folder)], WHOLE, rest=rest)][-2:] == [
         "ended",
         "state",
     ]
@@ -138,11 +142,11 @@ def test_what_cannot_be_read_and_is_not_written_to_any_more_is_an_error(
     (folder / "runT01").write_bytes(LEGS[0][:200])
     os.utime(folder / "runT01", (1e9, 1e9))
     with pytest.raises(D2RPickError, match="runT01"):
-        lasting(folder)
+        watch_to_end(folder)
 
 
 def test_several_runs_in_a_folder_are_refused(folder: Path) -> None:
     for name in ("aT01", "bT01"):
         (folder / name).write_bytes(LEGS[0])
     with pytest.raises(D2RPickError, match="several runs"):
-        lasting(folder)
+        watch_to_end(folder)

@@ -1,4 +1,4 @@
-"""Events of a run so far: a made body that swings, is pushed, flies and lands, as long as one likes."""
+"""Events of a run so far, for a synthetic body that vibrates, is pushed, flies and lands."""
 
 from functools import cache
 
@@ -7,9 +7,9 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
 from d2rpick.running.events import find_events
-from tests.energies import sure
-from tests.records import table, until
-from tests.running.seen import seen_in
+from tests.energies import require
+from tests.records import cut_history, make_table
+from tests.running.seen import take_whole_record
 
 # Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
 PUSHES = ((0.1, 0.13), (0.17, 0.2), (0.62, 0.66))
@@ -17,7 +17,7 @@ PERIOD, STEP, END = 0.12, 1e-3, 0.8
 
 
 @cache
-def made(gravity: float = 9.81) -> History:
+def make_pushed_history(gravity: float = 9.81) -> History:
     time = np.arange(0.0, END, STEP)
     force = np.zeros(time.size)
     for start, end in PUSHES:
@@ -38,26 +38,30 @@ def made(gravity: float = 9.81) -> History:
         kinetic,
         sliding=np.concatenate([[0.0], np.cumsum(force[1:] ** 2) * 1e-6]),
     )
-    return table(time, energy, whole, balance=balance)
+    return make_table(time, energy, whole, balance=balance)
 
 
-def told(
+def list_events(
     history: History, wait: float | None = None
 ) -> list[tuple[str, float | None, float | None]]:
-    return [one[:3] for one in find_events(*seen_in(history, wait))]
+    return [event[:3] for event in find_events(*take_whole_record(history, wait))]
 
 
 def test_a_gap_between_two_pushes_is_no_flight() -> None:
-    """It lasts for 40 ms, half of the period for 60."""
-    found = find_events(*seen_in(made()))
-    events = [one.event for one in found if one.event in ("flight", "contact")]
+    """The gap lasts 40 ms; half of the vibration period is 60 ms."""
+    found_events = find_events(*take_whole_record(make_pushed_history()))
+    events = [
+        event.event for event in found_events if event.event in ("flight", "contact")
+    ]
     assert events == ["flight", "contact", "flight", "contact", "flight"]
-    first, last, _ = [one for one in found if one.event == "flight"]
+    first, last, _ = [event for event in found_events if event.event == "flight"]
     assert first.time == 0.0
-    assert abs(sure(last.time) - PUSHES[1][1]) <= 3 * STEP
-    assert 0.05 <= sure(last.wait) <= 0.07
+    assert abs(require(last.time) - PUSHES[1][1]) <= 3 * STEP
+    assert 0.05 <= require(last.wait) <= 0.07
     contacts = [
-        one.time for one in found if one.event == "contact" and one.time is not None
+        event.time
+        for event in found_events
+        if event.event == "contact" and event.time is not None
     ]
     assert np.allclose(contacts, [PUSHES[0][0], PUSHES[2][0]], atol=3 * STEP)
 
@@ -67,9 +71,12 @@ def test_a_gap_between_two_pushes_is_no_flight() -> None:
 def test_the_events_of_a_run_so_far_are_the_first_of_all(
     state: int, wait: float | None
 ) -> None:
-    whole, now = told(made(), wait), float(made().time[state])
-    assert told(until(made(), now), wait) == [
-        one for one in whole if one[2] is not None and one[2] <= now
+    whole, end_of_file = (
+        list_events(make_pushed_history(), wait),
+        float(make_pushed_history().time[state]),
+    )
+    assert list_events(cut_history(make_pushed_history(), end_of_file), wait) == [
+        event for event in whole if event[2] is not None and event[2] <= end_of_file
     ]
 
 
@@ -78,13 +85,17 @@ def test_the_events_of_a_run_so_far_are_the_first_of_all(
 def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
     state: int,
 ) -> None:
-    history = until(made(), float(made().time[state])) if state > 20 else made()
-    for one in find_events(*seen_in(history)):
-        if one.event == "switch" and one.tr is not None and one.tr > PUSHES[1][1]:
-            assert not any(start <= one.tr <= end for start, end in PUSHES)
-            assert history.energy_at(one.tr) >= 0.7 * 50
+    history = (
+        cut_history(make_pushed_history(), float(make_pushed_history().time[state]))
+        if state > 20
+        else make_pushed_history()
+    )
+    for event in find_events(*take_whole_record(history)):
+        if event.event == "switch" and event.tr is not None and event.tr > PUSHES[1][1]:
+            assert not any(start <= event.tr <= end for start, end in PUSHES)
+            assert history.energy_at(event.tr) >= 0.7 * 50
 
 
 def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
-    found = find_events(*seen_in(made(5.0), 0.06))
-    assert "flight" not in {one.event for one in found}
+    events = find_events(*take_whole_record(make_pushed_history(5.0), 0.06))
+    assert "flight" not in {event.event for event in events}

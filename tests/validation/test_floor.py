@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.command import ROOT
-from validation.figures import table
+from validation.figures import read_results
 from validation.floor import SCALES, TD, Motion, compare_motions
 
 DOCS = ROOT / "docs/explanation/validation.md"
@@ -41,7 +41,7 @@ def test_a_late_energy_differs_by_its_amplitude_at_most() -> None:
 
 
 def test_the_page_shows_the_floor_of_each_model() -> None:
-    rows = table("floor")
+    rows = read_results("floor")
     text = Path(DOCS).read_text("utf-8")
     number = r"([\d.]+) to ([\d.]+)"
     listed = re.findall(

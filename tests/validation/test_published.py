@@ -11,17 +11,20 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.report.formats import PLAIN
 from d2rpick.vibration.oscillator import Oscillator, Replay, State
 from tests import paper
-from tests.command import ENERGY, ROOT, answer, refused, run, unwrapped
+from tests.command import ENERGY, ROOT, join_wrapped_lines, read_refusal, run, run_json
 from tests.json_schemas import check_by_schema
 from validation.published import box, exhibits, saving, values
 from validation.published.drawing import draw_exhibit
-from validation.published.values import MISPRINTS, integrated, table
+from validation.published.values import MISPRINTS, integrate_replay, make_values_table
 
 SOLVER = str(ROOT / "sample_data" / "oscillator_solver.csv")
 RUN = str(ROOT / "sample_data" / "oscillator_solver_6_80.csv")
 ALL = {
     exhibit.name: exhibit
-    for exhibit in (*(make() for _, make in exhibits.exhibits_of({})), saving.exhibit())
+    for exhibit in (
+        *(make() for _, make in exhibits.list_exhibits({})),
+        saving.make_saving_exhibit(),
+    )
 }
 
 
@@ -31,7 +34,7 @@ def test_the_oscillator_is_that_of_the_paper() -> None:
 
 
 def test_every_number_of_the_paper_and_every_reference_value_is_met() -> None:
-    rows = table()
+    rows = make_values_table()
     assert all(row.agrees for row in rows)
     assert all((row.published is None) != (row.reference is None) for row in rows)
     (read_off,) = [row for row in rows if row.published is not None]
@@ -44,33 +47,35 @@ def test_every_number_of_the_paper_and_every_reference_value_is_met() -> None:
 
 
 def test_what_a_solver_found_is_near() -> None:
-    solver = [row for row in table() if "OpenRadioss" in row.source]
+    solver = [row for row in make_values_table() if "OpenRadioss" in row.source]
     assert [abs(row.difference) < 0.006 for row in solver] == [True, True]
 
 
 def test_a_wrong_number_does_not_agree() -> None:
-    exact = next(row for row in table() if row.reference is not None)
+    exact = next(row for row in make_values_table() if row.reference is not None)
     assert exact.reference is not None
     assert replace(exact, reference=exact.reference * (1 + 1e-8)).agrees is False
 
 
 def test_the_better_pair_has_no_residual() -> None:
-    assert values.pair_at_peak() == pytest.approx(
+    assert values.find_pair_at_peak() == pytest.approx(
         (paper.BETTER_TR, paper.BETTER_TD), rel=1e-12
     )
-    assert values.residual(values.pair_at_peak()) < 1e-12
-    assert values.residual(values.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
+    assert values.compute_residual(values.find_pair_at_peak()) < 1e-12
+    assert values.compute_residual(values.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
-@pytest.mark.parametrize("known", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
+@pytest.mark.parametrize("true_states", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
 def test_integration_gives_the_states_that_were_computed_with_40_digits(
-    known: tuple[tuple[float, ...], ...],
+    true_states: tuple[tuple[float, ...], ...],
 ) -> None:
-    tr, td = (0.006, 0.08) if known is paper.SWITCHED_6_80 else (0.013, 0.064)
-    rows = np.array([row for row in known if row[0] not in (tr, td)])
-    found = integrated(Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td), rows[:, 0])
+    tr, td = (0.006, 0.08) if true_states is paper.SWITCHED_6_80 else (0.013, 0.064)
+    rows = np.array([row for row in true_states if row[0] not in (tr, td)])
+    states = integrate_replay(
+        Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td), rows[:, 0]
+    )
     np.testing.assert_allclose(
-        np.stack(found, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11
+        np.stack(states, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11
     )
 
 
@@ -82,7 +87,7 @@ def test_integration_and_closed_form_agree_for_any_damping_and_start(
     replay = Replay(oscillator, State.of(0.01, -0.02, 1.0, -3.0), 0.0, 0.02, 0.05)
     time = np.linspace(0.0, 0.1, 77)
     np.testing.assert_allclose(
-        integrated(replay, time)[:2], replay.motion(time)[:2], rtol=0, atol=1e-9
+        integrate_replay(replay, time)[:2], replay.motion(time)[:2], rtol=0, atol=1e-9
     )
 
 
@@ -90,7 +95,7 @@ def test_integration_of_times_before_the_switch_only() -> None:
     replay = Replay(paper.OSCILLATOR, paper.START, 0.0, 0.05, 0.06)
     time = np.array([0.0, 0.01])
     np.testing.assert_allclose(
-        integrated(replay, time).z, replay.reference(time).z, atol=1e-11
+        integrate_replay(replay, time).z, replay.reference(time).z, atol=1e-11
     )
 
 
@@ -150,11 +155,11 @@ def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_doe
     None
 ):
     columns = ALL["after-td"].columns
-    after = columns["time_ms"] > 1e3 * paper.BETTER_TD
-    wanted = columns["r_free_m"][after]
-    np.testing.assert_allclose(columns["r_better_m"][after], wanted, atol=1e-12)
+    after_td = columns["time_ms"] > 1e3 * paper.BETTER_TD
+    wanted = columns["r_free_m"][after_td]
+    np.testing.assert_allclose(columns["r_better_m"][after_td], wanted, atol=1e-12)
     assert (
-        np.abs(columns["r_published_m"][after] - wanted).max()
+        np.abs(columns["r_published_m"][after_td] - wanted).max()
         > 0.5 * np.abs(wanted).max()
     )
     assert ALL["after-td"].agrees is False
@@ -173,54 +178,56 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 @pytest.mark.slow
 def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     coarse = Parameters(mesh=4)
-    every = tuple(box.variants_of(coarse))
-    some = (
-        every[0],
-        every[2],
-        every[6],
-        every[-1],
+    all_variants = tuple(box.list_variants(coarse))
+    some_variants = (
+        all_variants[0],
+        all_variants[2],
+        all_variants[6],
+        all_variants[-1],
     )  # two that act after td, two before
-    assert [one.before for one in some] == [False, False, True, True]
-    made = {
+    assert [variant.before for variant in some_variants] == [False, False, True, True]
+    exhibits_by_name = {
         exhibit.name: exhibit
-        for exhibit in (make() for _, make in box.exhibits_of(coarse)[1:-1])
+        for exhibit in (make() for _, make in box.list_box_exhibits(coarse)[1:-1])
     }
-    made["variants"] = box.exhibit_of(box.tried(some))
-    assert [exhibit.figure for exhibit in made.values()] == [
+    exhibits_by_name["variants"] = box.make_variants_exhibit(
+        box.try_variants(some_variants)
+    )
+    assert [exhibit.figure for exhibit in exhibits_by_name.values()] == [
         "2a, b",
         "2c",
         "8",
         "section 4",
     ]
-    assert made["early"].agrees
+    assert exhibits_by_name["early"].agrees
     tr = next(
         name
-        for name in made["revised"].columns
+        for name in exhibits_by_name["revised"].columns
         if name.startswith("droll") and "70" not in name
     )
-    at_td = np.searchsorted(made["revised"].columns["time_ms"], 370.0)
-    assert abs(made["revised"].columns[tr][at_td]) < abs(
-        made["revised"].columns["droll_70_deg"][at_td]
+    at_td = np.searchsorted(exhibits_by_name["revised"].columns["time_ms"], 370.0)
+    assert abs(exhibits_by_name["revised"].columns[tr][at_td]) < abs(
+        exhibits_by_name["revised"].columns["droll_70_deg"][at_td]
     )
-    variants = made["variants"].columns
+    variants = exhibits_by_name["variants"].columns
     assert (
         np.ptp(variants["own_tr_ms"][:2]) < 1e-9
     )  # what acts after td leaves tr alone
     assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.ptp(variants["common_tr_ms"]) == 0
-    assert made["variants"].agrees
+    assert exhibits_by_name["variants"].agrees
     assert (
         f"tr = {variants['common_tr_ms'][0]:.1f} ms is still acceptable in all 4"
-        in made["variants"].found
+        in exhibits_by_name["variants"].found
     )
-    for exhibit in made.values():
+    for exhibit in exhibits_by_name.values():
         figure = draw_exhibit(exhibit)
         assert len(figure.axes) == sum(map(len, exhibit.panels))
 
 
 @pytest.mark.slow
 def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
-    place, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
+    folder, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
     sections = (
         "--section",
         "2",
@@ -231,19 +238,19 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
         "--report",
         str(page),
     )
-    result = run("reproduce", "--output-dir", str(place), *sections, "--solver", RUN)
+    result = run("reproduce", "--output-dir", str(folder), *sections, "--solver", RUN)
     assert result.exit_code == 0, result.stderr
-    names = {path.name for path in place.iterdir()}
+    names = {path.name for path in folder.iterdir()}
     drawn = ("masses", "response", "elements", "motion", "saving")
     expected = {
         f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")
     } - {"masses.csv", "elements.csv"}
     assert names == expected | {"README.md", "table.csv"}
-    assert all(misprint in unwrapped(result.stdout) for misprint in MISPRINTS)
-    index = (place / "README.md").read_text("utf-8")
+    assert all(misprint in join_wrapped_lines(result.stdout) for misprint in MISPRINTS)
+    index = (folder / "README.md").read_text("utf-8")
     assert all(f"{name}.svg" in index for name in drawn)
     assert page.read_text("utf-8").count("<figure>") == len(drawn)
-    columns = np.genfromtxt(place / "response.csv", delimiter=",", names=True)
+    columns = np.genfromtxt(folder / "response.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(
         columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"]
     )
@@ -253,7 +260,7 @@ def test_without_the_repository_a_line_says_what_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "validation.published", None)
-    assert "reproduce needs the folder validation of the repository" in refused(
+    assert "reproduce needs the folder validation of the repository" in read_refusal(
         "reproduce", "--output-dir", str(tmp_path / "paper")
     )
     assert not (tmp_path / "paper").exists()
@@ -283,35 +290,41 @@ def test_its_files_are_the_same_every_time_and_replaced_only_when_told(
     tmp_path: Path,
 ) -> None:
     whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
-    first = answer(*whole)
+    first = run_json(*whole)
     check_by_schema(first)
     assert first["better"]["residual"] < 1e-12
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert "the file exists" in refused(*whole)
+    contents_before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert "the file exists" in read_refusal(*whole)
     assert run(*whole, "--overwrite", "-q").exit_code == 0
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    assert {name.rpartition("/")[2] for name in first["files"]} == {*before}
+    assert {
+        path.name: path.read_bytes() for path in tmp_path.iterdir()
+    } == contents_before
+    assert {name.rpartition("/")[2] for name in first["files"]} == {*contents_before}
 
 
 def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "file").write_text("mine")
-    for place in (tmp_path / "file", tmp_path / "file" / "paper"):
-        assert "the folder cannot be created" in refused(
-            "reproduce", "--output-dir", str(place)
+    for path in (tmp_path / "file", tmp_path / "file" / "paper"):
+        assert "the folder cannot be created" in read_refusal(
+            "reproduce", "--output-dir", str(path)
         )
 
 
 def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None:
-    known = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
+    true_values = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
              for pair, rows in (("6, 80", paper.SWITCHED_6_80), ("13, 64", paper.SWITCHED_13_64))
              for row in rows for name, value in (("z", row[1]), ("y", row[2]), ("E", row[5]))}  # fmt: skip
-    assert {row.what: row.reference for row in table() if row.what in known} == known
+    assert {
+        row.what: row.reference
+        for row in make_values_table()
+        if row.what in true_values
+    } == true_values
 
 
 def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None:
-    assert "reference_m" in refused(
+    assert "reference_m" in read_refusal(
         "reproduce",
         "--output-dir",
         str(tmp_path / "paper"),
@@ -324,13 +337,17 @@ def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None
 
 def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
     tables = {
-        kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))
+        kind: read_named_columns(name)
+        for kind, name in (("pairs", SOLVER), ("run", RUN))
     }
-    made = {
+    exhibits_by_name = {
         exhibit.name: exhibit
-        for exhibit in (make() for _, make in exhibits.exhibits_of(tables))
+        for exhibit in (make() for _, make in exhibits.list_exhibits(tables))
     }
-    pairs, motion = made["solver"].columns, made["motion"].columns
+    pairs, motion = (
+        exhibits_by_name["solver"].columns,
+        exhibits_by_name["motion"].columns,
+    )
     scale = np.abs(pairs["reference_solver_m"]).max()
     for name in ("published", "better"):
         assert (
@@ -341,10 +358,10 @@ def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
             np.abs(motion[f"{name}_other_m"] - motion[f"{name}_closed_m"]).max()
             < 1e-4 * 0.053
         )
-    assert made["motion"].agrees
+    assert exhibits_by_name["motion"].agrees
 
 
-def named_columns(name: str) -> dict[str, np.ndarray]:
-    """Columns of a sample by their names."""
+def read_named_columns(name: str) -> dict[str, np.ndarray]:
+    """Return the columns of a sample by name."""
     rows = np.genfromtxt(name, delimiter=",", names=True)
     return {column: rows[column] for column in rows.dtype.names or ()}

@@ -1,4 +1,4 @@
-"""The runs of the solver that the documentation quotes: decks, legs, comparison, figures."""
+"""The solver runs quoted in the documentation: decks, restart segments, comparison, figures."""
 
 import os
 import re
@@ -9,7 +9,7 @@ import pytest
 
 from tests.command import ROOT
 from validation.compare import Run, compare, read
-from validation.figures import FIGURES, table
+from validation.figures import FIGURES, read_results
 from validation.models import MODELS
 from validation.run import run
 
@@ -45,7 +45,7 @@ def test_the_legs_follow_the_windows(
     legs = list(MODELS["OSC"].legs(windows))
     assert [leg.splitlines()[1] for leg in legs] == ends
     assert ["/DTIX" in leg for leg in legs] == rigid
-    assert ["/RBODY/OFF" in leg for leg in legs] == [not one for one in rigid]
+    assert ["/RBODY/OFF" in leg for leg in legs] == [not is_rigid for is_rigid in rigid]
     assert ["/INIV" in leg for leg in legs] == [True] + [False] * (len(legs) - 1)
 
 
@@ -54,10 +54,10 @@ def test_a_run_that_is_its_own_reference_has_no_deviation_and_a_late_landing_is_
 ):
     time = np.linspace(0, 1, 1001)
     reference = Run(time, 1 + np.sin(30 * time) ** 2, np.maximum(time - 0.8, 0.0))
-    found = compare(reference, reference, 0.5)
-    assert found.deviation == 0.0
-    assert found.mean_ratio == pytest.approx(1.0)
-    assert found.landing == pytest.approx(0.801, abs=1e-3)
+    comparison = compare(reference, reference, 0.5)
+    assert comparison.deviation == 0.0
+    assert comparison.mean_ratio == pytest.approx(1.0)
+    assert comparison.landing == pytest.approx(0.801, abs=1e-3)
     falling = reference._replace(internal=np.where(time < 0.81, 1e-18, 1.0))
     assert compare(falling, falling, 0.5).deviation is None
     late = compare(
@@ -85,16 +85,16 @@ def test_the_solver_confirms_the_better_pair_of_the_oscillator(tmp_path: Path) -
         read([str(leg) for leg in run(MODELS["OSC"], tmp_path / name, windows, solver)])
         for name, windows in (("reference", []), ("switched", [(0.013587, TD)]))
     )
-    found = compare(reference, switched, TD)
-    assert found.deviation is not None
-    assert found.deviation < 0.01
-    assert found.mean_ratio == pytest.approx(1.0, abs=0.02)
+    comparison = compare(reference, switched, TD)
+    assert comparison.deviation is not None
+    assert comparison.deviation < 0.01
+    assert comparison.mean_ratio == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_landings_of_plans_that_the_docs_sum_up_are_those_of_the_results_and_after_td() -> (
     None
 ):
-    rows = table("drop_plans")
+    rows = read_results("drop_plans")
     docs = (ROOT / "docs/explanation/validation-motion.md").read_text("utf-8")
     assert np.all(rows["td_s"] < rows["landing_s"])
     assert np.all(rows["tr_s"] < rows["td_s"])

@@ -1,4 +1,4 @@
-"""Validation of residuals by the motion of all nodes: the decks, the measures, and the results that the docs show."""
+"""Validation of residuals by the motion of all nodes: decks, measures, and the results shown in the docs."""
 
 import gzip
 import re
@@ -14,16 +14,16 @@ import d2rpick
 from d2rpick.deck import read_inventory
 from tests.command import ROOT
 from validation import vibration
-from validation.figures import RESULTS, absorbing_parts, table
+from validation.figures import RESULTS, find_absorbing_parts, read_results
 from validation.frame_deck import PARTS, Landing, mesh_frame, write_deck
 from validation.landing import Course, compare_landings
 from validation.nodes import (
     Motion,
     Nodes,
     compare_vibration,
+    compute_vibration_energy,
     read_nodes,
     remove_rigid_motion,
-    vibration_energy,
 )
 
 NODES = Nodes(
@@ -32,14 +32,14 @@ NODES = Nodes(
 )
 TIMES = np.linspace(0.0, 1.0, 7)
 VECTORS = arrays(float, 3, elements=st.floats(-5, 5, allow_nan=False))
-SWITCHED = table("vibration")[~np.isnan(table("vibration")["tr_s"])]
+SWITCHED = read_results("vibration")[~np.isnan(read_results("vibration")["tr_s"])]
 TOTALS = SWITCHED[SWITCHED["energy"] == "total"]
-PARTS_OF_LANDING = absorbing_parts(SWITCHED)
+PARTS_OF_LANDING = find_absorbing_parts(SWITCHED)
 DOCS = (ROOT / "docs/explanation/validation-vibration.md").read_text("utf-8")
 
 
-def moving(velocities: np.ndarray) -> Motion:
-    """Nodes at their places with constant velocities."""
+def move_nodes(velocities: np.ndarray) -> Motion:
+    """Return nodes at their positions with constant velocities."""
     return Motion(
         TIMES,
         *(
@@ -55,7 +55,7 @@ def test_a_rigid_motion_has_no_vibration(
 ) -> None:
     velocities = translation + np.cross(spin, NODES.places)
     np.testing.assert_allclose(
-        remove_rigid_motion(moving(velocities), NODES), 0.0, atol=1e-12
+        remove_rigid_motion(move_nodes(velocities), NODES), 0.0, atol=1e-12
     )
 
 
@@ -63,14 +63,18 @@ def test_a_rigid_motion_has_no_vibration(
 def test_what_is_left_has_no_momentum_and_does_not_depend_on_the_rigid_motion(
     velocities: np.ndarray, translation: np.ndarray, spin: np.ndarray
 ) -> None:
-    left = remove_rigid_motion(moving(velocities), NODES)
+    vibration_velocities = remove_rigid_motion(move_nodes(velocities), NODES)
     np.testing.assert_allclose(
-        np.einsum("n,tnx->tx", NODES.masses, left), 0.0, atol=1e-10
+        np.einsum("n,tnx->tx", NODES.masses, vibration_velocities), 0.0, atol=1e-10
     )
-    angular = np.einsum("n,tnx->tx", NODES.masses, np.cross(NODES.places, left))
+    angular = np.einsum(
+        "n,tnx->tx", NODES.masses, np.cross(NODES.places, vibration_velocities)
+    )
     np.testing.assert_allclose(angular, 0.0, atol=1e-10)
-    faster = moving(velocities + translation + np.cross(spin, NODES.places))
-    np.testing.assert_allclose(remove_rigid_motion(faster, NODES), left, atol=1e-10)
+    faster = move_nodes(velocities + translation + np.cross(spin, NODES.places))
+    np.testing.assert_allclose(
+        remove_rigid_motion(faster, NODES), vibration_velocities, atol=1e-10
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,10 +85,10 @@ def test_a_scaled_vibration_has_the_residual_of_its_factor(
     factor: float, residual: float, correlation: float
 ) -> None:
     velocities = np.random.default_rng(47).normal(size=(5, 3))
-    found = compare_vibration(
-        moving(velocities), moving(factor * velocities + (1.0, 2.0, 3.0)), NODES
+    comparison = compare_vibration(
+        move_nodes(velocities), move_nodes(factor * velocities + (1.0, 2.0, 3.0)), NODES
     )
-    assert found == pytest.approx((residual, correlation), abs=1e-12)
+    assert comparison == pytest.approx((residual, correlation), abs=1e-12)
 
 
 def test_the_vibration_energy_is_twice_the_kinetic_energy_without_the_rigid_motion() -> (
@@ -95,8 +99,8 @@ def test_the_vibration_energy_is_twice_the_kinetic_energy_without_the_rigid_moti
         (1.0, 0.0, 0.0),
         (-2.0, 0.0, 0.0),
     )  # on one line, with no momentum
-    assert vibration_energy(
-        moving(stretching + np.array([0.0, 0.0, 7.0])), NODES
+    assert compute_vibration_energy(
+        move_nodes(stretching + np.array([0.0, 0.0, 7.0])), NODES
     ) == pytest.approx(1 * 4 + 2 * 1)
 
 
@@ -116,9 +120,11 @@ def test_a_landing_compared_with_itself_differs_in_nothing_and_one_with_more_ene
         impulse=2 * course.impulse,
         places=NODES.places + 1,
     )
-    found = compare_landings(course, harder, ["parts"], NODES)
-    assert found[1:] == pytest.approx((0.1, 1.0, 3**0.5, 0.0), abs=1e-5)
-    assert found.energies["parts"] == pytest.approx((0.058, 0.1, 0.09, 10.0), abs=1e-3)
+    comparison = compare_landings(course, harder, ["parts"], NODES)
+    assert comparison[1:] == pytest.approx((0.1, 1.0, 3**0.5, 0.0), abs=1e-5)
+    assert comparison.energies["parts"] == pytest.approx(
+        (0.058, 0.1, 0.09, 10.0), abs=1e-3
+    )
 
 
 def test_the_frame_is_read_with_the_mass_of_its_cards_and_all_its_nodes(
@@ -156,8 +162,8 @@ def test_the_rollover_is_switched_whole_and_writes_all_its_nodes(
     whole, box = (read_inventory(str(path)) for path in (deck, plain))
     assert [body for body in box.ready if body] == [{1}, {3}]
     assert [body for body in whole.ready if body] == [{1, 2}, {3}]
-    own = np.union1d(whole.nodes_by_part[1], whole.nodes_by_part[2])
-    np.testing.assert_array_equal(np.sort(whole.watched), own)
+    nodes_of_parts = np.union1d(whole.nodes_by_part[1], whole.nodes_by_part[2])
+    np.testing.assert_array_equal(np.sort(whole.watched), nodes_of_parts)
 
 
 @pytest.mark.parametrize(
@@ -183,9 +189,9 @@ def test_without_the_solver_the_study_is_skipped(
 
 
 def test_every_residual_of_the_nodes_is_near_the_predicted_one() -> None:
-    off = np.abs(TOTALS["R_predicted"] - TOTALS["R_nodes"])
-    assert off[np.char.startswith(TOTALS["case"], "FRAME")].max() < 0.0125
-    assert off[TOTALS["case"] == "ROLL"].max() < 0.045
+    differences = np.abs(TOTALS["R_predicted"] - TOTALS["R_nodes"])
+    assert differences[np.char.startswith(TOTALS["case"], "FRAME")].max() < 0.0125
+    assert differences[TOTALS["case"] == "ROLL"].max() < 0.045
 
 
 @pytest.mark.parametrize(
@@ -223,8 +229,8 @@ def test_energies_after_the_landing_differ_with_the_root_of_the_worth_as_the_doc
             True,
             True,
         )
-    known = TOTALS[~np.isnan(TOTALS["R_predicted"])]
-    assert (known["R_nodes"] <= known["R_high"]).all()
+    compared_runs = TOTALS[~np.isnan(TOTALS["R_predicted"])]
+    assert (compared_runs["R_nodes"] <= compared_runs["R_high"]).all()
 
 
 def test_the_docs_show_what_differs_after_the_landing_by_the_worth() -> None:

@@ -1,4 +1,4 @@
-"""Linear structures whose motion is written down here in the coordinates of their modes, by no code of d2rpick."""
+"""Linear structures whose motion is computed here from their modes, independently of d2rpick."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from d2rpick.histories.history import Samples
 
 
 class LinearStructure(NamedTuple):
-    """Modes a exp(-g t) cos(w t + p) about a stretch, with the squares of the deformations for elastic energies."""
+    """Modes a exp(-g t) cos(w t + p) about a slow stretch; squared deformations are elastic energies."""
 
     amplitude: Samples
     damping: Samples
@@ -19,7 +19,7 @@ class LinearStructure(NamedTuple):
 
     @classmethod
     def draw(cls, seed: int, count: int) -> LinearStructure:
-        """Draw modes of their own damping."""
+        """Draw modes that each have their own damping."""
         random = np.random.default_rng(seed)
         rate = (
             2 * np.pi * np.cumprod(np.append(1.0, random.uniform(1.2, 1.7, count - 1)))
@@ -32,7 +32,7 @@ class LinearStructure(NamedTuple):
         )
 
     def deformations(self, time: Samples | float) -> Samples:
-        """Deformation of each mode, of the shape of ``time`` with an axis for modes before it."""
+        """Return the deformation of each mode, in the shape of ``time`` after an axis for modes."""
         reach = np.asarray(time)[np.newaxis]
         decay = self.amplitude[:, np.newaxis] * np.exp(
             -self.damping[:, np.newaxis] * reach
@@ -42,7 +42,7 @@ class LinearStructure(NamedTuple):
         )
 
     def kinetic_energies(self, time: Samples | float) -> Samples:
-        """Kinetic energy of each mode, of the shape of `deformations`."""
+        """Return the kinetic energy of each mode, in the shape of `deformations`."""
         reach = np.asarray(time)[np.newaxis]
         angle = self.rate[:, np.newaxis] * reach + self.phase[:, np.newaxis]
         decay = self.amplitude[:, np.newaxis] * np.exp(
@@ -56,15 +56,15 @@ class LinearStructure(NamedTuple):
         return np.asarray((speed / undamped) ** 2)
 
     def elastic_energy(self, time: Samples) -> Samples:
-        """Energy of all modes together, of the shape of ``time``."""
+        """Return the elastic energy of all modes, in the shape of ``time``."""
         return np.asarray(np.sum(self.deformations(time) ** 2, axis=0))
 
     def kinetic_energy(self, time: Samples) -> Samples:
-        """Kinetic energy of all modes together, of the shape of ``time``."""
+        """Return the kinetic energy of all modes, in the shape of ``time``."""
         return np.asarray(np.sum(self.kinetic_energies(time), axis=0))
 
     def residual(self, tr: Samples, td: Samples) -> Samples:
-        """Energy norm of what a switched run lacks at td, over that of the reference, for pairs of times."""
+        """Return R of pairs of times: energy norm of the missing motion at td over that of the reference vibration."""
         lack = np.sum((self.deformations(tr) - self.deformations(td)) ** 2, axis=0)
         kinetic, elastic = self.kinetic_energy(td), self.elastic_energy(td)
         return np.asarray(np.sqrt((lack + kinetic) / (kinetic + elastic)))

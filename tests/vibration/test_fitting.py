@@ -1,4 +1,4 @@
-"""What a fit leaves over: scatter or structure, and when a part of the samples is enough to tell."""
+"""Misfit of a fit: scatter or structure, and when a subset of the samples decides."""
 
 import numpy as np
 import pytest
@@ -20,18 +20,20 @@ from d2rpick.vibration.modes import compute_energy_and_jacobian
 S = np.linspace(0.0, 1.0, 20_000)
 
 
-def noise(size: int, seed: int = 14) -> np.ndarray:
-    """White noise of unit variance."""
+def draw_noise(size: int, seed: int = 14) -> np.ndarray:
+    """Return white noise of unit variance."""
     return np.random.default_rng(seed).standard_normal(size)
 
 
 def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
     wave = np.sin(40 * S)
     assert measure_structure(wave) == pytest.approx(np.sqrt(0.5), rel=0.05)
-    assert measure_structure(noise(S.size)) < 0.05
+    assert measure_structure(draw_noise(S.size)) < 0.05
     assert has_clear_structure(0.1 * wave, 1.0)
     assert not has_clear_structure(MAX_STRUCTURE * wave, 1.0)
-    assert not any(has_clear_structure(noise(2000, seed), 1.0) for seed in range(200))
+    assert not any(
+        has_clear_structure(draw_noise(2000, seed), 1.0) for seed in range(200)
+    )
 
 
 @pytest.mark.slow
@@ -39,14 +41,14 @@ def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
 def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(
     scatter: float,
 ) -> None:
-    one = np.exp(-S) * np.sin(20 * S) ** 2 + scatter * noise(S.size) / 4
-    two = one + 0.7 * np.exp(-S) * np.cos(33 * S) ** 2
-    many = (
+    one_mode = np.exp(-S) * np.sin(20 * S) ** 2 + scatter * draw_noise(S.size) / 4
+    two = one_mode + 0.7 * np.exp(-S) * np.cos(33 * S) ** 2
+    many_modes = (
         two
         + 0.6 * np.exp(-S) * np.sin(57 * S) ** 2
         + 0.5 * np.exp(-S) * np.sin(91 * S) ** 2
     )
-    for energy in (one, two, many):
+    for energy in (one_mode, two, many_modes):
         quick, full = identify(S, energy, quick=True), identify(S, energy)
         assert quick.describes_record == full.describes_record
         if full.describes_record:
@@ -63,7 +65,7 @@ def test_no_single_oscillator_is_hopeless_and_five_modes_are(
     def gives_up(energy: np.ndarray) -> bool:
         noisy = energy / np.ptp(energy) + scatter * float(
             np.std(energy / np.ptp(energy))
-        ) * noise(S.size)
+        ) * draw_noise(S.size)
         return (
             fit_few(Pencil.of(S, noisy).rates(), S, noisy, WITH_PRELOAD, HOPELESS)
             is None
@@ -83,35 +85,37 @@ def test_no_single_oscillator_is_hopeless_and_five_modes_are(
 
 
 def test_a_fit_that_leaves_another_mode_fails_early() -> None:
-    one = np.exp(-S) * np.sin(20 * S) ** 2
+    one_mode = np.exp(-S) * np.sin(20 * S) ** 2
     for share, follows in (
         (0.0, True),
         (0.05, False),
         (0.1, False),
     ):  # of the last four hundred samples show enough
-        two = one + share * np.exp(-S) * np.sin(33 * S) ** 2
+        two = one_mode + share * np.exp(-S) * np.sin(33 * S) ** 2
         poles = Pencil.of(S, two).rates()
-        few = fit_few(poles, S, two, VIBRATION, HOPELESS)
-        assert (fit(few, S, two, VIBRATION, HOPELESS) is not None) == follows
+        few_fit = fit_few(poles, S, two, VIBRATION, HOPELESS)
+        assert (fit(few_fit, S, two, VIBRATION, HOPELESS) is not None) == follows
         assert (
-            fit(few, S[:1500], two[:1500], VIBRATION) is not None
+            fit(few_fit, S[:1500], two[:1500], VIBRATION) is not None
         )  # asked for its misfit, none is held back
 
 
 def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_samples() -> (
     None
 ):
-    asked = []
+    decays_tried = []
 
     def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        asked.append(s.size)
+        decays_tried.append(s.size)
         return compute_energy_and_jacobian(parameters, s, VIBRATION)
 
     start = np.array([20.0, 1.0, 0.7, 0.7, 0.0, 0.0])
     for energy, all_of_them in (
-        (noise(S.size), False),
+        (draw_noise(S.size), False),
         (compute_energy_and_jacobian(start, S, VIBRATION)[0], True),
     ):
-        asked.clear()
+        decays_tried.clear()
         fit_all(start, model, S, energy, np.inf, slice(1))
-        assert (sum(asked) > 10 * S.size / 8 and max(asked) > 2048) == all_of_them
+        assert (
+            sum(decays_tried) > 10 * S.size / 8 and max(decays_tried) > 2048
+        ) == all_of_them

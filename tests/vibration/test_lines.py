@@ -1,4 +1,4 @@
-"""The lines of an energy, and what keeps them from being found."""
+"""Spectral lines of an energy, and reasons why they cannot be found."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.vibration.lines import Exponentials, fit_spectrum, make_even_grid, predict
-from tests.energies import sure
+from tests.energies import require
 from tests.vibration.linear_structure import LinearStructure
 
 TIME = np.linspace(0.0, 8.0, 1201)
@@ -19,15 +19,17 @@ def test_each_mode_has_a_line_at_twice_its_rate_and_decay(
     seed: int, count: int
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    found = sure(predict(make_even_grid(TIME, structure.elastic_energy(TIME))))
-    lines = found.spectrum.lines
+    predicted_lines = require(
+        predict(make_even_grid(TIME, structure.elastic_energy(TIME)))
+    )
+    lines = predicted_lines.spectrum.lines
     for rate, damping, amplitude in zip(
         structure.rate, structure.damping, structure.amplitude, strict=True
     ):
         nearest = int(np.argmin(np.abs(lines.poles - (-2 * damping + 2j * rate))))
         assert lines.poles[nearest].imag == pytest.approx(2 * rate, rel=1e-3)
         assert abs(lines.weights[nearest]) == pytest.approx(amplitude**2 / 2, rel=0.02)
-    assert found.missed < 0.05
+    assert predicted_lines.missed < 0.05
 
 
 def test_the_mean_over_a_block_of_a_wave_is_the_wave_with_a_gain() -> None:
@@ -37,16 +39,16 @@ def test_the_mean_over_a_block_of_a_wave_is_the_wave_with_a_gain() -> None:
     assert grid.size > 10
     expected = wave._replace(weights=wave.weights * grid.gain(wave.poles)).at(grid.time)
     np.testing.assert_allclose(grid.energy, expected, atol=1e-12)
-    found = fit_spectrum(grid, wave.poles, grid.span)
-    np.testing.assert_allclose(found.at(time), wave.at(time), atol=1e-9)
-    assert found.error < 1e-9
+    spectrum = fit_spectrum(grid, wave.poles, grid.span)
+    np.testing.assert_allclose(spectrum.at(time), wave.at(time), atol=1e-9)
+    assert spectrum.error < 1e-9
 
 
 def test_a_growing_pole_is_held_level_and_a_fast_decay_is_no_line() -> None:
     grid = make_even_grid(TIME, np.cos(20.0 * TIME))
-    found = fit_spectrum(grid, np.array([3.0 + 20.0j, -15.0 + 30.0j]), grid.span)
-    assert found.lines.poles.size == 1
-    assert found.lines.poles.real[0] == pytest.approx(0.2 / grid.span)
+    spectrum = fit_spectrum(grid, np.array([3.0 + 20.0j, -15.0 + 30.0j]), grid.span)
+    assert spectrum.lines.poles.size == 1
+    assert spectrum.lines.poles.real[0] == pytest.approx(0.2 / grid.span)
 
 
 @pytest.mark.parametrize(
@@ -60,10 +62,10 @@ def test_uneven_states_show_the_same_lines() -> None:
     structure = LinearStructure.draw(3, 2)
     random = np.random.default_rng(1)
     time = np.sort(random.uniform(0.0, 8.0, 1500))
-    found = sure(predict(make_even_grid(time, structure.elastic_energy(time))))
+    lines = require(predict(make_even_grid(time, structure.elastic_energy(time))))
     strongest = np.sort(
-        found.spectrum.lines.poles.imag[
-            np.argsort(-np.abs(found.spectrum.lines.weights))[:2]
+        lines.spectrum.lines.poles.imag[
+            np.argsort(-np.abs(lines.spectrum.lines.weights))[:2]
         ]
     )
     np.testing.assert_allclose(strongest, 2 * structure.rate, rtol=1e-3)
@@ -74,4 +76,4 @@ def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
     energy = np.where(
         TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME)
     )
-    assert sure(predict(make_even_grid(TIME, energy))).missed > 0.3
+    assert require(predict(make_even_grid(TIME, energy))).missed > 0.3

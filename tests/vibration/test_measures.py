@@ -8,7 +8,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Replay, make_from_mode, to_mode
 from tests import paper
-from tests.records import MODES, replayed_residual
+from tests.records import MODES, compute_replayed_residual
 
 
 @given(MODES, st.floats(0, 3), st.floats(0, 3))
@@ -32,14 +32,14 @@ def test_measures_by_formula_are_those_of_the_motion(
     assert replay.residual() == pytest.approx(
         measures.residual(lock_in, kinetic), abs=1e-6, rel=1e-7
     )
-    assert float(replayed_residual(mode, np.array([tr]), td)[0]) == pytest.approx(
-        replay.residual(), abs=1e-6, rel=1e-7
-    )
+    assert float(
+        compute_replayed_residual(mode, np.array([tr]), td)[0]
+    ) == pytest.approx(replay.residual(), abs=1e-6, rel=1e-7)
 
 
 def test_each_measure_has_a_column() -> None:
     mode, tr = to_mode(paper.OSCILLATOR, 6.0), np.array([0.01, 0.02])
-    found = measures.measured(
+    columns = measures.measured(
         mode,
         tr,
         paper.TD,
@@ -47,9 +47,9 @@ def test_each_measure_has_a_column() -> None:
         lambda error, *_: (error, error - 0.1, error + 0.1),
         of_parts=True,
     )
-    assert (*found,) == measures.Measured._fields
-    assert {column.shape for column in found.values()} == {tr.shape}
-    spread = measures.spread(5, [(np.array([3, 1]), found)])
+    assert (*columns,) == measures.Measured._fields
+    assert {column.shape for column in columns.values()} == {tr.shape}
+    spread = measures.spread(5, [(np.array([3, 1]), columns)])
     assert measures.compared(spread).tolist() == [False, True, False, True, False]
     assert spread["timing_tolerance"][[1, 3]].tolist() == [0.02, 0.01]
 
@@ -73,8 +73,8 @@ def test_the_timing_tolerance_is_where_the_error_has_grown(
     td = tr + window
     assume(float(mode.vibration_energy(td)) > 1e-6)
     tolerance = float(measures.timing_tolerance(mode, np.array([tr]), td)[0])
-    here = float(measures.lock_in_error(mode, tr, td))
-    grown = here + measures.TOLERATED_GROWTH
+    lock_in_at_tr = float(measures.lock_in_error(mode, tr, td))
+    grown = lock_in_at_tr + measures.TOLERATED_GROWTH
     inside = np.linspace(tr - tolerance, tr + tolerance, 501)[1:-1]
     assert (
         max(measures.lock_in_error(mode, float(t), td) for t in inside)

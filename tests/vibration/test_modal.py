@@ -1,4 +1,4 @@
-"""The residual of any pair from the energy alone: against the motion of the modes, and where it must be refused."""
+"""Residual of any pair from the energy alone, compared with the motion of the modes; and when it must be refused."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from d2rpick.vibration.modal import (
     confirm_by_kinetic_energy,
     identify_modal,
 )
-from tests.energies import of, sure
+from tests.energies import make_energy_history, require
 from tests.vibration.linear_structure import LinearStructure
 
 TIME = np.linspace(0.0, 9.0, 1801)
@@ -25,8 +25,8 @@ EVEN = np.linspace(0.0, 9.0, 40)
 PAIRS = np.array([(tr, td) for tr in EVEN for td in EVEN if tr < td]).T
 
 
-def residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
-    """What follows from the lock-in error and the kinetic share."""
+def compute_residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
+    """Return the residuals that follow from the lock-in error and the kinetic fraction."""
     return residual(lock_in_error(vibration, tr, td), kinetic_share(vibration, td))
 
 
@@ -36,11 +36,11 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(
     seed: int, count: int, static: float
 ) -> None:
     structure = LinearStructure.draw(seed, count)
-    found = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
-    assert found.signed, found.doubts
+    modal = require(identify_modal(TIME, structure.elastic_energy(TIME) + static))
+    assert modal.signed, modal.doubts
     true = structure.residual(*PAIRS)
-    assert np.sqrt(np.mean((residuals(found, *PAIRS) - true) ** 2)) < 0.02
-    _, low, high = found.residual_band(residuals(found, *PAIRS), *PAIRS)
+    assert np.sqrt(np.mean((compute_residuals(modal, *PAIRS) - true) ** 2)) < 0.02
+    _, low, high = modal.residual_band(compute_residuals(modal, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
 
 
@@ -55,10 +55,10 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(
         noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
     )
     clean, noisy = (
-        sure(identify_modal(TIME, one)) for one in (energy, energy + scatter)
+        require(identify_modal(TIME, record)) for record in (energy, energy + scatter)
     )
     true = structure.residual(*PAIRS)
-    _, low, high = noisy.residual_band(residuals(noisy, *PAIRS), *PAIRS)
+    _, low, high = noisy.residual_band(compute_residuals(noisy, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
     assert np.median(noisy.half_width(*PAIRS)) > np.median(clean.half_width(*PAIRS))
 
@@ -67,8 +67,8 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(
 @given(st.integers(0, 10**6), st.integers(1, 5))
 def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
     structure = LinearStructure.draw(seed, count)
-    internal = sure(identify_modal(TIME, structure.elastic_energy(TIME)))
-    kinetic = sure(
+    internal = require(identify_modal(TIME, structure.elastic_energy(TIME)))
+    kinetic = require(
         identify_modal(
             TIME,
             structure.kinetic_energy(TIME) + 40.0 * np.ones(TIME.size),
@@ -76,21 +76,27 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
         )
     )
     assert (
-        np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        np.sqrt(
+            np.mean(
+                (compute_residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2
+            )
+        )
         < 0.02
     )
-    both = sure(confirm_by_kinetic_energy(internal, kinetic))
-    assert both.second is kinetic.reading
-    assert np.all(both.half_width(*PAIRS) >= internal.half_width(*PAIRS))
+    confirmed = require(confirm_by_kinetic_energy(internal, kinetic))
+    assert confirmed.second is kinetic.reading
+    assert np.all(confirmed.half_width(*PAIRS) >= internal.half_width(*PAIRS))
 
 
 def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     structure = LinearStructure.draw(4, 3)
-    kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True))
+    kinetic = require(
+        identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True)
+    )
     flowing = (
         40.0 + 0.5 * np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)) / 5
     )
-    drifting = sure(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
+    drifting = require(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
     assert not drifting.signed
     assert confirm_by_kinetic_energy(drifting, None) is drifting
     calm = replace(drifting, doubts=drifting.doubts._replace(beyond=0.0))
@@ -101,7 +107,7 @@ def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
         )
         is not kinetic
     )
-    lacking = sure(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
+    lacking = require(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
     lacking = replace(lacking, doubts=calm.doubts)
     assert (
         confirm_by_kinetic_energy(lacking, kinetic) is lacking
@@ -114,16 +120,20 @@ def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
     structure = LinearStructure.draw(11, 3)
     about = structure.deformations(TIME)
     about[0] += stretch * structure.amplitude[0]
-    found = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
-    assert not found.reading.is_mode.all()
+    modal = require(identify_modal(TIME, np.sum(about**2, axis=0)))
+    assert not modal.reading.is_mode.all()
     assert (
-        np.sqrt(np.mean((residuals(found, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        np.sqrt(
+            np.mean(
+                (compute_residuals(modal, *PAIRS) - structure.residual(*PAIRS)) ** 2
+            )
+        )
         < 0.03
     )
 
 
-def rubbed() -> Samples:
-    """Energy of a mass that slides with friction on its spring: its swings fall by the same length each time."""
+def compute_rubbed_energy() -> Samples:
+    """Return the energy of a mass on a spring with dry friction: its amplitude drops by the same amount each cycle."""
     position, speed, step = 1.0, 0.0, 2e-3
     positions = []
     for _ in range(4500):
@@ -137,20 +147,20 @@ def rubbed() -> Samples:
 def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
     third: float, is_harmonic: bool
 ) -> None:
-    """Modes at twice and three times the rate of a weak one may begin in step with it."""
+    """Modes at twice and three times the frequency of a weak one may begin in phase with it."""
     energy = (
         np.cos(8 * TIME) ** 2
         + 0.3 * np.cos(16 * TIME) ** 2
         + third * np.cos(24 * TIME) ** 2
     )
-    found = sure(identify_modal(TIME, energy))
-    assert (found.doubts.refusal is not None) == is_harmonic
+    modal = require(identify_modal(TIME, energy))
+    assert (modal.doubts.refusal is not None) == is_harmonic
 
 
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
-        (rubbed()[::3], "predict|lines"),
+        (compute_rubbed_energy()[::3], "predict|lines"),
         (
             np.cumsum(np.random.default_rng(2).standard_normal(1500)),
             "predict|lines|mean",
@@ -160,8 +170,8 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
     ids=["friction", "random walk", "coarse"],
 )
 def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) -> None:
-    found = sure(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
-    refusal = sure(found.doubts.refusal)
+    modal = require(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
+    refusal = require(modal.doubts.refusal)
     assert any(word in refusal for word in reason.split("|")), refusal
 
 
@@ -171,8 +181,8 @@ def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) ->
     ids=["still", "no swing"],
 )
 def test_without_lines_there_are_no_modes(energy: Samples) -> None:
-    found = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
-    assert found is None or not found.signed
+    modal = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
+    assert modal is None or not modal.signed
     assert identify_modal(np.linspace(0.0, 1.0, 20), np.arange(20.0)) is None
 
 
@@ -182,41 +192,44 @@ def test_nothing_above_single_precision_is_no_vibration() -> None:
 
 
 STRUCTURE = LinearStructure.draw(21, 5)
-LOADED = of(
+LOADED = make_energy_history(
     np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME),
     TIME,
 )
 
 
-def true_residual(tr: float, td: float) -> float:
-    """R of one pair, by the motion."""
+def compute_true_residual(tr: float, td: float) -> float:
+    """Return R of one pair from the motion."""
     return float(STRUCTURE.residual(np.array([tr]), np.array([td]))[0])
 
 
 @pytest.mark.parametrize("td", [5.0, 6.3, 7.7, 8.6])
 def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
     answer = suggest(LOADED, td, Settings(after=1.0))
-    best = sure(answer.chosen)
+    best = require(answer.chosen)
     assert answer.situation.basis == "modal"
-    assert best.residual == pytest.approx(true_residual(best.tr, td), abs=0.02)
+    assert best.residual == pytest.approx(compute_true_residual(best.tr, td), abs=0.02)
     early = np.linspace(1.0, td - 0.25 * (td - 1.0), 2000)
     oracle = float(STRUCTURE.residual(early, np.full(early.size, td)).min())
-    assert true_residual(best.tr, td) < oracle + 0.03
+    assert compute_true_residual(best.tr, td) < oracle + 0.03
     verdict = verify(LOADED, best.tr, td, Settings(after=1.0))
     assert verdict.candidate.residual == pytest.approx(best.residual, abs=1e-9)
-    assert sure(verdict.quality).grade == sure(answer.quality).grade
+    assert require(verdict.quality).grade == require(answer.quality).grade
 
 
 def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> (
     None
 ):
     answer = suggest(LOADED, 7.7, Settings(after=1.0))
-    assert min(sure(one.residual) for one in answer.candidates) < 1
+    assert min(require(candidate.residual) for candidate in answer.candidates) < 1
     assert all(
-        sure(one.residual) <= 1.01 for one in answer.candidates if one.acceptable
+        require(candidate.residual) <= 1.01
+        for candidate in answer.candidates
+        if candidate.acceptable
     )
     worst = max(
-        np.linspace(1.1, 6.0, 500).tolist(), key=lambda tr: true_residual(tr, 7.7)
+        np.linspace(1.1, 6.0, 500).tolist(),
+        key=lambda tr: compute_true_residual(tr, 7.7),
     )
     verdict = verify(LOADED, worst, 7.7, Settings(after=1.0))
     assert not verdict.verified
@@ -227,7 +240,7 @@ def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there
 
 
 def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> None:
-    """At a td where nearly all energy is kinetic, no tr is better than a release without any vibration."""
+    """If nearly all energy is kinetic at td, no tr is better than a release without any vibration."""
     tds = np.linspace(4.0, 8.5, 600)
     share = STRUCTURE.kinetic_energy(tds) / (
         STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds)
@@ -236,11 +249,11 @@ def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> 
     situation = suggest(LOADED, td, Settings(after=1.0)).situation
     vibration = situation.vibration
     raised = replace(
-        vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4))
+        vibration, compared=require(vibration.compared)._replace(first=float(td - 0.4))
     )
-    for one in (vibration, raised):
-        if one.keeps_nothing:
-            moments = one.moments(0.2)
+    for record in (vibration, raised):
+        if record.keeps_nothing:
+            moments = record.moments(0.2)
             energies = STRUCTURE.elastic_energy(moments.tr)
             assert energies.min() < 0.2 * STRUCTURE.elastic_energy(TIME).max()
     assert situation.kinetic_share is not None
@@ -250,28 +263,28 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
     from tests.energies import suggest_in_window
 
     answer = suggest_in_window(LOADED, (4.0, 8.8), Settings(after=1.0))
-    best = sure(answer.recommended)
+    best = require(answer.recommended)
     assert best.rigid_time > 0.4 * (8.8 - 1.0)
-    assert true_residual(best.tr, best.td) == pytest.approx(
-        sure(best.residual), abs=0.02
+    assert compute_true_residual(best.tr, best.td) == pytest.approx(
+        require(best.residual), abs=0.02
     )
     for td in (5.0, 6.3, 7.7, 8.6):
-        other = suggest(LOADED, td, Settings(after=1.0)).recommended
+        suggestion = suggest(LOADED, td, Settings(after=1.0)).recommended
         assert (
-            sure(best.residual) <= sure(sure(other).residual) + 0.02
-            or sure(other).rigid_time < 3.9
+            require(best.residual) <= require(require(suggestion).residual) + 0.02
+            or require(suggestion).rigid_time < 3.9
         )
 
 
 def test_a_weak_mode_of_few_states_is_told_of() -> None:
-    """Its line holds too little for the strong ones, and shows that the record may hold faster ones unseen."""
+    """Its line is too weak for strong modes, and shows that faster modes may be invisible in the record."""
     for rate, is_coarse in ((3.3, False), (30.3, True)):
         time = np.linspace(0.0, 6.0, 1200)
         strong = np.cos(2 * np.pi * time) ** 2 + 0.7 * np.cos(14.3 * time) ** 2
         weak = 0.08 * np.cos(2 * np.pi * rate * time + 0.4) ** 2
-        found = sure(identify_modal(time, strong + weak))
-        assert found.doubts.coarse > 4.0
-        assert (found.states_per_period < 4.0) == is_coarse
+        modal = require(identify_modal(time, strong + weak))
+        assert modal.doubts.coarse > 4.0
+        assert (modal.states_per_period < 4.0) == is_coarse
 
 
 def test_a_profile_without_two_times_has_no_interval() -> None:

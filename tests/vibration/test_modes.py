@@ -1,4 +1,4 @@
-"""The closed form of a single-mode energy record."""
+"""Closed form of a single-mode energy history."""
 
 from collections.abc import Callable
 
@@ -56,8 +56,10 @@ def test_the_level_of_a_peak_is_crossed_before_it_but_not_at_it() -> None:
     assert max(crossings) < peak - 1e-3
 
 
-def slope(function: Callable[[Samples], Samples], mode: Mode) -> tuple[Samples, float]:
-    """Its central difference at T, and how exact that is for energies of the mode."""
+def estimate_slope(
+    function: Callable[[Samples], Samples], mode: Mode
+) -> tuple[Samples, float]:
+    """Return the central difference of ``function`` at T, and its accuracy for energies of the mode."""
     rate = mode.omega + mode.alpha
     h = 1e-5 / rate
     return (function(T + h) - function(T - h)) / (2 * h), 1e-6 * rate * float(
@@ -67,9 +69,9 @@ def slope(function: Callable[[Samples], Samples], mode: Mode) -> tuple[Samples, 
 
 @given(MODES)
 def test_velocity_is_the_slope_of_the_deformation(mode: Mode) -> None:
-    found, _ = slope(mode.deformation, mode)
+    numeric_slope, _ = estimate_slope(mode.deformation, mode)
     np.testing.assert_allclose(
-        found, mode.velocity(T), atol=1e-7 * np.max(np.abs(mode.velocity(T)))
+        numeric_slope, mode.velocity(T), atol=1e-7 * np.max(np.abs(mode.velocity(T)))
     )
     np.testing.assert_array_equal(
         mode.energy(T), mode.energy_plastic + mode.deformation(T) ** 2
@@ -78,8 +80,8 @@ def test_velocity_is_the_slope_of_the_deformation(mode: Mode) -> None:
 
 @given(MODES)
 def test_energies_are_elastic_and_kinetic_and_damping_takes_them(mode: Mode) -> None:
-    found, room = slope(mode.energy, mode)
-    np.testing.assert_allclose(found, mode.energy_slopes(T)[0], atol=room)
+    numeric_slope, room = estimate_slope(mode.energy, mode)
+    np.testing.assert_allclose(numeric_slope, mode.energy_slopes(T)[0], atol=room)
     elastic, kinetic = (
         np.sum((mode.amplitudes(T) - mode.preload) ** 2, axis=0),
         mode.kinetic_energy(T),
@@ -87,16 +89,20 @@ def test_energies_are_elastic_and_kinetic_and_damping_takes_them(mode: Mode) -> 
     np.testing.assert_allclose(
         mode.vibration_energy(T), elastic + kinetic, rtol=1e-9, atol=1e-12
     )
-    found, _ = slope(mode.vibration_energy, mode)
+    numeric_slope, _ = estimate_slope(mode.vibration_energy, mode)
     scale = (mode.omega + mode.alpha) * np.max(mode.vibration_energy(T))
-    np.testing.assert_allclose(found, -2 * mode.alpha * kinetic, atol=1e-6 * scale)
+    np.testing.assert_allclose(
+        numeric_slope, -2 * mode.alpha * kinetic, atol=1e-6 * scale
+    )
 
 
 @given(MODES)
 def test_the_second_slope_of_an_energy_is_that_of_its_first(mode: Mode) -> None:
-    found, room = slope(lambda t: mode.energy_slopes(t)[0], mode)
+    numeric_slope, room = estimate_slope(lambda t: mode.energy_slopes(t)[0], mode)
     np.testing.assert_allclose(
-        found, mode.energy_slopes(T)[1], atol=10 * room * (mode.omega + mode.alpha)
+        numeric_slope,
+        mode.energy_slopes(T)[1],
+        atol=10 * room * (mode.omega + mode.alpha),
     )
 
 

@@ -1,4 +1,4 @@
-"""Closed forms against independent numbers, scipy's integrator, and what mechanics says must hold."""
+"""Closed forms compared with independent numbers, scipy's integrator, and laws of mechanics."""
 
 from collections.abc import Callable
 
@@ -38,7 +38,7 @@ oscillators = st.builds(
 
 
 def scale(oscillator: Oscillator, start: State) -> float:
-    """Largest displacement and velocity that the motion can reach, for comparisons relative to it."""
+    """Return the largest displacement and velocity that the motion can reach, as a scale for errors."""
     return (
         float(
             np.sum(np.abs(start)) * max(1, oscillator.omega_0, 1 / oscillator.omega_0)
@@ -86,7 +86,7 @@ def test_free_motion_agrees_with_an_integrator(
         return [vz, vy, k * (y - z) / m - alpha * vz, -k * (y - z) / mass - alpha * vy]
 
     end = periods * 2 * np.pi / oscillator.omega_0
-    found = solve_ivp(
+    solution = solve_ivp(
         equations_of_motion,
         (0, end),
         list(start),
@@ -94,10 +94,10 @@ def test_free_motion_agrees_with_an_integrator(
         rtol=1e-12,
         atol=1e-14,
     )
-    assert found.success
+    assert solution.success
     room = 1e-9 * scale(oscillator, start)
     np.testing.assert_allclose(
-        np.stack(oscillator.free(start, end)), found.y[:, -1], atol=room, rtol=1e-9
+        np.stack(oscillator.free(start, end)), solution.y[:, -1], atol=room, rtol=1e-9
     )
 
 
@@ -154,19 +154,19 @@ def test_the_grid_gives_what_single_times_give(
 
 
 def test_the_loss_at_the_switch_is_the_vibration_part_of_the_kinetic_energy() -> None:
-    before = paper.OSCILLATOR.free(paper.START, 0.006)
-    after = paper.OSCILLATOR.rigid(before, 0.0)
-    lost = paper.OSCILLATOR.kinetic_energy(before) - paper.OSCILLATOR.kinetic_energy(
-        after
-    )
+    start_of_rigid = paper.OSCILLATOR.free(paper.START, 0.006)
+    rigid_state = paper.OSCILLATOR.rigid(start_of_rigid, 0.0)
+    lost = paper.OSCILLATOR.kinetic_energy(
+        start_of_rigid
+    ) - paper.OSCILLATOR.kinetic_energy(rigid_state)
     vibration = paper.OSCILLATOR.vibration_energy(
-        before
-    ) - paper.OSCILLATOR.internal_energy(before)
+        start_of_rigid
+    ) - paper.OSCILLATOR.internal_energy(start_of_rigid)
     assert float(lost) == pytest.approx(float(vibration), rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("make", "found"),
+    ("make", "error"),
     [
         (lambda: Oscillator(0.0, 1.0, 1.0), "^stiffness is "),
         (lambda: Oscillator(1.0, -1.0, 1.0), "^mass is "),
@@ -182,8 +182,8 @@ def test_the_loss_at_the_switch_is_the_vibration_part_of_the_kinetic_energy() ->
         ),
     ],
 )
-def test_what_is_no_motion_is_refused(make: Callable[[], object], found: str) -> None:
-    with pytest.raises(RangeError, match=found):
+def test_what_is_no_motion_is_refused(make: Callable[[], object], error: str) -> None:
+    with pytest.raises(RangeError, match=error):
         make()
 
 
@@ -207,19 +207,19 @@ def test_the_spring_back_is_the_published_formula() -> None:
     # (18) with beta = 2, from the state at td that (9)-(12) give
     tr, td, alpha, beta, omega = 0.006, 0.080, 50.0, 2.0, paper.OMEGA_2
     replay = Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td)
-    at = replay.motion(td)
+    state_at_td = replay.motion(td)
     tau = np.linspace(0, 0.07, 200)
     g = 1 - np.exp(-alpha * tau / 2) * (
         np.cos(omega * tau) + alpha / (2 * omega) * np.sin(omega * tau)
     )
-    drift = at.vz * (1 - np.exp(-alpha * tau)) / alpha
-    frozen = at.y - at.z
+    drift = state_at_td.vz * (1 - np.exp(-alpha * tau)) / alpha
+    frozen = state_at_td.y - state_at_td.z
     later = replay.motion(td + tau)
     np.testing.assert_allclose(
-        later.z, at.z + drift + beta * frozen / (1 + beta) * g, atol=1e-15
+        later.z, state_at_td.z + drift + beta * frozen / (1 + beta) * g, atol=1e-15
     )
     np.testing.assert_allclose(
-        later.y, at.y + drift - frozen / (1 + beta) * g, atol=1e-15
+        later.y, state_at_td.y + drift - frozen / (1 + beta) * g, atol=1e-15
     )
 
 
@@ -283,4 +283,6 @@ def test_the_grid_of_a_trajectory_ends_where_it_should() -> None:
 
 def test_an_oscillator_given_as_mode_has_its_energy() -> None:
     mode, time = to_mode(paper.OSCILLATOR, 6.0), np.linspace(0, 0.15, 400)
-    np.testing.assert_allclose(mode.energy(time), paper.energy(time), atol=1e-12)
+    np.testing.assert_allclose(
+        mode.energy(time), paper.compute_energy(time), atol=1e-12
+    )

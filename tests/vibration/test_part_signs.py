@@ -1,4 +1,4 @@
-"""Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
+"""Deformations of single parts: their signs, the residual that follows, and when they have no sign."""
 
 from copy import copy
 from dataclasses import replace
@@ -20,18 +20,18 @@ from d2rpick.vibration.model import SUNK
 from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, find_own_mode
 from d2rpick.vibration.waves import PartMotion, Waves, find_all_zeros, follow_waves
 from tests import chain
-from tests.benchmarks.promise_parts import Motion, history
+from tests.benchmarks.promise_parts import Motion, make_history_of_parts
 from tests.command import BOX
-from tests.energies import sure
-from tests.reading import solved
-from tests.records import noisy, printed
+from tests.energies import require
+from tests.reading import read_solved
+from tests.records import add_noise, round_as_printed
 
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")
 
 
-def two_springs(time: np.ndarray) -> np.ndarray:
-    """Signed deformations of two parts in which two modes mix, shape (n, 2)."""
+def move_two_springs(time: np.ndarray) -> np.ndarray:
+    """Return signed deformations of two parts in which two modes mix, shape (n, 2)."""
     slow, fast = (
         np.exp(-0.1 * time) * np.sin(5 * time),
         np.exp(-0.1 * time) * np.cos(8.3 * time),
@@ -39,18 +39,18 @@ def two_springs(time: np.ndarray) -> np.ndarray:
     return np.stack([slow + 0.7 * fast, 0.8 * slow - 0.9 * fast], axis=1)
 
 
-def deformations(parts: SignedParts, t: np.ndarray) -> np.ndarray:
-    """Signed deformations of whole parts, shape (k, n)."""
+def compute_deformations(parts: SignedParts, t: np.ndarray) -> np.ndarray:
+    """Return signed deformations of parts described by waves, shape (k, n)."""
     return np.array(
         [
-            one.model.deformation(t)
-            for one in parts.motions
-            if isinstance(one.model, Waves)
+            motion.model.deformation(t)
+            for motion in parts.motions
+            if isinstance(motion.model, Waves)
         ]
     )
 
 
-def of(deformation: np.ndarray, time: np.ndarray) -> History:
+def make_part_history(deformation: np.ndarray, time: np.ndarray) -> History:
     energies = deformation**2
     names = tuple(f"part {i}" for i in range(1, energies.shape[1] + 1))
     return History(
@@ -60,9 +60,9 @@ def of(deformation: np.ndarray, time: np.ndarray) -> History:
 
 
 @cache
-def seen(td: float) -> Situation:
-    """The chain from a td."""
-    return examine(chain.history(), td, PLAIN)
+def examine_chain_at(td: float) -> Situation:
+    """Return the situation of the chain at a td."""
+    return examine(chain.read_chain_history(), td, PLAIN)
 
 
 # ---- signs
@@ -71,17 +71,23 @@ def seen(td: float) -> Situation:
 @pytest.mark.parametrize("samples_per_period", [20, 150, 1000])
 def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     time = np.arange(0, 12, 2 * np.pi / 8.3 / samples_per_period)
-    true = two_springs(time)
-    found = SignedParts(time, printed(true.ravel() ** 2).reshape(true.shape), NAMES)
-    assert found.names == NAMES
-    known = (time > found.comparable_since(10.8)) & (time < 10.8)
-    for own, expected in zip(
-        deformations(found, time[known]), true.T[:, known], strict=True
+    true = move_two_springs(time)
+    signed_parts = SignedParts(
+        time, round_as_printed(true.ravel() ** 2).reshape(true.shape), NAMES
+    )
+    assert signed_parts.names == NAMES
+    comparable = (time > signed_parts.comparable_since(10.8)) & (time < 10.8)
+    for deformation, expected in zip(
+        compute_deformations(signed_parts, time[comparable]),
+        true.T[:, comparable],
+        strict=True,
     ):
-        wrong = np.sign(own) != np.sign(expected) * np.sign(own @ expected)
+        sign_differs = np.sign(deformation) != np.sign(expected) * np.sign(
+            deformation @ expected
+        )
         # a sample next to a zero may be taken for one on its other side
-        assert np.all(np.abs(expected[wrong]) < 0.1)
-    assert np.mean(known) > 0.85
+        assert np.all(np.abs(expected[sign_differs]) < 0.1)
+    assert np.mean(comparable) > 0.85
 
 
 @given(
@@ -98,13 +104,13 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
     td = 0.9 * time[-1]
     tr = tr / 6 * td
     deformation = np.exp(-damping * rate * time) * np.sin(rate * time + phase)
-    found = SignedParts(time, deformation[:, np.newaxis] ** 2, ["one"])
-    assert found.signed
-    assume(found.comparable_since(td) <= tr)
+    signed_parts = SignedParts(time, deformation[:, np.newaxis] ** 2, ["one"])
+    assert signed_parts.signed
+    assume(signed_parts.comparable_since(td) <= tr)
     true = np.interp([tr, td], time, deformation)
     assume(np.all(np.abs(true) > 0.1 * np.exp(-damping * rate * np.array([tr, td]))))
-    own = deformations(found, np.array([tr, td]))[0]
-    assert (own[0] * own[1] > 0) == (true[0] * true[1] > 0)
+    part_deformation = compute_deformations(signed_parts, np.array([tr, td]))[0]
+    assert (part_deformation[0] * part_deformation[1] > 0) == (true[0] * true[1] > 0)
 
 
 @pytest.mark.parametrize(
@@ -121,26 +127,30 @@ def test_a_part_that_does_not_swing_about_zero_has_no_sign(
     make: object, reason: str
 ) -> None:
     time = np.arange(0, 12, 0.02)
-    found = SignedParts(
+    signed_parts = SignedParts(
         time,
-        np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1),  # type: ignore[operator]
+        np.stack([move_two_springs(time)[:, 0] ** 2, make(time)], axis=1),  # type: ignore[operator]
         ["good", "bad"],
     )
-    assert found.names == ("good",)
-    assert [(part.name, reason in sure(part.reason)) for part in found.unsigned] == [
-        ("bad", True)
-    ]
-    assert not found.signed
+    assert signed_parts.names == ("good",)
+    assert [
+        (part.name, reason in require(part.reason)) for part in signed_parts.unsigned
+    ] == [("bad", True)]
+    assert not signed_parts.signed
 
 
 def test_a_part_without_sign_and_almost_no_energy_is_left_out_and_named() -> None:
     time = np.arange(0, 12, 0.02)
     small = np.full(time.shape, 0.1 * np.sqrt(MOST_UNSIGNED))
-    answer = suggest(of(np.column_stack([two_springs(time), small]), time), 10.0, PLAIN)
+    answer = suggest(
+        make_part_history(np.column_stack([move_two_springs(time), small]), time),
+        10.0,
+        PLAIN,
+    )
     assert answer.situation.basis == "parts"
     assert "part-without-sign" in {caution.code for caution in answer.cautions}
     best = answer.candidates[0]
-    assert [(one.name, one.sign_match, one.share) for one in best.parts][-1] == (
+    assert [(part.name, part.sign_match, part.share) for part in best.parts][-1] == (
         "part 3",
         None,
         None,
@@ -149,10 +159,12 @@ def test_a_part_without_sign_and_almost_no_energy_is_left_out_and_named() -> Non
 
 def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
     time = np.arange(0, 12, 0.02)
-    deformation = two_springs(time)
+    deformation = move_two_springs(time)
     noise = np.random.default_rng(3).normal(size=(40, 2))
     deformation[300:340] = 0.02 * noise  # the signal is lost for a while
-    situation = examine(of(deformation, time), 10.0, replace(PLAIN, after=0.0))
+    situation = examine(
+        make_part_history(deformation, time), 10.0, replace(PLAIN, after=0.0)
+    )
     early, late = judge(situation, [2.0, 8.0])
     assert (early.sign_match, early.residual) == (None, None)
     assert any("cannot be followed" in note for note in early.notes)
@@ -162,17 +174,17 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 # ---- the chain of a real solver
 
 
-def predicted(situation: Situation, tr: float) -> float:
+def predict_residual(situation: Situation, tr: float) -> float:
     (candidate,) = judge(situation, [tr])
-    return sure(candidate.residual)
+    return require(candidate.residual)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("estimated", [False, True], ids=["oscillator", "parts alone"])
 def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
-    errors, some = [], chain.scan()[::3]
+    errors, some_runs = [], chain.scan()[::3]
     for td in (chain.TD_PEAK, chain.TD_LATE):
-        situation = seen(td)
+        situation = examine_chain_at(td)
         assert situation.basis == "parts"
         if estimated:
             situation = replace(
@@ -180,19 +192,19 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
             )
             assert situation.vibration.estimated
         runs = [
-            run for run in some if abs(run["td_s"] - td) < 1e-3
+            run for run in some_runs if abs(run["td_s"] - td) < 1e-3
         ]  # a step of the solver late
         errors += [
-            abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"])
+            abs(predict_residual(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"])
             for run in runs
         ]
-    assert len(errors) == len(some)
+    assert len(errors) == len(some_runs)
     assert max(errors) < 0.025  # what is reached
 
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
-    situation = seen(chain.TD_LATE)
-    parts = sure(situation.evidence.parts)
+    situation = examine_chain_at(chain.TD_LATE)
+    parts = require(situation.evidence.parts)
     started = Waves(
         np.array([-300 + 900j]),
         np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]),
@@ -223,16 +235,16 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = sure(seen(chain.TD_LATE).evidence.parts)
+    parts = require(examine_chain_at(chain.TD_LATE).evidence.parts)
     for run in chain.scan():
         product = np.prod(
-            deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1
+            compute_deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1
         )
         assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]
 
 
 def read_t01() -> History:
-    return solved("chain_referenceT01.gz", "spring1,spring2").history
+    return read_solved("chain_referenceT01.gz", "spring1,spring2").history
 
 
 @pytest.mark.slow
@@ -241,9 +253,11 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
     source: str,
 ) -> None:
     answer = suggest(
-        chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN
+        chain.read_chain_history() if source == "csv" else read_t01(),
+        chain.TD_PEAK,
+        PLAIN,
     )
-    assert sure(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
+    assert require(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
     best = answer.candidates[0]
     assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
     assert best.residual == pytest.approx(0.065, abs=0.005)
@@ -256,16 +270,18 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
     answer = suggest(
-        chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN
+        chain.read_chain_history() if source == "csv" else read_t01(),
+        chain.TD_LATE,
+        PLAIN,
     )
-    tr = sure(answer.recommended).tr
+    tr = require(answer.recommended).tr
     runs = [run for run in chain.scan() if run["td_s"] > 0.2]
     nearest = min(runs, key=lambda run: abs(run["tr_s"] - tr))
     assert nearest["R_sim"] <= min(run["R_sim"] for run in runs) + 0.05
 
 
 def test_the_parts_that_contribute_most_are_named() -> None:
-    situation = seen(chain.TD_PEAK)
+    situation = examine_chain_at(chain.TD_PEAK)
     (candidate,) = judge(situation, [0.1])
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)
@@ -274,9 +290,9 @@ def test_the_parts_that_contribute_most_are_named() -> None:
         note.startswith(f"mismatch of {candidate.parts[0].name}")
         for note in candidate.notes
     )
-    still = 1 - sure(situation.kinetic_share)
+    still = 1 - require(situation.kinetic_share)
     assert candidate.lock_in_error == pytest.approx(
-        np.sqrt(still) * sure(candidate.part_mismatch)
+        np.sqrt(still) * require(candidate.part_mismatch)
     )
 
 
@@ -296,28 +312,30 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
 
 
 def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:
-    assert chain.history().part_names == NAMES
-    assert chain.history("IE_total_J").part_energies is None
+    assert chain.read_chain_history().part_names == NAMES
+    assert chain.read_chain_history("IE_total_J").part_energies is None
     selection = Selection(energy=(*NAMES, "x3_m"))
-    assert chain.history(*selection.energy).part_names == selection.energy
-    table = chain.history()
-    np.testing.assert_array_equal(sure(table.part_energies).sum(axis=1), table.energy)
+    assert chain.read_chain_history(*selection.energy).part_names == selection.energy
+    table = chain.read_chain_history()
+    np.testing.assert_array_equal(
+        require(table.part_energies).sum(axis=1), table.energy
+    )
 
 
 def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> (
     None
 ):
     time = np.linspace(0, 6, 201)
-    found = SignedParts(time, two_springs(time) ** 2, NAMES)
-    at = np.array([0.123, 1.0, 1.9876, 4.321])
-    assert np.abs(deformations(found, at)) == pytest.approx(
-        np.abs(two_springs(at).T), abs=1e-4
+    signed_parts = SignedParts(time, move_two_springs(time) ** 2, NAMES)
+    times = np.array([0.123, 1.0, 1.9876, 4.321])
+    assert np.abs(compute_deformations(signed_parts, times)) == pytest.approx(
+        np.abs(move_two_springs(times).T), abs=1e-4
     )
     slow, fast = (
-        np.exp(-0.2 * at) * np.cos(5 * at) ** 2,
-        np.exp(-0.2 * at) * np.sin(8.3 * at) ** 2,
+        np.exp(-0.2 * times) * np.cos(5 * times) ** 2,
+        np.exp(-0.2 * times) * np.sin(8.3 * times) ** 2,
     )
-    assert found.kinetic_energy(at) == pytest.approx(
+    assert signed_parts.kinetic_energy(times) == pytest.approx(
         1.64 * slow + 1.3 * fast, abs=0.1
     )  # but for the damping
 
@@ -326,8 +344,8 @@ SPAN = np.arange(0, 0.4, 4e-4)
 TWO_PARTS = ("A", "B")
 
 
-def planes(share: float) -> Motion:
-    """A bends in two planes, of which the second has that share of its energy; B has one mode."""
+def make_motion_in_planes(share: float) -> Motion:
+    """Return a part A that bends in two planes, the second with ``share`` of its energy, and a part B with one mode."""
     forms = np.array([np.diag([1 - share, share, 0.0]), np.diag([0.0, 0.0, 0.5])])
     return Motion(
         7.7,
@@ -337,8 +355,8 @@ def planes(share: float) -> Motion:
     )
 
 
-def grouped() -> Motion:
-    """Three springs in which three modes mix; the first two are one part."""
+def make_grouped_springs() -> Motion:
+    """Return three springs in which three modes mix; the first two springs are one part."""
     rows = np.array([[1.0, 0.7, -0.2], [0.8, -0.9, 0.4], [0.3, 0.2, 1.0]])
     forms = np.einsum("si,sj->sij", rows, rows)
     return Motion(
@@ -349,12 +367,12 @@ def grouped() -> Motion:
     )
 
 
-def written(motion: Motion, noise: float = 0.0) -> History:
+def make_history_of_motion(motion: Motion, noise: float = 0.0) -> History:
     energies = motion.energies(SPAN)
-    return history(
+    return make_history_of_parts(
         SPAN,
         np.maximum(
-            np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0
+            np.stack([add_noise(row, noise, seed=2) for row in energies.T], axis=1), 0.0
         ),
     )
 
@@ -372,20 +390,20 @@ def written(motion: Motion, noise: float = 0.0) -> History:
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     share: float, noise: float, basis: str
 ) -> None:
-    """A part whose planes both swing has no sign; the modes of the whole have."""
-    truth, td = planes(share), 0.31
-    answer = suggest(written(truth, noise), td, Settings(after=0.0))
+    """A part vibrating in both planes has no sign; the modes of the whole structure have."""
+    truth, td = make_motion_in_planes(share), 0.31
+    answer = suggest(make_history_of_motion(truth, noise), td, Settings(after=0.0))
     assert answer.situation.basis == basis
-    for one in answer.candidates[:6]:
+    for candidate in answer.candidates[:6]:
         assert (
-            sure(one.residual_low) - 0.05
-            <= truth.residual(one.tr, td)
-            <= sure(one.residual_high) + 0.05
+            require(candidate.residual_low) - 0.05
+            <= truth.residual(candidate.tr, td)
+            <= require(candidate.residual_high) + 0.05
         )
 
 
 def test_minima_that_stay_above_zero_prove_no_sign() -> None:
-    energy = planes(0.03).energies(SPAN)[:, 0]
+    energy = make_motion_in_planes(0.03).energies(SPAN)[:, 0]
     (zeros,) = find_all_zeros(SPAN, np.sqrt(energy)[np.newaxis])
     tracked = np.where(np.searchsorted(zeros.sure, SPAN) % 2, -1, 1) * np.sqrt(energy)
     assert follow_waves(SPAN, tracked, zeros) is None
@@ -393,33 +411,38 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
 
 
 def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
-    small = SignedParts(SPAN, planes(5e-4).energies(SPAN), TWO_PARTS)
+    small = SignedParts(SPAN, make_motion_in_planes(5e-4).energies(SPAN), TWO_PARTS)
     assert small.names == TWO_PARTS
     assert all(
         isinstance(motion.model, Waves) for motion in small.motions
     )  # taken for one plane
     tr, td = np.array([0.05, 0.1]), 0.2072
-    told = np.sqrt(
+    stated_residual = np.sqrt(
         np.sum((small.amplitudes(tr).T - small.amplitudes(td)) ** 2, axis=1)
         + small.kinetic_energy(td)
     )
-    told /= np.sqrt(small.vibration_energy(td))
-    _, _, high = small.residual_band(told, tr, td)
-    truth = [planes(5e-4).residual(one, td) for one in tr]
-    assert np.all(high > told + 5e-4)
-    assert np.all(np.abs(told - truth) < 0.02)
+    stated_residual /= np.sqrt(small.vibration_energy(td))
+    _, _, high = small.residual_band(stated_residual, tr, td)
+    truth = [make_motion_in_planes(5e-4).residual(tr_time, td) for tr_time in tr]
+    assert np.all(high > stated_residual + 5e-4)
+    assert np.all(np.abs(stated_residual - truth) < 0.02)
     assert np.all(truth <= high + 1e-3)
 
 
 def test_parts_of_several_springs_in_which_modes_mix_have_no_sign() -> None:
-    parts = SignedParts(SPAN, grouped().energies(SPAN), TWO_PARTS)
+    parts = SignedParts(SPAN, make_grouped_springs().energies(SPAN), TWO_PARTS)
     assert parts.names == ("B",)
-    assert [one.name for one in parts.unsigned] == ["A"]
-    assert examine(written(grouped()), 0.3, Settings(after=0.0)).basis != "parts"
+    assert [part_id.name for part_id in parts.unsigned] == ["A"]
+    assert (
+        examine(
+            make_history_of_motion(make_grouped_springs()), 0.3, Settings(after=0.0)
+        ).basis
+        != "parts"
+    )
 
 
 def test_what_crosses_between_modes_in_the_parts_is_no_part_of_the_error() -> None:
-    """The energy of the parts alone may come back wrong by it at td, and is right a moment later."""
+    """It makes the energy of single parts wrong at td, but only for a moment."""
     rows = np.array([[0.9, 0.6], [0.8, -0.3]])
     forms = np.einsum("pi,pj->pij", rows, rows)
     truth = Motion(3.0, 2 * np.pi * np.array([24.0, 37.0]), np.array([0.4, 2.1]), forms)
@@ -427,7 +450,7 @@ def test_what_crosses_between_modes_in_the_parts_is_no_part_of_the_error() -> No
     assert parts.names == TWO_PARTS
     td = 0.31
     for tr in (0.05, 0.1, 0.2):
-        found = np.hypot(
+        measured = np.hypot(
             lock_in_error(parts, tr, td), np.sqrt(kinetic_share(parts, td))
         )
-        assert found == pytest.approx(truth.residual(tr, td), abs=1e-3)
+        assert measured == pytest.approx(truth.residual(tr, td), abs=1e-3)

@@ -1,4 +1,4 @@
-"""The window in which a record stays with an oscillator, what is tried to find it, and what may hide in its rest."""
+"""The span that one oscillator describes, how it is searched, and what its misfit may hide."""
 
 import tracemalloc
 
@@ -21,35 +21,35 @@ from d2rpick.vibration.span import (
 )
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
-from tests.energies import sure
+from tests.energies import require
 from tests.records import (
     ENERGY,
     MODE,
     TIME,
-    energy_of,
-    noisy,
-    printed,
-    replayed_residual,
-    table,
+    add_noise,
+    compute_replayed_residual,
+    make_table,
+    round_as_printed,
+    sum_energies,
 )
 
 
-def of(energy: np.ndarray) -> History:
-    return table(TIME, energy)
+def make_history(energy: np.ndarray) -> History:
+    return make_table(TIME, energy)
 
 
-def by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
-    """Where means over a twenty-fifth of a period leave the paper's mode by more than 1 % of its energy."""
+def find_span_by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
+    """Return the span in which running means over 1/25 period stay within 1 % of the energy of the paper's mode."""
     width = round(2 * np.pi / MODE.omega / 25 / 1e-4)
     gone = np.abs(
         np.convolve(energy - ENERGY, np.ones(width) / width, mode="same")
     ) > 0.01 * MODE.vibration_energy(TIME)
-    at = int(np.searchsorted(TIME, anchor))
-    left, right = (
-        np.flatnonzero(gone[:at])[-1] + 1 + width // 2,
-        at + np.flatnonzero(gone[at:])[0] - 1 - width // 2,
+    anchor_index = int(np.searchsorted(TIME, anchor))
+    left_end, right_end = (
+        np.flatnonzero(gone[:anchor_index])[-1] + 1 + width // 2,
+        anchor_index + np.flatnonzero(gone[anchor_index:])[0] - 1 - width // 2,
     )
-    return float(TIME[left]), float(TIME[right])
+    return float(TIME[left_end]), float(TIME[right_end])
 
 
 @pytest.mark.parametrize("anchor", [0.06, 0.08, 0.1])
@@ -61,24 +61,24 @@ def test_a_span_ends_where_running_means_leave_the_fit(
         (TIME < 0.0311) | (TIME > 0.1234)
     )
     fit = judge_given(MODE, TIME, ENERGY)
-    assert find_span(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(
-        energy, anchor
-    )
+    assert find_span(
+        make_history(energy), anchor, fit, Span(0.0, 0.15)
+    ) == find_span_by_convolution(energy, anchor)
 
 
 def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     rng = np.random.default_rng(1)
     energy = rng.normal(size=TIME.size)
-    span, fit = find_described_span(of(energy), 0.1, Span(0.0, 0.15))
+    span, fit = find_described_span(make_history(energy), 0.1, Span(0.0, 0.15))
     assert span is None
-    before = TIME <= 0.1
-    assert fit.reason == identify(TIME[before], energy[before]).reason
-    for found in (
+    early = TIME <= 0.1
+    assert fit.reason == identify(TIME[early], energy[early]).reason
+    for fitted in (
         identify(TIME, energy, quick=True),
         judge_given(MODE, TIME, energy, quick=True),
     ):
-        assert (found.mode, found.describes_record) == (None, False)
-        assert found.reason
+        assert (fitted.mode, fitted.describes_record) == (None, False)
+        assert fitted.reason
 
 
 def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record() -> (
@@ -87,18 +87,18 @@ def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record
     energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
     tracemalloc.start()
     span, fit = find_described_span(
-        table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
+        make_table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
     )
-    most = tracemalloc.get_traced_memory()[1]
+    peak_memory = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert (span, fit.describes_record) == (None, False)
     assert "vibration period" in str(fit.reason)
-    assert most < 100 * energy.nbytes
+    assert peak_memory < 100 * energy.nbytes
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_what_is_accepted_is_the_same_when_refusals_are_quick(noise: float) -> None:
-    energy = noisy(ENERGY, noise, seed=2)
+    energy = add_noise(ENERGY, noise, seed=2)
     quick, thorough = identify(TIME, energy, quick=True), identify(TIME, energy)
     assert isinstance(quick.mode, Mode)
     assert (quick.mode, quick.reason, quick.rms) == (thorough.mode, None, thorough.rms)
@@ -127,18 +127,19 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
     fits = Fits()
     for td in (0.05, paper.TD, 0.1):
         anew, again = (
-            examine(paper.history(), td, Settings(), known) for known in (None, fits)
+            examine(paper.make_history(), td, Settings(), fits_before)
+            for fits_before in (None, fits)
         )
         assert again.evidence.span == anew.evidence.span
-        assert sure(again.evidence.fit).mode == sure(anew.evidence.fit).mode
+        assert require(again.evidence.fit).mode == require(anew.evidence.fit).mode
 
 
 MAIN = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0)
 TIMES = np.arange(0, 7, 1 / 40)
 
 
-def beside(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
-    """The main mode and one with that share of its energy."""
+def add_second_mode(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
+    """Return the main mode and one with this share of its energy."""
     root = float(np.sqrt(share * MAIN.vibration_energy(0.0)))
     return MAIN, Mode(
         rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0
@@ -151,11 +152,11 @@ def beside(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
 def test_the_share_of_a_small_second_mode_is_estimated(
     share: float, noise: float, rate: float
 ) -> None:
-    energy = noisy(energy_of(beside(share, rate), TIMES), noise, seed=1)
-    one = identify(TIMES, energy)
-    assert one.mode is not None  # its rest is too small to refuse it
-    assert one.describes_record
-    assert estimate_hidden_share(TIMES, energy, one.mode) == pytest.approx(
+    energy = add_noise(sum_energies(add_second_mode(share, rate), TIMES), noise, seed=1)
+    fitted = identify(TIMES, energy)
+    assert fitted.mode is not None  # its rest is too small to refuse it
+    assert fitted.describes_record
+    assert estimate_hidden_share(TIMES, energy, fitted.mode) == pytest.approx(
         share, rel=0.5
     )
 
@@ -165,50 +166,62 @@ def test_the_share_of_a_small_second_mode_is_estimated(
 def test_white_noise_hides_a_second_mode_of_its_own_size(
     noise: float, seed: int
 ) -> None:
-    energy = noisy(MAIN.energy(TIMES), noise, seed)
+    energy = add_noise(MAIN.energy(TIMES), noise, seed)
     assert (
         0
-        < estimate_hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode))
+        < estimate_hidden_share(TIMES, energy, require(identify(TIMES, energy).mode))
         < 3 * noise
     )
 
 
 def test_a_clean_or_printed_record_hides_nothing() -> None:
-    for energy, most in ((ENERGY, 1e-12), (printed(ENERGY), 1e-5)):
+    for energy, largest in ((ENERGY, 1e-12), (round_as_printed(ENERGY), 1e-5)):
         assert (
-            estimate_hidden_share(TIME, energy, sure(identify(TIME, energy).mode))
-            < most
+            estimate_hidden_share(TIME, energy, require(identify(TIME, energy).mode))
+            < largest
         )
 
 
 def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
     tr, td = np.array([0.3, 1.1, 2.6]), 5.3
     for seed in range(0, 20, 3):
-        truth = beside(0.005, rate=1.5 + seed / 10)
-        energy = noisy(energy_of(truth, TIMES), 0.03, seed)
-        found = identify(TIMES, energy)
-        mode = sure(found.mode)
-        found = found._replace(hidden_share=estimate_hidden_share(TIMES, energy, mode))
-        true, told = replayed_residual(truth, tr, td), replayed_residual(mode, tr, td)
-        _, low, high = residual_band(found, told, tr, td)
+        truth = add_second_mode(0.005, rate=1.5 + seed / 10)
+        energy = add_noise(sum_energies(truth, TIMES), 0.03, seed)
+        fitted = identify(TIMES, energy)
+        mode = require(fitted.mode)
+        fitted = fitted._replace(
+            hidden_share=estimate_hidden_share(TIMES, energy, mode)
+        )
+        true, predicted = (
+            compute_replayed_residual(truth, tr, td),
+            compute_replayed_residual(mode, tr, td),
+        )
+        _, low, high = residual_band(fitted, predicted, tr, td)
         assert np.all(high > true - 0.05)
         assert np.all(low < true + 0.05)
 
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:
-    energy = noisy(MAIN.energy(TIMES), 0.03, seed=3)
-    found = suggest(table(TIMES, energy), 5.3, Settings(after=0.0))
-    assert found.candidates
-    for one in found.candidates:
-        assert sure(one.residual_high) >= sure(one.residual)
-        noted = any("if the record hides a further mode" in note for note in one.notes)
-        assert noted == (sure(one.residual_high) > sure(one.residual) + 0.1)
+    energy = add_noise(MAIN.energy(TIMES), 0.03, seed=3)
+    suggestion = suggest(make_table(TIMES, energy), 5.3, Settings(after=0.0))
+    assert suggestion.candidates
+    for candidate in suggestion.candidates:
+        assert require(candidate.residual_high) >= require(candidate.residual)
+        noted = any(
+            "if the record hides a further mode" in note for note in candidate.notes
+        )
+        assert noted == (
+            require(candidate.residual_high) > require(candidate.residual) + 0.1
+        )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["one", "small", "large"])
 def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
-    found = small_second_modes(kind, range(3))
-    assert len(found) >= 2
-    off = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
-    assert np.percentile(off, 95) <= 0.05
+    records = small_second_modes(kind, range(3))
+    assert len(records) >= 2
+    deviations = [
+        max(record.stated - record.true, record.true - record.highest, 0.0)
+        for record in records
+    ]
+    assert np.percentile(deviations, 95) <= 0.05

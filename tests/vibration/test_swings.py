@@ -1,4 +1,4 @@
-"""Counting the swings of an energy: the signs of a motion that was integrated, or none where a mode hides."""
+"""Counting the oscillation cycles of an energy: signs of an integrated motion, or none if a mode may be hidden."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,15 +19,15 @@ from d2rpick.vibration.identify import identify
 from d2rpick.vibration.model import Evidence, find_energy_at, model_at
 from d2rpick.vibration.span import Span
 from d2rpick.vibration.swings import Swings, count_swings
-from tests.energies import sure
-from tests.records import table
+from tests.energies import require
+from tests.records import make_table
 
 TIME: Samples = np.linspace(0.0, 30.0, 1201)
 
 
-def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
-    """Deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
-    found = solve_ivp(
+def integrate_stiffening_spring(by: float, alpha: float) -> tuple[Samples, Samples]:
+    """Return the deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
+    solution = solve_ivp(
         lambda _, x: (x[1], -alpha * x[1] - x[0] - by * x[0] ** 3),
         TIME[[0, -1]],
         (1.0, 0.0),
@@ -35,7 +35,7 @@ def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
         TIME,
         rtol=1e-9,
     )
-    x = found.y[0]
+    x = solution.y[0]
     return x, x**2 + by * x**4 / 2
 
 
@@ -47,10 +47,10 @@ def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
 def test_every_minimum_on_the_floor_is_a_passage_through_zero(
     by: float, alpha: float, lifted: Samples
 ) -> None:
-    x, energy = stiffening(by, alpha)
-    found = sure(count_swings(TIME, energy + lifted))
-    counted = found.amplitudes(TIME)[0]
-    unclear = found.unclear
+    x, energy = integrate_stiffening_spring(by, alpha)
+    swings = require(count_swings(TIME, energy + lifted))
+    counted = swings.amplitudes(TIME)[0]
+    unclear = swings.unclear
     assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))
     # a sample next to a zero may lie on either side of it, and behind the last peak none is seen yet
     clear = (np.abs(x) > 0.15 * np.exp(-alpha / 2 * TIME)) & (unclear.max() >= TIME)
@@ -66,30 +66,30 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(
 def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(
     rate: float, phase: float, share: float
 ) -> None:
-    """The residual with both modes known is not above the highest that counting tells."""
-    both = np.stack([np.sin(TIME), np.sqrt(share) * np.sin(rate * TIME + phase)])
-    found = count_swings(TIME, np.sum(both**2, axis=0))
-    if found is None:
+    """The residual with both modes known is at most the upper limit that counting gives."""
+    two_planes = np.stack([np.sin(TIME), np.sqrt(share) * np.sin(rate * TIME + phase)])
+    swings = count_swings(TIME, np.sum(two_planes**2, axis=0))
+    if swings is None:
         return
     td = np.pi / 2 + 8 * np.pi
     tr = td - 2 * np.pi * np.arange(1.0, 4.0)
-    tr = tr[tr > found.comparable_since(td)]
+    tr = tr[tr > swings.comparable_since(td)]
     hidden = np.abs(np.sin(rate * tr + phase) - np.sin(rate * td + phase)) * np.sqrt(
         share / (1 + share)
     )
-    assert (hidden <= 3 * np.sqrt(found.unseen(tr, td)) + 0.2).all()
+    assert (hidden <= 3 * np.sqrt(swings.unseen(tr, td)) + 0.2).all()
 
 
 @pytest.mark.parametrize("preload", [0.1, 0.3, -0.3])
 def test_a_preload_that_makes_swings_uneven_is_no_beat(preload: float) -> None:
-    found = sure(
+    swings = require(
         count_swings(TIME, (np.exp(-0.02 * TIME) * np.sin(TIME) + preload) ** 2)
     )
-    assert np.ptp(np.diff(found.bottoms)) > 0.3
+    assert np.ptp(np.diff(swings.bottoms)) > 0.3
 
 
 def test_noise_and_too_few_swings_are_not_counted() -> None:
-    _, energy = stiffening(0.3, 0.0)
+    _, energy = integrate_stiffening_spring(0.3, 0.0)
     noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
     assert count_swings(TIME, energy + noise) is None
     assert count_swings(TIME[:200], energy[:200]) is None
@@ -99,26 +99,29 @@ def test_noise_and_too_few_swings_are_not_counted() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 5.0 + 0.01 * TIME])
 def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) -> None:
-    x, energy = stiffening(1.0, 0.02)
-    record = table(TIME, energy + lifted)
+    x, energy = integrate_stiffening_spring(1.0, 0.02)
+    record = make_table(TIME, energy + lifted)
     for td in (20.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
         assert ("basis", "swings of the energy, counted") in heading(
             answer.situation
         )  # no word of parts
-        at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
+        at_tr, at_td = np.interp([require(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(
-            one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3
-            for one in answer.candidates
+            candidate.acceptable and np.interp(candidate.tr, TIME, x) * at_td < -1e-3
+            for candidate in answer.candidates
         )
 
 
 def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> (
     None
 ):
-    record, memory = table(TIME, stiffening(1.0, 0.02)[1]), Memory()
+    record, memory = (
+        make_table(TIME, integrate_stiffening_spring(1.0, 0.02)[1]),
+        Memory(),
+    )
     around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
     together = Together(record, Flight())
 
@@ -129,9 +132,9 @@ def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doub
 
     assert not find(None, doubtful=True)
     assert not find(flight, doubtful=False)
-    found, again = (find(flight, doubtful=True)["swings"] for _ in range(2))
-    assert found is again
-    assert (found.time[0], found.time[-1]) == (1.0, 28.0)
+    swings, again = (find(flight, doubtful=True)["swings"] for _ in range(2))
+    assert swings is again
+    assert (swings.time[0], swings.time[-1]) == (1.0, 28.0)
 
 
 @pytest.mark.parametrize(
@@ -146,8 +149,8 @@ def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
             return np.array([unseen])
 
     time = np.linspace(0.0, 6.0, 601)
-    record = table(time, np.sin(5 * time) ** 2)
-    counted = sure(count_swings(time, record.energy))
+    record = make_table(time, np.sin(5 * time) ** 2)
+    counted = require(count_swings(time, record.energy))
     fit = identify(time, record.energy)._replace(hidden_share=hidden)
     evidence = Evidence(fit, Span(0.0, 6.0), models={"swings": Told(**vars(counted))})
     assert model_at(find_energy_at(record, 4.1, evidence), evidence).basis == basis

@@ -1,11 +1,11 @@
-"""Waves: signed records made of a few are found again, others are none."""
+"""Sums of waves: signed records made of a few waves are recovered, other records are refused."""
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.vibration.waves import Waves, fit_waves
-from tests.energies import sure
+from tests.energies import require
 
 MADE = Waves(
     np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0
@@ -24,33 +24,34 @@ def test_waves_are_found_again(
     rate: float, ratio: float, damping: float, phase: float, even: bool
 ) -> None:
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
-    made = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
+    true_waves = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
     time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
-    found = sure(fit_waves(time, made.deformation(time)))
-    room = (1e-6 if even else 0.02) * made.vibration_energy(time)
-    assert np.all(np.abs(found.energy(time) - made.energy(time)) < room + 1e-9)
+    fitted = require(fit_waves(time, true_waves.deformation(time)))
+    room = (1e-6 if even else 0.02) * true_waves.vibration_energy(time)
+    assert np.all(np.abs(fitted.energy(time) - true_waves.energy(time)) < room + 1e-9)
     assert np.all(
-        np.abs(found.kinetic_energy(time) - made.kinetic_energy(time)) < 2 * room + 1e-9
+        np.abs(fitted.kinetic_energy(time) - true_waves.kinetic_energy(time))
+        < 2 * room + 1e-9
     )
 
 
 def test_one_wave_is_an_oscillator() -> None:
-    one = Waves(MADE.rates[:1], MADE.weights[:1], 0.0)
-    velocity = np.gradient(one.deformation(TIME), TIME, edge_order=2)
-    assert one.kinetic_energy(TIME) == pytest.approx(
-        (velocity / abs(one.rates[0])) ** 2, abs=2e-3
+    single_wave = Waves(MADE.rates[:1], MADE.weights[:1], 0.0)
+    velocity = np.gradient(single_wave.deformation(TIME), TIME, edge_order=2)
+    assert single_wave.kinetic_energy(TIME) == pytest.approx(
+        (velocity / abs(single_wave.rates[0])) ** 2, abs=2e-3
     )
-    assert one.alpha == pytest.approx(0.2)
-    assert one.vibration_energy(0.3) == pytest.approx(
-        one.energy(0.3) + one.kinetic_energy(0.3)
+    assert single_wave.alpha == pytest.approx(0.2)
+    assert single_wave.vibration_energy(0.3) == pytest.approx(
+        single_wave.energy(0.3) + single_wave.kinetic_energy(0.3)
     )
 
 
 def test_the_fewest_waves_that_do_are_taken() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
-    found = sure(fit_waves(TIME, MADE.deformation(TIME) + noise))
-    assert np.sort(found.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
-    assert np.all(found.rates.real <= 0)
+    fitted = require(fit_waves(TIME, MADE.deformation(TIME) + noise))
+    assert np.sort(fitted.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
+    assert np.all(fitted.rates.real <= 0)
 
 
 def test_far_before_the_record_nothing_overflows() -> None:

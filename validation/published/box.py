@@ -76,36 +76,37 @@ def _run(parameters: Parameters, *windows: RigidWindow) -> Record:
     return simulate(parameters, _END, *windows)
 
 
-def _setting(_: Parameters) -> Exhibit:
+def _make_setting_exhibit(_: Parameters) -> Exhibit:
     return Exhibit(
         "box", "Box on a sled that meets a curb", 1, "1", "A box on a decelerating sled, tripped by a curb.",
         "Drawn from the model: a narrow box on the tilted floor of a standard dolly.",
     )  # fmt: skip
 
 
-def _early(base: Parameters) -> Exhibit:
+def _make_early_exhibit(base: Parameters) -> Exhibit:
     reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
-    off = _roll_error(reference, early)
-    return _compared(
+    roll_error = _compute_roll_error(reference, early)
+    return _make_comparison(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
         "Outlines and roll with and without switching; switched at 1 ms the box rolls less than the reference.",
-        f"So does this box, by {abs(off):.2f} degrees of {np.degrees(abs(_at_td(reference).roll)):.0f} at td. Outlines "
-        "and roll look identical; the difference is visible only in a panel of its own.",
-        agrees=off < 0,
+        f"So does this box, by {abs(roll_error):.2f} degrees of "
+        f"{np.degrees(abs(_find_state_at_td(reference).roll)):.0f} at td. "
+        "Outlines and roll look identical; the difference is visible only in a panel of its own.",
+        agrees=roll_error < 0,
     )  # fmt: skip
 
 
-def _energies(base: Parameters) -> Exhibit:
+def _make_energy_exhibit(base: Parameters) -> Exhibit:
     reference = _run(base)
     errors = {
-        tr: _roll_error(reference, _run(base, RigidWindow(tr, TD)))
+        tr: _compute_roll_error(reference, _run(base, RigidWindow(tr, TD)))
         for tr in (_LITTLE, _MUCH)
     }
     energy = {
         tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
         for tr in (*errors, TD)
     }
-    return _compared(
+    return _make_comparison(
         "energies", "Too little and too much energy", "2c", 1, base, (_LITTLE, _MUCH),
         "Too little energy locked in gives less roll, too much gives more roll.",
         f"With {energy[_LITTLE] / energy[TD]:.2f} times the level (tr = {1e3 * _LITTLE:g} ms) the roll at td is off by "
@@ -116,15 +117,15 @@ def _energies(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _revised(base: Parameters) -> Exhibit:
+def _make_revised_exhibit(base: Parameters) -> Exhibit:
     reference = _run(base)
-    tr = _own(reference, TD)
+    tr = _find_own_tr(reference, TD)
     assert tr is not None
     errors = [
-        _roll_error(reference, _run(base, RigidWindow(time, TD)))
+        _compute_roll_error(reference, _run(base, RigidWindow(time, TD)))
         for time in (_REVISED, tr)
     ]
-    return _compared(
+    return _make_comparison(
         "revised", "The revised pair", "8", 4, base, (_REVISED, tr),
         "With tr = 70 and td = 370 ms, the ground at about 380 ms, height and roll agree closely.",
         f"The sled pushes this box until {1e3 * (reference.released or 0):.0f} ms, so 70 ms lies in its trip: the roll "
@@ -134,16 +135,16 @@ def _revised(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _compared(
+def _make_comparison(
     name: str, title: str, figure: str, section: int, base: Parameters, times: tuple[float, ...], paper: str,
-    found: str, *, agrees: bool,
+    results: str, *, agrees: bool,
 ) -> Exhibit:  # fmt: skip
     """Outlines, roll and height of runs switched at ``times`` beside the reference, and the differences."""
     reference = _run(base)
     columns: dict[str, Samples] = {
         "time_ms": 1e3 * reference.time, "roll_deg": np.degrees(reference.roll), "z_m": reference.centre.imag,
     }  # fmt: skip
-    shapes = [Shape("without switching", _outlines(reference))]
+    shapes = [Shape("without switching", _make_outlines(reference))]
     rolls, differences, heights = [Curve("without switching", "roll_deg")], [], []
     for tr in times:
         run, key = _run(base, RigidWindow(tr, TD)), f"{1e3 * tr:.4g}"
@@ -151,16 +152,16 @@ def _compared(
         columns[f"roll_{key}_deg"] = np.degrees(run.roll)
         columns[f"droll_{key}_deg"] = np.degrees(run.roll - reference.roll)
         columns[f"dz_{key}_mm"] = 1e3 * (run.centre - reference.centre).imag
-        shapes.append(Shape(label, _outlines(run), "thin"))
+        shapes.append(Shape(label, _make_outlines(run), "thin"))
         rolls.append(Curve(label, f"roll_{key}_deg", "thin"))
         differences.append(Curve(label, f"droll_{key}_deg"))
         heights.append(Curve(label, f"dz_{key}_mm"))
-    every = 1e3 * _END / (_OUTLINES - 1)
+    period_ms = 1e3 * _END / (_OUTLINES - 1)
     marks = (("td", 1e3 * TD),)
     panels = (
         (
             Panel(
-                f"box every {every:.0f} ms",
+                f"box every {period_ms:.0f} ms",
                 "z [m]",
                 shapes=tuple(shapes),
                 xlabel="x [m]",
@@ -182,10 +183,12 @@ def _compared(
             ),
         ),
     )
-    return Exhibit(name, title, section, figure, paper, found, agrees, columns, panels)
+    return Exhibit(
+        name, title, section, figure, paper, results, agrees, columns, panels
+    )
 
 
-def variants_of(base: Parameters) -> Iterator[Variant]:
+def list_variants(base: Parameters) -> Iterator[Variant]:
     """Changes that act after td, then changes that act before."""
     yield Variant("base", base, before=False)
     yield Variant(
@@ -221,28 +224,36 @@ def variants_of(base: Parameters) -> Iterator[Variant]:
     yield Variant("damping 1 1/s", replace(base, damping=1.0), before=True)
 
 
-def tried(variants: Sequence[Variant]) -> Trial:
+def try_variants(variants: Sequence[Variant]) -> Trial:
     """Run all variants, the base first, choose one tr for them as ``study`` does, and switch each run there.
 
     td is 10 ms before the first of their landings.
     """
-    landings = [_run(one.parameters).landed or _END for one in variants]
+    landings = [
+        _run(trial_result.parameters).landed or _END for trial_result in variants
+    ]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     rows = [
-        row_of(one.name, suggest(make_history(_run(one.parameters)), td, Settings()))
-        for one in variants
+        row_of(
+            trial_result.name,
+            suggest(make_history(_run(trial_result.parameters)), td, Settings()),
+        )
+        for trial_result in variants
     ]
     common = common_tr(rows)
     assert common.tr is not None
     window = RigidWindow(common.tr, td)
-    known = zip(variants, rows, common.errors, strict=True)
-    runs = tuple(_at(one, row, error or 0.0, window) for one, row, error in known)
-    named = [
+    common_results = zip(variants, rows, common.errors, strict=True)
+    runs = tuple(
+        _switch_variant(trial_result, row, error or 0.0, window)
+        for trial_result, row, error in common_results
+    )
+    named_rows = [
         row
         for row in rows
         if row.source in ("base", "stiffness -15%", "stiffness +15%")
     ]
-    alone = common_tr(named)
+    alone = common_tr(named_rows)
     three = (
         None
         if alone.tr is None
@@ -251,25 +262,32 @@ def tried(variants: Sequence[Variant]) -> Trial:
     return Trial(window, bool(common.keeps_tolerance), runs, three)
 
 
-def _at(variant: Variant, row: StudyRow, error: float, common: RigidWindow) -> Tried:
+def _switch_variant(
+    variant: Variant, row: StudyRow, error: float, common: RigidWindow
+) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare_runs(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
     return Tried(variant, row, error, outcome.roll_error, end)
 
 
-def _variants(base: Parameters) -> Exhibit:
-    return exhibit_of(tried(tuple(variants_of(base))))
+def _make_variants_exhibit(base: Parameters) -> Exhibit:
+    return make_variants_exhibit(try_variants(tuple(list_variants(base))))
 
 
-def exhibit_of(trial: Trial) -> Exhibit:
+def make_variants_exhibit(trial: Trial) -> Exhibit:
     """Show what one tr for many variants costs each of them."""
     window, rows = trial.window, trial.runs
     number = np.arange(1.0, len(rows) + 1)
-    own = np.array([np.nan if one.row.tr is None else one.row.tr for one in rows])
+    own_tr = np.array(
+        [
+            np.nan if result_row.row.tr is None else result_row.row.tr
+            for result_row in rows
+        ]
+    )
     columns = {
-        "run": number, "own_tr_ms": 1e3 * own, "common_tr_ms": 0 * number + 1e3 * window.tr,
-        "rigid_own": (window.td - own) / _END, "rigid_common": 0 * number + (window.td - window.tr) / _END,
+        "run": number, "own_tr_ms": 1e3 * own_tr, "common_tr_ms": 0 * number + 1e3 * window.tr,
+        "rigid_own": (window.td - own_tr) / _END, "rigid_common": 0 * number + (window.td - window.tr) / _END,
         "level_error": np.array([row.level_error for row in rows]),
         "roll_error_deg": np.array([row.roll_error for row in rows]),
         "end_error_deg": np.array([row.end_error for row in rows]),
@@ -278,11 +296,11 @@ def exhibit_of(trial: Trial) -> Exhibit:
         "variants", "One reference run for many variants", 4, "section 4",
         "One reference run serves dozens of variants, since parameters such as headroom, belts and roof do not "
         "influence tr: they act after td.",
-        _told(trial), _alone_after(trial), columns, _of_variants(window),
+        _describe_outcome(trial), _is_tr_kept_after_td(trial), columns, _make_variant_panels(window),
     )  # fmt: skip
 
 
-def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
+def _make_variant_panels(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
     rigid = (
@@ -317,43 +335,56 @@ def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     )
 
 
-def _alone_after(trial: Trial) -> bool:
+def _is_tr_kept_after_td(trial: Trial) -> bool:
     """Whether what acts after td leaves tr where it is, to a state of the record."""
     times = [
-        one.row.tr
-        for one in trial.runs
-        if one.row.tr is not None and not one.variant.before
+        run.row.tr
+        for run in trial.runs
+        if run.row.tr is not None and not run.variant.before
     ]
     return max(times) - min(times) < float(
         _run(trial.runs[0].variant.parameters).time[1]
     )
 
 
-def _told(trial: Trial) -> str:
+def _describe_outcome(trial: Trial) -> str:
     """Say how far the paper's statement holds, and where it fails."""
     rows, window = trial.runs, trial.window
-    known = [(one, 1e3 * one.row.tr) for one in rows if one.row.tr is not None]
-    after, before = (
-        [tr for one, tr in known if one.variant.before is flag]
+    chosen = [
+        (result_of_variant, 1e3 * result_of_variant.row.tr)
+        for result_of_variant in rows
+        if result_of_variant.row.tr is not None
+    ]
+    later, earlier = (
+        [
+            tr
+            for result_of_variant, tr in chosen
+            if result_of_variant.variant.before is flag
+        ]
         for flag in (False, True)
     )
-    loads = [1e3 * (_run(one.variant.parameters).released or 0.0) for one in rows]
-    worst = max(rows, key=lambda one: one.level_error)
+    loads = [
+        1e3 * (_run(result_of_variant.variant.parameters).released or 0.0)
+        for result_of_variant in rows
+    ]
+    worst = max(rows, key=lambda result_of_variant: result_of_variant.level_error)
     given_up, rigid = (
-        1e3 * window.tr - min(tr for _, tr in known),
+        1e3 * window.tr - min(tr for _, tr in chosen),
         1e3 * (window.td - window.tr),
     )
-    roll = max(abs(one.roll_error) for one in rows)
+    roll = max(abs(result_of_variant.roll_error) for result_of_variant in rows)
     names = "; ".join(
-        f"{place} {one.variant.name}" for place, one in enumerate(rows, start=1)
+        f"{place_number} {result_of_variant.variant.name}"
+        for place_number, result_of_variant in enumerate(rows, start=1)
     )
     fails = "" if trial.kept else (
         "It fails for all of them at once: no tr lies within the timing tolerance of each run, so that no error grows "
         "by more than 0.05. "
     )  # fmt: skip
     return (
-        f"True for what acts after td: tr moves by {max(after) - min(after):.2g} ms. What acts before td moves it: "
-        f"from {min(before):.1f} to {max(before):.1f} ms. {_of_stiffness(trial, dict(_named(known)))}{fails}"
+        f"True for what acts after td: tr moves by {max(later) - min(later):.2g} ms. What acts before td moves it: "
+        f"from {min(earlier):.1f} to {max(earlier):.1f} ms. "
+        f"{_describe_stiffness(trial, dict(_name_results(chosen)))}{fails}"
         f"tr = {1e3 * window.tr:.1f} ms is still acceptable in all {len(rows)}: the level is off by up to "
         f"{worst.level_error:.3f} ({worst.variant.name}), with a tolerance of 0.2; switched there, the roll at td is "
         f"right within {roll:.2f} degrees, and up to {given_up:.1f} ms of about {rigid:.0f} are given up. "
@@ -362,17 +393,20 @@ def _told(trial: Trial) -> str:
     )
 
 
-def _named(known: Sequence[tuple[Tried, float]]) -> Iterator[tuple[str, float]]:
-    for one, tr in known:
-        yield one.variant.name, tr
+def _name_results(
+    known_results: Sequence[tuple[Tried, float]],
+) -> Iterator[tuple[str, float]]:
+    for known_result, tr in known_results:
+        yield known_result.variant.name, tr
 
 
-def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
+def _describe_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
     """Say what the stiffness alone does, where its variants were run."""
-    if trial.stiffness is None or "stiffness +15%" not in own:
+    if trial.stiffness is None or "stiffness +15%" not in own_results:
         return ""
     times = ", ".join(
-        f"{own[name]:.1f}" for name in ("stiffness -15%", "base", "stiffness +15%")
+        f"{own_results[name]:.1f}"
+        for name in ("stiffness -15%", "base", "stiffness +15%")
     )
     tr, error = trial.stiffness
     return (
@@ -381,7 +415,7 @@ def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
     )
 
 
-def _own(reference: Record, td: float) -> float | None:
+def _find_own_tr(reference: Record, td: float) -> float | None:
     recommended = suggest(make_history(reference), td, Settings()).recommended
     return recommended.tr if recommended else None
 
@@ -391,31 +425,35 @@ class _State(NamedTuple):
     centre: complex
 
 
-def _at_td(record: Record) -> _State:
-    at = int(np.abs(record.time - TD).argmin())
-    return _State(float(record.roll[at]), complex(record.centre[at]))
+def _find_state_at_td(record: Record) -> _State:
+    state_index = int(np.abs(record.time - TD).argmin())
+    return _State(float(record.roll[state_index]), complex(record.centre[state_index]))
 
 
-def _roll_error(reference: Record, run: Record) -> float:
+def _compute_roll_error(reference: Record, run: Record) -> float:
     """Roll at td against the reference [degrees]."""
-    return float(np.degrees(_at_td(run).roll - _at_td(reference).roll))
+    return float(
+        np.degrees(_find_state_at_td(run).roll - _find_state_at_td(reference).roll)
+    )
 
 
-def _outlines(record: Record) -> Plane:
-    shown = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
-    return np.asarray(record.outline[shown])
+def _make_outlines(record: Record) -> Plane:
+    shown_states = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
+    return np.asarray(record.outline[shown_states])
 
 
 # Section of the paper and what makes each figure, some seconds with the default box.
 _FIGURES: Final = (
-    (1, _setting),
-    (1, _early),
-    (1, _energies),
-    (4, _revised),
-    (4, _variants),
+    (1, _make_setting_exhibit),
+    (1, _make_early_exhibit),
+    (1, _make_energy_exhibit),
+    (4, _make_revised_exhibit),
+    (4, _make_variants_exhibit),
 )
 
 
-def exhibits_of(parameters: Parameters) -> list[tuple[int, Callable[[], Exhibit]]]:
+def list_box_exhibits(
+    parameters: Parameters,
+) -> list[tuple[int, Callable[[], Exhibit]]]:
     """Figures of a box by section, each to be computed by a call."""
     return [(section, partial(make, parameters)) for section, make in _FIGURES]

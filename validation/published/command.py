@@ -14,7 +14,7 @@ from d2rpick.report import figures
 from d2rpick.report.formats import Shown, written_by
 from validation.published import box, exhibits, reproduction, saving
 from validation.published.drawing import draw_exhibit
-from validation.published.values import table
+from validation.published.values import make_values_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -40,11 +40,15 @@ def reproduce(
 
     ``tables``: the columns of a solver's table beside its times, by what it is.
     """
-    place = _made(output_dir)  # the page may go there
+    folder = _make_folder(output_dir)  # the page may go there
     output = output.beside(*solver)
-    curves = _solver(solver, tables)  # before the half minute that the box takes
-    answer = reproduction.Reproduction(table(), list(_exhibits(section, curves)))
-    files = _write(output, place, answer)
+    curves = _read_solver_tables(
+        solver, tables
+    )  # before the half minute that the box takes
+    answer = reproduction.Reproduction(
+        make_values_table(), list(_make_exhibits(section, curves))
+    )
+    files = _write(output, folder, answer)
     if output.report:
         output.write(
             output.report, reproduction.as_page(answer, options.repeat()).encode()
@@ -57,24 +61,26 @@ def reproduce(
     output.finish(objection=not all(row.agrees for row in answer.rows))
 
 
-def _exhibits(
+def _make_exhibits(
     sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
 ) -> Iterator[Exhibit]:
     """Give the figures of these sections, of all without any, in the order of the paper."""
     makers = [
-        *box.exhibits_of(Parameters()),
-        *exhibits.exhibits_of(solver),
-        (5, saving.exhibit),
+        *box.list_box_exhibits(Parameters()),
+        *exhibits.list_exhibits(solver),
+        (5, saving.make_saving_exhibit),
     ]
-    makers.sort(key=lambda one: one[0])
+    makers.sort(key=lambda section_name: section_name[0])
     return (
         make() for section, make in makers if not sections or str(section) in sections
     )
 
 
-def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples]]:
+def _read_solver_tables(
+    names: Sequence[str], tables: Tables
+) -> dict[str, dict[str, Samples]]:
     """Read each table by the columns that it has."""
-    found = {}
+    tables_by_name = {}
     for name in names:
         (database,) = open_run([name], Selection(energy=("2",))).databases
         kinds = [
@@ -83,48 +89,50 @@ def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples
             if {*columns} <= {*database.channels}
         ]
         if not kinds:
-            known = " or ".join(", ".join(columns) for columns in tables.values())
+            columns_expected = " or ".join(
+                ", ".join(columns) for columns in tables.values()
+            )
             raise FormatError(
-                f"{name}: the columns are {', '.join(database.channels)}; {known} were expected"
+                f"{name}: the columns are {', '.join(database.channels)}; {columns_expected} were expected"
             )
         columns = {
             column: database.channel(database.find(column))
             for column in tables[kinds[0]]
         }
-        found[kinds[0]] = {"time_s": database.time, **columns}
-    return found
+        tables_by_name[kinds[0]] = {"time_s": database.time, **columns}
+    return tables_by_name
 
 
-def _made(folder: str) -> Path:
+def _make_folder(folder: str) -> Path:
     """Create the folder where it is missing; D2RPickError where that cannot be done."""
-    place = Path(folder)
+    path = Path(folder)
     try:
-        place.mkdir(parents=True, exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise D2RPickError(
             f"{folder}: the folder cannot be created ({error.strerror}); choose another one"
         ) from error
-    return place
+    return path
 
 
-def _write(output: Output, place: Path, answer: Reproduction) -> list[str]:
+def _write(output: Output, folder: Path, answer: Reproduction) -> list[str]:
     """Write all files, or none where one may not be written; give their names."""
     index, values = (
         reproduction.as_markdown(answer, Shown(), pictures=True),
         reproduction.as_csv(answer, Shown()),
     )
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{values}\n".encode()}
-    for one in answer.exhibits:
-        figure = draw_exhibit(one)
+    for exhibit in answer.exhibits:
+        figure = draw_exhibit(exhibit)
         contents |= {
-            f"{one.name}.{form}": figures.render(figure, f"x.{form}")
+            f"{exhibit.name}.{form}": figures.render(figure, f"x.{form}")
             for form in PICTURES
         }
-        if one.columns:
-            contents[f"{one.name}.csv"] = csv_table.write(dict(one.columns))
-    named = {str(place / name): content for name, content in contents.items()}
-    for name in named:
+        if exhibit.columns:
+            contents[f"{exhibit.name}.csv"] = csv_table.write(dict(exhibit.columns))
+    file_contents = {str(folder / name): content for name, content in contents.items()}
+    for name in file_contents:
         output.claim(name)
-    for name, content in named.items():
+    for name, content in file_contents.items():
         output.write(name, content)
-    return list(named)
+    return list(file_contents)

@@ -65,15 +65,15 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
             columns[curve.x] if curve.x else next(iter(columns.values())),
             columns[curve.column],
         )
-        shown = slice(
+        shown_points = slice(
             None,
             None,
             max(1, x.size // _DOTS) if curve.style == "dots" and not panel.span else 1,
         )
         label = curve.label or "_"
         axes.plot(
-            x[shown],
-            y[shown],
+            x[shown_points],
+            y[shown_points],
             label=label,
             color=_COLOURS[drawn[curve.style]],
             **_STYLES[curve.style],
@@ -104,9 +104,9 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
 def _draw_marks(axes: Axes, panel: Panel) -> None:
     for name, level in panel.levels:
         axes.axhline(level, color=SWITCHED, linewidth=0.8, label=name)
-    for place, (name, x) in enumerate(panel.marks):
+    for mark_index, (name, x) in enumerate(panel.marks):
         axes.axvline(
-            x, color=_COLOURS[2 + place], linestyle="--", linewidth=1, label=name
+            x, color=_COLOURS[2 + mark_index], linestyle="--", linewidth=1, label=name
         )
     for x, y in panel.points:
         axes.plot(x, y, "o", color=GOOD, markersize=5)
@@ -145,22 +145,22 @@ def box(axes: Axes) -> None:
         (structure.box, REFERENCE, 0.4),
         (structure.step, GOOD, 1.2),
     ):
-        for one, other in structure.places[truss.ends]:
+        for first_node, second_node in structure.places[truss.ends]:
             axes.plot(
-                [one.real, other.real],
-                [one.imag, other.imag],
+                [first_node.real, second_node.real],
+                [first_node.imag, second_node.imag],
                 color=colour,
                 linewidth=width,
             )
-    _arrow(axes, (-1.35, 0.95), (-0.95, 0.95), "sled, 7 m/s, stops in 60 ms")
-    for text, place, at in (
+    _draw_arrow(axes, (-1.35, 0.95), (-0.95, 0.95), "sled, 7 m/s, stops in 60 ms")
+    for text, text_position, arrow_position in (
         ("box, switched", (0.55, 1.2), (0.1, 1.0)), ("step, stays deformable", (0.55, 0.75), (0.02, 0.1)),
         ("curb with cushion", (0.55, 0.35), (0.07, 0.04)), ("ground", (0.75, -0.08), (0.75, -parameters.ground)),
     ):  # fmt: skip
         axes.annotate(
             text,
-            at,
-            xytext=place,
+            arrow_position,
+            xytext=text_position,
             fontsize="small",
             arrowprops={"arrowstyle": "-", "linewidth": 0.6},
         )
@@ -169,14 +169,14 @@ def box(axes: Axes) -> None:
 
 def masses(axes: Axes) -> None:
     """Two masses, a spring, a damper to each."""
-    _block(axes, 0.0, "m")
-    _block(axes, 3.0, "M")
-    _spring(axes, 1.0, 3.0, 0.65)
+    _draw_block(axes, 0.0, "m")
+    _draw_block(axes, 3.0, "M")
+    _draw_spring(axes, 1.0, 3.0, 0.65)
     axes.text(2.0, 0.95, "k", ha="center")
-    for left, name, label in ((0.0, "z", "α m"), (3.0, "y", "α M")):
-        _arrow(axes, (left + 0.5, 1.35), (left + 1.1, 1.35), name)
-        _damper(axes, left + 0.5, label)
-    _arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
+    for left_edge, name, label in ((0.0, "z", "α m"), (3.0, "y", "α M")):
+        _draw_arrow(axes, (left_edge + 0.5, 1.35), (left_edge + 1.1, 1.35), name)
+        _draw_damper(axes, left_edge + 0.5, label)
+    _draw_arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
     axes.text(
         2.0,
         -1.25,
@@ -201,10 +201,10 @@ def elements(axes: Axes) -> None:
                 alpha=0.6,
             )
         )
-    _block(axes, 0.0, "m")
-    _block(axes, 3.0, "M")
+    _draw_block(axes, 0.0, "m")
+    _draw_block(axes, 3.0, "M")
     axes.text(2.0, 0.95, "ten bricks, E A/L = k", ha="center")
-    _arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
+    _draw_arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
     axes.text(2.0, -0.5, "masses added to the nodes of the end sections;\nall nodes are one rigid body from tr to td",
               ha="center", fontsize="small")  # fmt: skip
     axes.set(xlim=(-1.3, 4.6), ylim=(-0.9, 1.5))
@@ -218,10 +218,10 @@ SCHEMES: Final[Mapping[str, Callable[[Axes], None]]] = {
 }
 
 
-def _block(axes: Axes, left: float, name: str) -> None:
+def _draw_block(axes: Axes, left_edge: float, name: str) -> None:
     axes.add_patch(
         Rectangle(
-            (left, 0.15),
+            (left_edge, 0.15),
             1.0,
             1.0,
             facecolor="white",
@@ -229,17 +229,17 @@ def _block(axes: Axes, left: float, name: str) -> None:
             linewidth=1.2,
         )
     )
-    axes.text(left + 0.5, 0.65, name, ha="center", va="center", fontsize="large")
+    axes.text(left_edge + 0.5, 0.65, name, ha="center", va="center", fontsize="large")
 
 
-def _spring(axes: Axes, left: float, right: float, height: float) -> None:
-    inner = np.linspace(left + 0.3, right - 0.3, 13)
-    x = np.concatenate([[left], inner, [right]])
+def _draw_spring(axes: Axes, left_end: float, right_end: float, height: float) -> None:
+    inner = np.linspace(left_end + 0.3, right_end - 0.3, 13)
+    x = np.concatenate([[left_end], inner, [right_end]])
     z = height + 0.14 * np.concatenate([[0, 0], np.resize([1.0, -1.0], 11), [0, 0]])
     axes.plot(x, z, color=REFERENCE, linewidth=1.2)
 
 
-def _damper(axes: Axes, x: float, label: str) -> None:
+def _draw_damper(axes: Axes, x: float, label: str) -> None:
     """A dashpot from a mass down to the rest."""
     axes.plot([x, x], [0.15, -0.25], color=REFERENCE, linewidth=1)
     axes.plot([x - 0.13, x + 0.13], [-0.25, -0.25], color=REFERENCE, linewidth=2)
@@ -254,7 +254,7 @@ def _damper(axes: Axes, x: float, label: str) -> None:
     axes.text(x + 0.28, -0.4, label, fontsize="small")
 
 
-def _arrow(
+def _draw_arrow(
     axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str
 ) -> None:
     axes.add_patch(

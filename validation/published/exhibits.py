@@ -15,11 +15,11 @@ from validation.published.values import (
     PUBLISHED,
     START,
     TIME,
-    deformation_of,
-    integrated,
-    pair_at_peak,
-    residual,
-    switched,
+    compute_deformation,
+    compute_residual,
+    find_pair_at_peak,
+    integrate_replay,
+    switch_replay,
 )
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ _PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
 _NEAR: Final = 1.2
 
 
-def exhibits_of(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
+def list_exhibits(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
     """Figures of the oscillator by section, each to be computed by a call.
 
     ``solver`` holds runs of a solver by name, each a table of columns: "run" of the pair that the paper computed
@@ -108,7 +108,7 @@ def exhibits_of(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
         (
             2,
             partial(
-                _scheme,
+                _make_scheme,
                 "masses",
                 "The floating oscillator",
                 2,
@@ -116,11 +116,11 @@ def exhibits_of(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
                 "Two masses, a spring, dampers, no support.",
             ),
         ),
-        (2, _response),
+        (2, _make_response_exhibit),
         (
             3,
             partial(
-                _scheme,
+                _make_scheme,
                 "elements",
                 "Its finite element model",
                 3,
@@ -128,36 +128,38 @@ def exhibits_of(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
                 "The oscillator in finite elements.",
             ),
         ),
-        (3, partial(_motion, solver.get("run"))),
-        (4, _level),
-        (4, _after_td),
+        (3, partial(_make_motion_exhibit, solver.get("run"))),
+        (4, _make_level_exhibit),
+        (4, _make_after_td_exhibit),
     ]
     return (
-        [*figures, (4, partial(_beside_solver, solver["pairs"]))]
+        [*figures, (4, partial(_make_solver_exhibit, solver["pairs"]))]
         if "pairs" in solver
         else figures
     )
 
 
-def _scheme(name: str, title: str, section: int, figure: str, paper: str) -> Exhibit:
+def _make_scheme(
+    name: str, title: str, section: int, figure: str, paper: str
+) -> Exhibit:
     return Exhibit(name, title, section, figure, paper, "Drawn anew.")
 
 
-def _named(pair: Sequence[float]) -> str:
+def _name_pair(pair: Sequence[float]) -> str:
     return "tr = {:.4g}, td = {:.4g} ms".format(*(1e3 * time for time in pair))
 
 
-def _rigid(pair: tuple[float, float]) -> tuple[float, float]:
+def _find_rigid_span(pair: tuple[float, float]) -> tuple[float, float]:
     return 1e3 * pair[0], 1e3 * pair[1]
 
 
-def _response() -> Exhibit:
+def _make_response_exhibit() -> Exhibit:
     """Response of the suspended mass for several pairs over each other, beside that without switching."""
     columns = {"time_ms": 1e3 * TIME, "y_free_m": OSCILLATOR.free(START, TIME).y}
     curves, errors = [Curve("without switching", "y_free_m")], []
     for pair in _PAIRS:
         key = f"{1e3 * pair[0]:g}_{1e3 * pair[1]:g}"
-        columns[f"y_{key}_m"] = switched(pair).motion(TIME).y
+        columns[f"y_{key}_m"] = switch_replay(pair).motion(TIME).y
         columns[f"error_{key}_m"] = columns[f"y_{key}_m"] - columns["y_free_m"]
         curves.append(Curve(f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms", f"y_{key}_m"))
         errors.append(
@@ -182,24 +184,28 @@ def _response() -> Exhibit:
     )  # fmt: skip
 
 
-def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
+def _make_motion_exhibit(run: Mapping[str, Samples] | None) -> Exhibit:
     """Displacements and velocities in closed form, against a solver's run or, without one, numerical integration."""
-    replay = switched(INTEGRATED)
+    replay = switch_replay(INTEGRATED)
     time = TIME if run is None else run["time_s"]
     closed = replay.motion(time)
-    other = integrated(replay, time) if run is None else [run[f"{name}_m"] for name in "zy"] + [
+    other_columns = integrate_replay(replay, time) if run is None else [run[f"{name}_m"] for name in "zy"] + [
         run[f"v{name}_mps"] for name in "zy"
     ]  # fmt: skip
     method = "integrated" if run is None else "finite elements"
     columns = {"time_ms": 1e3 * time}
     for name, unit, ours, theirs in zip(
-        ("z", "y", "vz", "vy"), ("m", "m", "mps", "mps"), closed, other, strict=True
+        ("z", "y", "vz", "vy"),
+        ("m", "m", "mps", "mps"),
+        closed,
+        other_columns,
+        strict=True,
     ):
         columns |= {
             f"{name}_closed_{unit}": ours,
             f"{name}_other_{unit}": np.asarray(theirs),
         }
-    rigid = _rigid(INTEGRATED)
+    rigid = _find_rigid_span(INTEGRATED)
 
     def panel(
         title: str,
@@ -225,27 +231,27 @@ def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
         )
     ]
     whole = panel(
-        f"displacements, {_named(INTEGRATED)}",
+        f"displacements, {_name_pair(INTEGRATED)}",
         "m",
         "displacement [m]",
         ("z", "y"),
         None,
     )
-    off = max(
+    largest = max(
         float(np.abs(columns[f"{name}_other_m"] - columns[f"{name}_closed_m"]).max()) for name in "zy"
     ) / float(np.abs(closed.z).max())  # fmt: skip
     return Exhibit(
         "motion", f"Closed form and {method}", 3, "6a-d",
         "Displacements and velocities for (6, 80) ms, analytical and by explicit finite elements, with the solver's "
         "transients at the switches.",
-        f"Displacements agree within {off:.1g} of the largest. Velocities jump at tr to their common value; a solver "
-        "takes one step for that, and its output shows the last state before it. At td nothing jumps: the "
+        f"Displacements agree within {largest:.1g} of the largest. Velocities jump at tr to their common value; "
+        "a solver takes one step for that, and its output shows the last state before it. At td nothing jumps: the "
         "spring alone accelerates the masses.",
-        off < 1e-2, columns, ((whole, velocities[0]), (velocities[1], velocities[2])),
+        largest < 1e-2, columns, ((whole, velocities[0]), (velocities[1], velocities[2])),
     )  # fmt: skip
 
 
-def _level() -> Exhibit:
+def _make_level_exhibit() -> Exhibit:
     """Energy with its level at td, all crossings of it, and tr as it was read off and as it is."""
     td = PUBLISHED[1]
     level = float(MODE.energy(td))
@@ -293,16 +299,16 @@ def _level() -> Exhibit:
     )  # fmt: skip
 
 
-def _after_td() -> Exhibit:
+def _make_after_td_exhibit() -> Exhibit:
     """Response after td for the published pair and the better one, against the reference."""
     columns: dict[str, Samples] = {
         "time_ms": 1e3 * TIME,
         "y_free_m": OSCILLATOR.free(START, TIME).y,
     }
     panels = []
-    for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
-        columns[f"y_{name}_m"] = switched(pair).motion(TIME).y
-        columns[f"r_{name}_m"] = deformation_of(switched(pair).motion(TIME))
+    for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak())):
+        columns[f"y_{name}_m"] = switch_replay(pair).motion(TIME).y
+        columns[f"r_{name}_m"] = compute_deformation(switch_replay(pair).motion(TIME))
         motion = (
             Curve("without switching", "y_free_m"),
             Curve("switched", f"y_{name}_m"),
@@ -311,31 +317,32 @@ def _after_td() -> Exhibit:
             Curve("without switching", "r_free_m"),
             Curve("switched", f"r_{name}_m"),
         )
-        shown = (10.0, 150.0)
+        limits = (10.0, 150.0)
         panels.append((
-            Panel(f"{name} pair: {_named(pair)}", "y [m]", motion, _rigid(pair), span=shown),
-            Panel(f"residual R = {residual(pair):.3f}", "deformation y - z [m]", vibration, _rigid(pair), span=shown),
+            Panel(f"{name} pair: {_name_pair(pair)}", "y [m]", motion, _find_rigid_span(pair), span=limits),
+            Panel(f"residual R = {compute_residual(pair):.3f}", "deformation y - z [m]", vibration,
+                  _find_rigid_span(pair), span=limits),
         ))  # fmt: skip
-    columns["r_free_m"] = deformation_of(OSCILLATOR.free(START, TIME))
+    columns["r_free_m"] = compute_deformation(OSCILLATOR.free(START, TIME))
     return Exhibit(
         "after-td", "Response after td", 4, "7b",
         "After td the response y for (13, 64) ms agrees well with the reference.",
-        f"It does not: R = {residual(PUBLISHED):.3f}. At 64 ms 92 % of the energy of the vibration is kinetic and so "
-        "is lost, whatever tr. The mean motion agrees, the vibration does not. 4.8 ms later, at the next peak of the "
-        "energy, the switched run goes on as the reference does.",
+        f"It does not: R = {compute_residual(PUBLISHED):.3f}. At 64 ms 92 % of the energy of the vibration is kinetic "
+        "and so is lost, whatever tr. The mean motion agrees, the vibration does not. 4.8 ms later, at the next "
+        "peak of the energy, the switched run goes on as the reference does.",
         False, columns, tuple(panels),
     )  # fmt: skip
 
 
-def _beside_solver(solver: Mapping[str, Samples]) -> Exhibit:
+def _make_solver_exhibit(solver: Mapping[str, Samples]) -> Exhibit:
     """The deformation of explicit finite element runs beside the closed form."""
     time = solver["time_s"]
     columns = {"time_ms": 1e3 * time, "reference_solver_m": solver["reference_m"]}
     panels = []
-    for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
+    for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak())):
         columns |= {
             f"{name}_solver_m": solver[f"{name}_m"],
-            f"{name}_m": deformation_of(switched(pair).motion(time)),
+            f"{name}_m": compute_deformation(switch_replay(pair).motion(time)),
         }
         curves = (
             Curve("without switching, solver", "reference_solver_m", "thin"),
@@ -344,10 +351,10 @@ def _beside_solver(solver: Mapping[str, Samples]) -> Exhibit:
         panels.append(
             (
                 Panel(
-                    f"{name} pair: {_named(pair)}",
+                    f"{name} pair: {_name_pair(pair)}",
                     "deformation y - z [m]",
                     curves,
-                    _rigid(pair),
+                    _find_rigid_span(pair),
                 ),
             )
         )

@@ -14,8 +14,8 @@ from validation.published.values import (
     MISPRINTS,
     MOST_DIFFERENCE,
     PUBLISHED,
-    pair_at_peak,
-    residual,
+    compute_residual,
+    find_pair_at_peak,
 )
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Reproduction(NamedTuple):
 
 _PAIR: Final = Kind(
     row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
-    lambda pair: {"tr": pair[0], "td": pair[1], "residual": residual(pair)},
+    lambda pair: {"tr": pair[0], "td": pair[1], "residual": compute_residual(pair)},
     "pair",
 )
 _ROW: Final = row(
@@ -76,7 +76,7 @@ DOCUMENT: Final = Document(
         keys.WARNINGS._replace(get=lambda _: ()),
         Field("rows", kind_of(many(_ROW), minItems=1)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
-        Field("better", _PAIR, get=lambda _: pair_at_peak()),
+        Field("better", _PAIR, get=lambda _: find_pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
         Field("misprints", "texts", get=lambda _: MISPRINTS),
         Field("files", "texts"),
@@ -84,27 +84,27 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction, shown: Shown) -> str:
+def as_table(answer: Reproduction, is_shown: Shown) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
     lines = [
-        tables.as_text(HEAD, [cells(row) for row in rows], shown.width),
+        tables.as_text(HEAD, [list_cells(row) for row in rows], is_shown.width),
         "",
-        *pairs_of(),
+        *describe_pairs(),
         "",
     ]
-    for one in exhibits:
+    for exhibit in exhibits:
         lines += [
-            f"{heading(one)}: {verdict(one)}",
-            f"  paper  {one.paper}",
-            f"  here   {one.found}",
+            f"{write_heading(exhibit)}: {write_verdict(exhibit)}",
+            f"  paper  {exhibit.paper}",
+            f"  here   {exhibit.found}",
         ]
     lines += [
         "",
         "misprints in the paper",
         *(f"  {misprint}" for misprint in MISPRINTS),
     ]
-    return tables.wrapped("\n".join(lines), shown.width)
+    return tables.wrapped("\n".join(lines), is_shown.width)
 
 
 def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
@@ -114,19 +114,19 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
         "# Analysis of switched-rigid floating oscillator, reproduced",
         f"{MODEL}; d2rpick {__version__}.",
     ]
-    for one in exhibits:
-        shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
+    for exhibit in exhibits:
+        picture_lines = [f"![{exhibit.title}]({exhibit.name}.svg)"] if pictures else []
         blocks += [
-            f"## {heading(one)}",
-            *shown,
-            f"Paper: {one.paper}",
-            f"Here: {one.found}",
-            f"Agrees: {verdict(one)}.",
+            f"## {write_heading(exhibit)}",
+            *picture_lines,
+            f"Paper: {exhibit.paper}",
+            f"Here: {exhibit.found}",
+            f"Agrees: {write_verdict(exhibit)}.",
         ]
     blocks += [
         "## Published and computed values",
-        tables.as_markdown(HEAD, [cells(row) for row in rows]),
-        *pairs_of(),
+        tables.as_markdown(HEAD, [list_cells(row) for row in rows]),
+        *describe_pairs(),
     ]
     blocks += [
         "## Misprints in the paper",
@@ -155,56 +155,66 @@ def as_csv(answer: Reproduction, _: Shown) -> str:
     return tables.as_csv(HEAD, body).rstrip("\n")
 
 
-def cells(row: PublishedValue) -> list[tables.Cell]:
+def list_cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
-    known = (
+    cell_texts = (
         None if value is None else f"{round(value, _DECIMALS):.12g}"
         for value in (row.published, row.reference)
     )
-    here = f"{round(row.here, _DECIMALS):.12g}"
+    our_value = f"{round(row.here, _DECIMALS):.12g}"
     difference = (
         "0"
         if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected)
         else f"{row.difference:.1e}"
     )
-    return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
+    return [
+        row.what,
+        row.unit,
+        *cell_texts,
+        our_value,
+        difference,
+        row.agrees,
+        row.source,
+    ]
 
 
-def heading(exhibit: Exhibit) -> str:
+def write_heading(exhibit: Exhibit) -> str:
     """Give the figure of the paper and what it shows."""
-    place = (
+    figure_label = (
         exhibit.figure
         if exhibit.figure.startswith("section")
         else f"fig. {exhibit.figure}"
     )
-    return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
+    return f"{figure_label[0].upper()}{figure_label[1:]}: {exhibit.title}"
 
 
-def verdict(exhibit: Exhibit) -> str:
+def write_verdict(exhibit: Exhibit) -> str:
     """Say whether what is found is what the paper shows."""
     return {True: "yes", False: "no", None: "nothing to compare"}[exhibit.agrees]
 
 
-def pairs_of() -> list[str]:
+def describe_pairs() -> list[str]:
     """Say how good the published and the better pair are."""
     return [
-        f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {residual(pair):.3f}"
-        for name, pair in (("published", PUBLISHED), ("better", pair_at_peak()))
+        f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {compute_residual(pair):.3f}"
+        for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak()))
     ]
 
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     """Write the page: every figure with what the paper shows and what is found, then the table."""
-    published = table("Published and here", HEAD, [cells(row) for row in answer.rows])
+    published = table(
+        "Published and here", HEAD, [list_cells(row) for row in answer.rows]
+    )
     return document(
         "Analysis of switched-rigid floating oscillator, reproduced",
         tag(
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
-        *(_exhibited(one) for one in answer.exhibits),
+        *(_write_exhibit(exhibit) for exhibit in answer.exhibits),
         section("Published and here", published),
-        tag("ul", *(tag("li", text) for text in pairs_of())),
+        tag("ul", *(tag("li", text) for text in describe_pairs())),
         section(
             "Misprints in the paper",
             tag("ul", *(tag("li", misprint) for misprint in MISPRINTS)),
@@ -214,13 +224,13 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     )
 
 
-def _exhibited(one: Exhibit) -> Markup:
-    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
-    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
+def _write_exhibit(exhibit: Exhibit) -> Markup:
+    drawing = Markup(svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
+    class_ = {True: "good", False: "bad", None: "soft"}[exhibit.agrees]
     return section(
-        heading(one),
-        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
-        tag("p", tag("b", "Paper: "), one.paper),
-        tag("p", tag("b", "Here: "), one.found),
-        tag("p", "Agrees: ", tag("span", verdict(one), class_=class_)),
+        write_heading(exhibit),
+        tag("figure", tag("div", drawing, role="img", aria_label=exhibit.title)),
+        tag("p", tag("b", "Paper: "), exhibit.paper),
+        tag("p", tag("b", "Here: "), exhibit.found),
+        tag("p", "Agrees: ", tag("span", write_verdict(exhibit), class_=class_)),
     )

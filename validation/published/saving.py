@@ -47,7 +47,9 @@ class Run(NamedTuple):
     @property
     def cost_share(self) -> float:
         """Share of a step that is saved, by the cost model [-]."""
-        return saved_share(_WEIGHTS, _cost(_CAR), _cost(self.rigid), self.nodes)
+        return saved_share(
+            _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
+        )
 
     @property
     def by_cost(self) -> float:
@@ -60,7 +62,7 @@ class Run(NamedTuple):
         return self.predicted(self.element_share)
 
 
-def _cost(elements: Mapping[str, int]) -> float:
+def _compute_cost(elements: Mapping[str, int]) -> float:
     return sum(_WEIGHTS.per_element[name] * count for name, count in elements.items())
 
 
@@ -111,29 +113,29 @@ RUNS: Final = (
 )
 
 
-def needed(share: float) -> float:
+def find_needed_fraction(share: float) -> float:
     """Rigid fraction with which the pick-up truck's saving needs this share of the cost [-].
 
     Examples
     --------
-    >>> round(needed(1.0), 3), round(needed(0.85), 3)
+    >>> round(find_needed_fraction(1.0), 3), round(find_needed_fraction(0.85), 3)
     (0.745, 0.877)
     """
     return (1 - PICK_UP[1] / PICK_UP[0]) / share
 
 
-def exhibit() -> Exhibit:
+def make_saving_exhibit() -> Exhibit:
     """Predicted savings beside the measured ones, and what the published saving asks for."""
     published = 1 - PICK_UP[1] / PICK_UP[0]
     share = np.linspace(published, 1.0, 51)  # with less, no rigid fraction is enough
     number = np.arange(1.0, len(RUNS) + 1)
     columns = {
         "run": np.append(number, np.full(share.size - number.size, np.nan)), "share": share,
-        "rigid_fraction": np.array([needed(float(one)) for one in share]),
+        "rigid_fraction": np.array([find_needed_fraction(float(run)) for run in share]),
     }  # fmt: skip
     for name, values in (
-        ("measured", [one.measured for one in RUNS]), ("by_cost", [one.by_cost for one in RUNS]),
-        ("by_count", [one.by_count for one in RUNS]),
+        ("measured", [run.measured for run in RUNS]), ("by_cost", [run.by_cost for run in RUNS]),
+        ("by_count", [run.by_count for run in RUNS]),
     ):  # fmt: skip
         columns[name] = np.append(values, np.full(share.size - len(values), np.nan))
     dots = [
@@ -147,15 +149,18 @@ def exhibit() -> Exhibit:
                   (Curve("n = 1", "rigid_fraction", "line", "share"),), xlabel="share of the cost of a step [-]"),
         ),
     )  # fmt: skip
-    names = "; ".join(f"{place} {one.name}" for place, one in enumerate(RUNS, start=1))
-    off = max(abs(one.by_cost - one.measured) for one in RUNS)
+    names = "; ".join(
+        f"{run_number} {run.name}" for run_number, run in enumerate(RUNS, start=1)
+    )
+    largest = max(abs(run.by_cost - run.measured) for run in RUNS)
     return Exhibit(
         "saving", "What switching saves", 5, "section 5",
         f"A pick-up truck takes {PICK_UP[1]:g} instead of {PICK_UP[0]:g} h on 8 processors.",
         f"That is a saving of {published:.3f}; tr, td, the end and the parts are not published, so it cannot be "
-        f"computed anew. By the formula it needs a rigid fraction of at least {needed(1.0):.3f}, or {needed(0.85):.3f} "
-        f"with elements that take 85 % of a step. For runs of our own the formula is right within {off:.3f} with the "
-        f"cost of the elements; with their number alone it promises up to "
-        f"{max(one.by_count - one.measured for one in RUNS):.3f} too much. Sets: {names}.",
+        f"computed anew. By the formula it needs a rigid fraction of at least {find_needed_fraction(1.0):.3f}, "
+        f"or {find_needed_fraction(0.85):.3f} "
+        f"with elements that take 85 % of a step. For runs of our own the formula is right within {largest:.3f} with "
+        f"the cost of the elements; with their number alone it promises up to "
+        f"{max(run.by_count - run.measured for run in RUNS):.3f} too much. Sets: {names}.",
         None, columns, panels,
     )  # fmt: skip

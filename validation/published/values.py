@@ -77,72 +77,90 @@ class PublishedValue:
         return abs(self.difference) <= self.tolerance
 
 
-def _exact(what: str, unit: str, reference: float, here: float) -> PublishedValue:
+def _make_exact(
+    quantity: str, unit: str, reference: float, our_value: float
+) -> PublishedValue:
     return PublishedValue(
-        what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT
+        quantity,
+        unit,
+        None,
+        reference,
+        our_value,
+        MOST_DIFFERENCE * abs(reference),
+        _EXACT,
     )
 
 
-def pair_at_peak() -> tuple[float, float]:
+def find_pair_at_peak() -> tuple[float, float]:
     """Give the pair that is better: td at the first energy peak after 64 ms, tr where the deformation matches [s]."""
     td = MODE.peaks(PUBLISHED[1], END)[0]
-    return _matching(td), td
+    return _find_matching(td), td
 
 
-def table() -> tuple[PublishedValue, ...]:
+def make_values_table() -> tuple[PublishedValue, ...]:
     """Numbers of the paper and reference values beside those found here."""
-    return tuple(_rows())
+    return tuple(_make_rows())
 
 
-def deviation(pair: tuple[float, float]) -> float:
+def compute_deviation(pair: tuple[float, float]) -> float:
     """Largest error of the deformation after td over the largest deformation without switching there [-]."""
-    after = TIME[pair[1] <= TIME]
-    replay = switched(pair)
-    wanted, found = (
-        deformation_of(replay.reference(after)),
-        deformation_of(replay.motion(after)),
+    times_after_td = TIME[pair[1] <= TIME]
+    replay = switch_replay(pair)
+    wanted, deformation = (
+        compute_deformation(replay.reference(times_after_td)),
+        compute_deformation(replay.motion(times_after_td)),
     )
-    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+    return float(np.abs(deformation - wanted).max() / np.abs(wanted).max())
 
 
-def residual(pair: tuple[float, float]) -> float:
+def compute_residual(pair: tuple[float, float]) -> float:
     """R of a pair [-]."""
-    return switched(pair).residual()
+    return switch_replay(pair).residual()
 
 
-def _rows() -> Iterator[PublishedValue]:
-    td, better = PUBLISHED[1], pair_at_peak()
+def _make_rows() -> Iterator[PublishedValue]:
+    td, better = PUBLISHED[1], find_pair_at_peak()
     yield PublishedValue(
-        "tr with the energy of td = 64 ms", "ms", 13.0, None, 1e3 * _matching(td), 0.5,
+        "tr with the energy of td = 64 ms", "ms", 13.0, None, 1e3 * _find_matching(td), 0.5,
         "the paper, read from its plot to a millisecond",
     )  # fmt: skip
-    yield _exact("the same, sign matched", "ms", 12.8852793630525, 1e3 * _matching(td))
-    yield _exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2)
-    yield _exact("E(64 ms)", "J", 0.606348787620396, float(MODE.energy(td)))
-    yield _exact(
+    yield _make_exact(
+        "the same, sign matched", "ms", 12.8852793630525, 1e3 * _find_matching(td)
+    )
+    yield _make_exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2)
+    yield _make_exact("E(64 ms)", "J", 0.606348787620396, float(MODE.energy(td)))
+    yield _make_exact(
         "kinetic share at 64 ms",
         "-",
         0.916699887073,
         float(measures.kinetic_share(MODE, td)),
     )
-    yield _exact("energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1])
-    yield _exact("tr for that peak", "ms", 13.5866683619825, 1e3 * better[0])
-    for pair, known in _STATES.items():
-        for time, z, y, energy in known:
-            state = switched(pair).motion(time)
+    yield _make_exact(
+        "energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1]
+    )
+    yield _make_exact("tr for that peak", "ms", 13.5866683619825, 1e3 * better[0])
+    for pair, known_values in _STATES.items():
+        for time, z, y, energy in known_values:
+            state = switch_replay(pair).motion(time)
             name = f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms at {1e3 * time:g} ms"
-            yield _exact(f"z of {name}", "m", z, float(state.z))
-            yield _exact(f"y of {name}", "m", y, float(state.y))
-            yield _exact(
+            yield _make_exact(f"z of {name}", "m", z, float(state.z))
+            yield _make_exact(f"y of {name}", "m", y, float(state.y))
+            yield _make_exact(
                 f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state))
             )
-    for name, pair, found in (
+    for name, pair, deviation_found in (
         ("(13, 64) ms", PUBLISHED, 0.888),
         ("better pair", better, 0.005),
     ):
-        what = f"deviation after td, {name}"
+        quantity = f"deviation after td, {name}"
         yield PublishedValue(
-            what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER
+            quantity,
+            "-",
+            None,
+            deviation_found,
+            compute_deviation(pair),
+            _SOLVER_DIFFERENCE,
+            _SOLVER,
         )
 
 
@@ -166,17 +184,17 @@ _STATES: Final = {
 }
 
 
-def _matching(td: float) -> float:
+def _find_matching(td: float) -> float:
     """First time with the deformation of ``td``, sign included [s]."""
     return MODE.crossings(float(MODE.deformation(td)), 0.0, td)[0]
 
 
-def switched(pair: tuple[float, float]) -> Replay:
+def switch_replay(pair: tuple[float, float]) -> Replay:
     """Give the run that is rigid between these times [s]."""
     return Replay(OSCILLATOR, START, 0.0, *pair)
 
 
-def deformation_of(state: State) -> Samples:
+def compute_deformation(state: State) -> Samples:
     """Deformation of the spring, y - z [m]."""
     return np.asarray(state.y - state.z)
 
@@ -185,7 +203,7 @@ def deformation_of(state: State) -> Samples:
 _RELATIVE, _ABSOLUTE = 1e-11, 1e-14
 
 
-def integrated(switched: Replay, time: Samples) -> State:
+def integrate_replay(switched: Replay, time: Samples) -> State:
     """Integrate the equations of motion (1) through a switched run and give its states at ``time``.
 
     Free up to tr; rigid up to td, when both masses have the velocity that keeps the momentum and only damping acts;
@@ -219,7 +237,7 @@ def integrated(switched: Replay, time: Samples) -> State:
         return np.concatenate([x[2:], -o.alpha * x[2:]])
 
     x = np.array(switched.start, dtype=np.float64)
-    found = np.empty((4, time.size))
+    states = np.empty((4, time.size))
     bounds = (
         switched.origin,
         switched.tr,
@@ -242,6 +260,6 @@ def integrated(switched: Replay, time: Samples) -> State:
         )
         inside = (time >= start) & (time <= end)
         if inside.any():
-            found[:, inside] = steps.sol(time[inside])
+            states[:, inside] = steps.sol(time[inside])
         x = steps.y[:, -1]
-    return State(*found)
+    return State(*states)

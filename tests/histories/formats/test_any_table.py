@@ -10,7 +10,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.history import History, Samples
 from d2rpick.histories.opening import Selection
-from tests.reading import history_of
+from tests.reading import read_contents
 
 STATES = 40
 TIME = np.arange(STATES) * 0.25
@@ -167,7 +167,9 @@ TABLES: dict[str, str | bytes] = {
 
 def read_table(text: str | bytes, *energy: str) -> History:
     data = text if isinstance(text, bytes) else text.encode()
-    return history_of(csv_table, data, selection=Selection(energy=energy), name="table")
+    return read_contents(
+        csv_table, data, selection=Selection(energy=energy), name="table"
+    )
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -11,8 +11,14 @@ from d2rpick.histories.formats import binout
 from d2rpick.histories.formats.binout import Binout, recognises
 from d2rpick.histories.opening import Run, Selection
 from d2rpick.histories.source import Source
-from tests.made_binout import GLSTAT, LsdaWriter, Style, binout as made_binout, values
-from tests.reading import run_of
+from tests.made_binout import (
+    GLSTAT,
+    LsdaWriter,
+    Style,
+    compute_value,
+    make_binout as made_binout,
+)
+from tests.reading import open_contents
 
 
 def open_binout(*files: LsdaWriter | bytes) -> Binout:
@@ -23,7 +29,7 @@ def open_binout(*files: LsdaWriter | bytes) -> Binout:
 
 
 def expected(name: str, states: Sequence[int]) -> list[float]:
-    return [values(name, state) for state in states]
+    return [compute_value(name, state) for state in states]
 
 
 STYLES = [
@@ -64,7 +70,8 @@ def test_any_style_gives_the_numbers_that_were_written(
     assert run.part_time.tolist() == expected("time", late)
     energies = run.part_channel("internal_energy", [3, 7])
     assert energies.tolist() == [
-        [values("internal_energy", state, id_) for id_ in (3, 7)] for state in late
+        [compute_value("internal_energy", state, id_) for id_ in (3, 7)]
+        for state in late
     ]
 
 
@@ -104,7 +111,7 @@ def test_a_number_left_out_inside_a_file_says_that_records_are_lost() -> None:
 
 
 def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
-    run = run_of(binout, bytes(made_binout([1, 2, 3, 4, 5, 3, 4]).data))
+    run = open_contents(binout, bytes(made_binout([1, 2, 3, 4, 5, 3, 4]).data))
     assert run.databases[0].time.tolist() == expected("time", [1, 2, 3, 4])
     assert (
         "time steps back once (restart); if legs overlap the newer one is used"
@@ -132,7 +139,7 @@ def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> N
         "time", range(1, again + 3)
     )
     assert run.part_energies(run.parts)[:, 1].tolist() == [
-        values("internal_energy", state, 3) for state in range(1, again + 3)
+        compute_value("internal_energy", state, 3) for state in range(1, again + 3)
     ]
 
 
@@ -141,7 +148,9 @@ def test_a_family_is_one_run() -> None:
     run = open_binout(second, first)
     assert run.complete
     assert run.time.tolist() == expected("time", range(1, 31))
-    assert run.part_channel("x_momentum", [3])[25, 0] == values("x_momentum", 26, 3)
+    assert run.part_channel("x_momentum", [3])[25, 0] == compute_value(
+        "x_momentum", 26, 3
+    )
 
 
 def test_a_missing_member_of_a_family_is_noted() -> None:
@@ -159,7 +168,8 @@ def test_parts_that_change_are_read_by_id_or_refused() -> None:
     assert [part.id for part in run.parts] == [7, 3, 9]
     energies = run.part_channel("internal_energy", [3, 7])
     assert energies.tolist() == [
-        [values("internal_energy", s, id_) for id_ in (3, 7)] for s in range(1, 13)
+        [compute_value("internal_energy", s, id_) for id_ in (3, 7)]
+        for s in range(1, 13)
     ]
     with pytest.raises(
         FormatError,
@@ -179,7 +189,7 @@ def test_another_order_of_parts_of_the_same_count_is_followed() -> None:
         )
     )
     assert run.part_channel("x_momentum", [7])[:, 0].tolist() == [
-        values("x_momentum", s, 7) for s in range(1, 41)
+        compute_value("x_momentum", s, 7) for s in range(1, 41)
     ]
 
 

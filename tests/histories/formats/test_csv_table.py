@@ -13,7 +13,7 @@ from d2rpick.histories.formats.text import Text
 from d2rpick.histories.history import EXACT, History, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
-from tests.reading import history_of, on_disk, states_of
+from tests.reading import list_states, open_on_disk, read_contents
 
 TIMES = [0.0, 0.25, 0.625]
 ENERGIES = [1.5, 2.75, -3.125]
@@ -21,7 +21,9 @@ ENERGIES = [1.5, 2.75, -3.125]
 
 def read_table(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
-    return history_of(csv_table, data, selection=Selection(time, energy), name="table")
+    return read_contents(
+        csv_table, data, selection=Selection(time, energy), name="table"
+    )
 
 
 def write_rows(
@@ -265,17 +267,17 @@ SIDE_BY_SIDE = (
 
 def test_curves_side_by_side_have_times_of_their_own() -> None:
     """T/HIS writes them like this; a shorter curve ends in empty cells."""
-    assert states_of(read_table(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
-    assert states_of(read_table(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
+    assert list_states(read_table(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
+    assert list_states(read_table(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
     assert read_table(SIDE_BY_SIDE, "KE").time_precision == Precision(digits=1)
-    assert states_of(read_table(SIDE_BY_SIDE, "IE", "HE")) == [
+    assert list_states(read_table(SIDE_BY_SIDE, "IE", "HE")) == [
         (0, 8),
         (1, 11),
         (2, 13),
         (3, 16),
     ]
     without_names = SIDE_BY_SIDE.partition("\n")[2]
-    assert states_of(read_table(without_names, "4", time="3")) == [(0, 5), (0.5, 6)]
+    assert list_states(read_table(without_names, "4", time="3")) == [(0, 5), (0.5, 6)]
 
 
 @pytest.mark.parametrize(
@@ -551,7 +553,7 @@ def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     ]
     assert tables[0] == tables[1] == tables[2]
     file.write_bytes(data)
-    assert [in_pieces(on_disk(file), size) for size in (8, 1 << 17)] == tables[:2]
+    assert [in_pieces(open_on_disk(file), size) for size in (8, 1 << 17)] == tables[:2]
 
 
 HARD = st.floats(allow_nan=False, allow_infinity=False).map(repr) | st.from_regex(
@@ -569,7 +571,7 @@ def test_numbers_from_the_disk_are_those_of_python(
         "time,IE\n"
         + "".join(f"{number}.5,{text}\n" for number, text in enumerate(texts))
     )
-    table = csv_table.Table(Text(Source("table", on_disk(file))), Selection())
+    table = csv_table.Table(Text(Source("table", open_on_disk(file))), Selection())
     assert table.channel("IE").tolist() == [float(text) for text in texts]
 
 

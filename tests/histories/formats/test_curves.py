@@ -9,7 +9,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.history import History, Precision
 from d2rpick.histories.opening import Selection
-from tests.reading import history_of, run_of, states_of
+from tests.reading import list_states, open_contents, read_contents
 
 CURVEPLOT = """\
 Curveplot
@@ -58,7 +58,9 @@ CHANNELS = {
 
 
 def read_curves(text: str, *energy: str, time: str | None = None) -> History:
-    return history_of(csv_table, text, selection=Selection(time, energy), name="curves")
+    return read_contents(
+        csv_table, text, selection=Selection(time, energy), name="curves"
+    )
 
 
 @pytest.mark.parametrize("form", TEXTS)
@@ -66,18 +68,18 @@ def read_curves(text: str, *energy: str, time: str | None = None) -> History:
 def test_each_curve_has_its_own_times(form: str, end: str) -> None:
     text = TEXTS[form].replace("\n", end)
     first, second = CHANNELS[form]
-    assert run_of(csv_table, text, selection=Selection(energy=("2",))).databases[
+    assert open_contents(csv_table, text, selection=Selection(energy=("2",))).databases[
         0
     ].channels == (first, second)
     history = read_curves(text, "1")
-    assert (history.channel, states_of(history), history.complete) == (
+    assert (history.channel, list_states(history), history.complete) == (
         first,
         FIRST,
         True,
     )
     assert (
-        states_of(read_curves(text, second.upper()))
-        == states_of(read_curves(text, "2"))
+        list_states(read_curves(text, second.upper()))
+        == list_states(read_curves(text, "2"))
         == SECOND
     )
     with pytest.raises(
@@ -88,7 +90,7 @@ def test_each_curve_has_its_own_times(form: str, end: str) -> None:
 
 @pytest.mark.parametrize("form", ["T/HIS", "DYNAFORM"])
 def test_the_internal_energy_is_taken_by_default(form: str) -> None:
-    assert states_of(read_curves(TEXTS[form])) == FIRST
+    assert list_states(read_curves(TEXTS[form])) == FIRST
 
 
 @pytest.mark.parametrize("form", TEXTS)
@@ -101,7 +103,7 @@ def test_a_single_curve_needs_no_name(form: str) -> None:
     history = read_curves(
         TEXTS[form].partition(ends[form])[0].replace("Internal Energy", "Heat")
     )
-    assert states_of(history) == FIRST
+    assert list_states(history) == FIRST
 
 
 def test_what_the_labels_say() -> None:
@@ -119,7 +121,7 @@ def test_what_the_labels_say() -> None:
 
 
 def test_a_curve_has_its_own_times_and_no_others() -> None:
-    assert states_of(read_curves(CURVEPLOT, "1", time="Time")) == FIRST
+    assert list_states(read_curves(CURVEPLOT, "1", time="Time")) == FIRST
     with pytest.raises(
         FormatError, match="each curve has its own times; leave `time` '2' out"
     ):
@@ -134,7 +136,7 @@ def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
         for number, true in (("1", FIRST), ("2", SECOND)):
             with contextlib.suppress(FormatError):
                 history = read_curves(text, number)
-                states_read = states_of(history)
+                states_read = list_states(history)
                 assert states_read == true[: len(states_read)]
                 counts.add((number, len(states_read)))
                 assert history.complete or history.notes
@@ -156,17 +158,17 @@ PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
 
 def test_pairs_below_their_count_are_a_curve() -> None:
     history = read_curves(COUNTED)
-    assert (states_of(history), history.channel, history.complete) == (
+    assert (list_states(history), history.channel, history.complete) == (
         PAIRS,
         "curve 1",
         True,
     )
-    assert states_of(read_curves(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (
+    assert list_states(read_curves(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (
         0.0,
         7.0,
     )
     history = read_curves(COUNTED.replace("3\n", "4\n"))
-    assert (states_of(history), history.complete) == (PAIRS, False)
+    assert (list_states(history), history.complete) == (PAIRS, False)
     assert history.notes == ("the file ends within the curve 1",)
 
 
@@ -267,7 +269,7 @@ def test_labels_of_the_oasys_programs_have_types_and_factors(title: str) -> None
         "Whole model: Internal energy",
         "ms",
     )
-    assert states_of(history) == FIRST
+    assert list_states(history) == FIRST
     assert history.balance is not None
     assert history.balance.kinetic is not None
     assert history.balance.kinetic.tolist() == [5.0, 6.0, 7.0]

@@ -13,8 +13,8 @@ from d2rpick.base.errors import ChangedError, FormatError
 from d2rpick.histories.formats.d3plot import open_legs, recognises
 from d2rpick.histories.opening import Selection, Source, open_run, open_sources
 from d2rpick.histories.source import open_files
-from tests.made_d3plot import D3plotWriter, State, states
-from tests.text_files import glstat_text, matsum_text
+from tests.made_d3plot import D3plotWriter, State, make_states
+from tests.text_files import make_glstat_text, make_matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 TIMES = [0.0, 0.5, 1.0, 1.5, 2.0]
-STATES = states(TIMES)
+STATES = make_states(TIMES)
 
 
 def put(folder: Path, files: Mapping[str, bytes]) -> Path:
@@ -168,7 +168,7 @@ def test_a_run_that_still_writes_gives_more_each_time(tmp_path: Path) -> None:
 
 
 def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> None:
-    writer, later = D3plotWriter(), states([0.75, 2.0, 3.0])
+    writer, later = D3plotWriter(), make_states([0.75, 2.0, 3.0])
     files = {
         "d3plot": writer.head(),
         "d3plot01": writer.file(STATES[:3]),
@@ -183,7 +183,8 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
 def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
     """All releases with such a name have the number 960, yet the states contain positions of rigid walls."""
     run = open_family(
-        tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2)
+        tmp_path,
+        D3plotWriter(walls=2, name=name).written(make_states(TIMES, walls=2), 2),
     )
     assert_holds(run, STATES)
     for wall in (1, 2):
@@ -259,7 +260,7 @@ def test_what_a_model_has_besides_is_passed_over(kind: str, tmp_path: Path) -> N
 
 
 def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
-    often = states([0.1 * number for number in range(30)])
+    often = make_states([0.1 * number for number in range(30)])
     run = open_family(tmp_path, D3plotWriter(family=3).written(often, 4, "d3thdt"))
     assert_holds(run, often)
     assert run.databases[0].format == "d3thdt"
@@ -392,7 +393,9 @@ def test_a_job_has_its_name_before_that_of_the_family(tmp_path: Path) -> None:
 
 def test_two_families_of_one_run_are_its_legs(tmp_path: Path) -> None:
     first = put(tmp_path / "leg1", D3plotWriter().written(STATES[:3]))
-    second = put(tmp_path / "leg2", D3plotWriter().written(states([1.0, 2.0, 3.0])[1:]))
+    second = put(
+        tmp_path / "leg2", D3plotWriter().written(make_states([1.0, 2.0, 3.0])[1:])
+    )
     run = open_run([str(first), str(second)])
     assert run.databases[0].time.tolist() == [0.0, 0.5, 1.0, 2.0, 3.0]
 
@@ -406,7 +409,7 @@ def test_other_files_are_none() -> None:
     assert not recognises(b" " * 8192)
 
 
-GLSTAT = glstat_text(TIMES, [sum(state.internal) for state in STATES])
+GLSTAT = make_glstat_text(TIMES, [sum(state.internal) for state in STATES])
 
 
 def test_in_a_folder_a_d3plot_gives_what_the_others_leave_out(tmp_path: Path) -> None:
@@ -416,7 +419,9 @@ def test_in_a_folder_a_d3plot_gives_what_the_others_leave_out(tmp_path: Path) ->
     assert [part.id for part in run.parts] == [7, 3]
     assert run.history(Selection()).energy_format == "glstat"
     assert run.history(Selection(parts=("7",))).energy_format == "d3plot"
-    matsum = matsum_text(TIMES, [7, 3], np.array([state.internal for state in STATES]))
+    matsum = make_matsum_text(
+        TIMES, [7, 3], np.array([state.internal for state in STATES])
+    )
     put(tmp_path, {"matsum": matsum})
     run = open_run([str(tmp_path)])
     assert [database.format for database in run.databases] == ["glstat", "matsum"]
@@ -448,7 +453,7 @@ def test_a_file_that_is_written_anew_meanwhile_is_refused(tmp_path: Path) -> Non
 
 def test_more_files_than_a_process_may_have_open_are_read(tmp_path: Path) -> None:
     resource = pytest.importorskip("resource")
-    first = put(tmp_path, D3plotWriter().written(states(np.arange(80.0).tolist())))
+    first = put(tmp_path, D3plotWriter().written(make_states(np.arange(80.0).tolist())))
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (60, limits[1]))
     try:

@@ -16,29 +16,29 @@ from tests.damaged_files import (
     FILES,
     PARTS,
     STATES,
-    bounded_memory,
-    true_binout,
-    true_t01,
+    check_binout,
+    check_t01,
+    limit_memory,
 )
-from tests.faults import cases, some
-from tests.made_binout import Style, binout
+from tests.faults import choose_some, make_settings
+from tests.made_binout import Style, make_binout
 
 
 @pytest.mark.parametrize("tables", [True, False])
 def test_a_binout_cut_at_any_byte_keeps_its_whole_states(tables: bool) -> None:
-    writer = binout(range(1, STATES + 1), PARTS, tables=tables)
+    writer = make_binout(range(1, STATES + 1), PARTS, tables=tables)
     data = bytes(writer.data)
     states = [
         mark
         for mark in writer.marks
         if data[mark + 8] == 2 and b"/glstat/d" in data[mark : mark + 25]
     ]
-    assert true_binout(data) == [(STATES, True)] * 5
-    for cut in some(range(len(data))):
+    assert check_binout(data) == [(STATES, True)] * 5
+    for cut in choose_some(range(len(data))):
         whole = sum(
             state < cut for state in states[1:]
         )  # a state is whole once the next one has begun
-        states_read = true_binout(data[:cut])
+        states_read = check_binout(data[:cut])
         assert all(count >= whole for count, _ in states_read)
         assert len(states_read) == 5 or whole < 2
 
@@ -51,7 +51,7 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states(
     begin = file.made.marks[file.first]
     stride = (len(file.data) - begin) // file.states
     for cut in sorted(
-        {*some(range(len(file.data)), 23), *file.made.marks, len(file.data)}
+        {*choose_some(range(len(file.data)), 23), *file.made.marks, len(file.data)}
     ):
         whole, bytes_left = divmod(cut - begin, stride)
         states_read = file.true(file.data[:cut])
@@ -68,7 +68,7 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states(
 def test_any_byte_of_structure_may_be_wrong(name: str, flip: int) -> None:
     file = FILES[name]
     data = bytearray(file.data)
-    for address in some(file.structure[flip % 7 :], 37):
+    for address in choose_some(file.structure[flip % 7 :], 37):
         data[address] ^= flip
         file.true(bytes(data))
         data[address] ^= flip
@@ -80,12 +80,12 @@ def test_bytes_inserted_into_a_value_or_lost_from_it_shift_no_number(
     states: int, change: int
 ) -> None:
     """The damaged record is the one before the address at which the records cannot be followed any more."""
-    writer = binout(range(1, states + 1), PARTS, tables=False)
+    writer = make_binout(range(1, states + 1), PARTS, tables=False)
     data = bytes(writer.data)
     for begin, end in pairwise([*writer.marks, len(data)]):
         if data[begin + 8] == 3 and end < len(data):
             middle = end - 4
-            true_binout(
+            check_binout(
                 data[:middle] + b"\x11" * change + data[middle + max(0, -change) :]
             )
 
@@ -104,12 +104,12 @@ def test_a_variable_whose_type_changes_between_states_is_left_out_with_a_note() 
 
 
 @pytest.mark.parametrize("name", FILES)
-@cases(40)
+@make_settings(40)
 @given(random=st.randoms(use_true_random=True))
 def test_records_may_be_lost_doubled_and_moved_and_bytes_put_in_and_changed(
     name: str, random: Random
 ) -> None:
-    with nullcontext() if name == "long binout" else bounded_memory():
+    with nullcontext() if name == "long binout" else limit_memory():
         FILES[name].true(FILES[name].restructured(random))
 
 
@@ -118,15 +118,15 @@ def test_records_may_be_lost_doubled_and_moved_and_bytes_put_in_and_changed(
     st.sampled_from([FILES["binout"].data[:700], FILES["T01"].data[:700], b""]),
 )
 def test_any_bytes_behind_a_true_beginning(rest: bytes, beginning: bytes) -> None:
-    with bounded_memory():
-        true_binout(beginning + rest)
-        true_t01(beginning + rest)
+    with limit_memory():
+        check_binout(beginning + rest)
+        check_t01(beginning + rest)
 
 
 @pytest.mark.parametrize(
     "style", [Style(">", 4, 4, 1, 1, "f8"), Style("<", 8, 4, 2, 4, "f4")], ids=str
 )
 def test_other_styles_cut_anywhere(style: Style) -> None:
-    data = bytes(binout(range(1, 4), PARTS, style=style).data)
-    for cut in some(range(len(data))):
-        true_binout(data[:cut])
+    data = bytes(make_binout(range(1, 4), PARTS, style=style).data)
+    for cut in choose_some(range(len(data))):
+        check_binout(data[:cut])

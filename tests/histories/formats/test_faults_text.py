@@ -11,18 +11,18 @@ from d2rpick.histories.formats import glstat, matsum
 from tests.faults import (
     FAULTS,
     Fault,
-    cases,
     damage,
-    glstat_states,
     is_within,
-    matsum_states,
+    make_settings,
+    read_glstat_states,
+    read_matsum_states,
 )
-from tests.text_files import glstat_text, matsum_text
+from tests.text_files import make_glstat_text, make_matsum_text
 
 IDS = [1, 12, 13]
-GLSTAT = glstat_text(np.arange(8) / 8, np.arange(8) ** 3 - 10)
+GLSTAT = make_glstat_text(np.arange(8) / 8, np.arange(8) ** 3 - 10)
 MATSUM = {
-    lines: matsum_text(
+    lines: make_matsum_text(
         np.arange(8) / 8, IDS, 10.0 * np.arange(8)[:, None] + np.array(IDS), lines
     )
     for lines in (3, 4)
@@ -41,7 +41,7 @@ def legs(text: bytes) -> int:
 def check_glstat(faults: list[Fault]) -> bool:
     """Return True if the damaged file could be read."""
     text = damage(GLSTAT, faults, borders(GLSTAT, b" dt of cycle"))
-    states = glstat_states(text)
+    states = read_glstat_states(text)
     try:
         run = glstat.Glstat(text, "glstat", ["internal energy"])
         energy = run.channel("internal energy").tolist()
@@ -72,9 +72,9 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
                 (time, row[column])
                 for time, row in zip(run.part_time.tolist(), energies, strict=True)
             ]
-            states = matsum_states(text, id_)
+            states = read_matsum_states(text, id_)
             # If one part is read, only its lines are compared, not those of other parts that may have its number.
-            assert is_within(states_read, states, most=1 if ids == IDS else 2), (
+            assert is_within(states_read, states, most_lost=1 if ids == IDS else 2), (
                 id_,
                 states_read,
                 states,
@@ -84,14 +84,14 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
     return readable > 0
 
 
-@cases(40)
+@make_settings(40)
 @given(FAULTS)
 def test_glstat(faults: list[Fault]) -> None:
     check_glstat(faults)
 
 
 @pytest.mark.parametrize("lines", MATSUM)
-@cases(40)
+@make_settings(40)
 @given(faults=FAULTS)
 def test_matsum(lines: int, faults: list[Fault]) -> None:
     check_matsum(faults, lines)

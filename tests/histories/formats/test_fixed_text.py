@@ -12,7 +12,12 @@ from d2rpick.histories.content import Content
 from d2rpick.histories.formats.blocks import parse_numbers
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
-from tests.text_files import HEAD, glstat_blocks, glstat_text, matsum_text
+from tests.text_files import (
+    HEAD,
+    make_glstat_blocks,
+    make_glstat_text,
+    make_matsum_text,
+)
 
 IDS = [1, 20, 300]
 Sizes = dict[str, int]  # numbers of blocks and fields that are read together
@@ -30,7 +35,9 @@ def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
     )
     time = np.arange(states) / 8
     text = bytearray(
-        matsum_text(time, IDS, energies) if parts else glstat_text(time, energies[:, 0])
+        make_matsum_text(time, IDS, energies)
+        if parts
+        else make_glstat_text(time, energies[:, 0])
     )
     numbers = [
         match.end() - 6
@@ -102,7 +109,7 @@ class Noted(Content):
 
 def test_what_is_taken_ahead_is_not_fetched() -> None:
     states = np.arange(200.0)
-    data = Noted(glstat_text(states, states**2))
+    data = Noted(make_glstat_text(states, states**2))
     run = Glstat(data, "glstat", ["internal energy"])
     assert run.channel("internal energy").tolist() == (states**2).tolist()
     assert (
@@ -114,7 +121,7 @@ def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alo
     None
 ):
     states = np.arange(200.0)
-    text = glstat_text(states, states)
+    text = make_glstat_text(states, states)
     sound, damaged = (
         Noted(text),
         text.replace(
@@ -139,7 +146,9 @@ def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alo
 
 def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:
     states = np.arange(200.0)
-    text = glstat_text(states, states + 0.125).replace(b"1.00125E+02", b"1.00*25E+02")
+    text = make_glstat_text(states, states + 0.125).replace(
+        b"1.00125E+02", b"1.00*25E+02"
+    )
     run = Glstat(text, "glstat", ["internal energy"])
     assert run.time.tolist() == states.tolist()
     line = 1 + text[: text.index(b"*25")].count(b"\n")
@@ -154,7 +163,7 @@ def test_blocks_whose_length_varies_are_read(lengths: int) -> None:
     states = np.arange(100.0)
     blocks = [
         block.replace(b"100449", b"1" * (1 + state % lengths))
-        for state, block in enumerate(glstat_blocks(states, states**2))
+        for state, block in enumerate(make_glstat_blocks(states, states**2))
     ]
     run = Glstat(HEAD + b"\n\n" + b"".join(blocks), "glstat", ["internal energy"])
     assert run.time.tolist() == states.tolist()

@@ -10,8 +10,8 @@ from d2rpick.histories.formats import glstat
 from d2rpick.histories.history import History, Precision
 from d2rpick.histories.opening import Selection
 from tests.command import ROOT
-from tests.faults import cuts
-from tests.reading import history_of, run_of, states_of
+from tests.faults import list_cuts
+from tests.reading import list_states, open_contents, read_contents
 
 HEAD = """\
  Internal energy of a time box, 1.0E+00
@@ -65,7 +65,9 @@ WHOLE = HEAD + "".join(
 
 
 def read_glstat(text: str | bytes, *energy: str) -> History:
-    return history_of(glstat, text, selection=Selection(energy=energy), name="glstat")
+    return read_contents(
+        glstat, text, selection=Selection(energy=energy), name="glstat"
+    )
 
 
 KILLED = "a leg that was killed, and its restart"
@@ -147,7 +149,7 @@ SCENARIOS = {
 def test_scenario(name: str) -> None:
     text, expected = SCENARIOS[name]
     history = read_glstat(text)
-    assert states_of(history) == [tuple(map(float, state)) for state in expected]
+    assert list_states(history) == [tuple(map(float, state)) for state in expected]
     assert history.channel == "internal energy"
     assert history.format == "glstat"
     assert history.complete
@@ -169,7 +171,7 @@ def test_notes_say_what_was_left_out() -> None:
 
 
 def test_a_head_alone_is_a_legal_file_without_states() -> None:
-    run = run_of(glstat, HEAD)
+    run = open_contents(glstat, HEAD)
     assert run.databases[0].span is None
     assert run.databases[0].complete
     assert (
@@ -287,15 +289,15 @@ def test_other_lines_of_a_damaged_state_are_still_good() -> None:
 @pytest.mark.parametrize("energy", ["internal energy", "added mass"])
 def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
     whole = WHOLE.encode()
-    expected = states_of(read_glstat(whole, energy))
+    expected = list_states(read_glstat(whole, energy))
     outcomes: set[str | int] = set()
-    for cut in cuts(whole):
+    for cut in list_cuts(whole):
         try:
             history = read_glstat(whole[:cut], energy)
         except FormatError:
             outcomes.add("error")
             continue
-        states_read = states_of(history)
+        states_read = list_states(history)
         assert states_read == expected[: len(states_read)]
         outcomes.add(len(states_read))
         # A file cut between two lines differs from a whole file only by the missing lines.
@@ -306,7 +308,7 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
 
 def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     cut = WHOLE[: WHOLE.rindex(" hourglass") + 40]
-    assert states_of(read_glstat(cut)) == list(STATES)
+    assert list_states(read_glstat(cut)) == list(STATES)
     assert (
         read_glstat(cut).notes[-1]
         == "the file ends within its last state, after the lines that were needed"
@@ -319,7 +321,7 @@ def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     assert read_glstat(at_its_end).time.size == 2  # no line follows
     assert read_glstat(at_its_end + " ").time.size == 3
     assert (
-        run_of(glstat, cut, selection=Selection(energy=("no such line",)))
+        open_contents(glstat, cut, selection=Selection(energy=("no such line",)))
         .databases[0]
         .time.size
         == 2
@@ -332,7 +334,7 @@ def test_a_byte_lost_or_put_between_the_columns_is_seen(damage: str) -> None:
     for position in range(start, start + 34):
         removed = WHOLE[:position] + damage + WHOLE[position + 1 :]
         try:
-            states_read = states_of(read_glstat(removed))
+            states_read = list_states(read_glstat(removed))
         except FormatError:
             continue
         assert states_read == list(STATES)

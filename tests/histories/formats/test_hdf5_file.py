@@ -18,8 +18,8 @@ from d2rpick.histories.formats.hdf5_file import SavedBinout, check_file
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
-from tests.computed import stored, unpacked
-from tests.faults import FAULTS, Fault, cases, damage
+from tests.computed import locate_stored, read_unpacked
+from tests.faults import FAULTS, Fault, damage, make_settings
 from tests.hdf5_files import (
     ENERGY,
     KINETIC,
@@ -28,13 +28,13 @@ from tests.hdf5_files import (
     TIME,
     lasso,
     plain,
-    written,
+    write_hdf5,
 )
-from tests.reading import history_of
+from tests.reading import read_contents
 
 
 def read_hdf5(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
-    return history_of(
+    return read_contents(
         hdf5_file, file.getvalue(), selection=Selection(time, energy), name="run.h5"
     )
 
@@ -52,12 +52,12 @@ def make_file(columns: Mapping[str, object]) -> io.BytesIO:
         for name, values in columns.items():
             file[name] = values
 
-    return written(write)
+    return write_hdf5(write)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
-    file = written(LAYOUTS[layout])
+    file = write_hdf5(LAYOUTS[layout])
     assert hdf5_file.recognises(file.getvalue()[:520])
     history = read_hdf5(file)
     expected = ENERGY.astype("f4") if layout == "columns_upright" else ENERGY
@@ -85,7 +85,7 @@ def test_columns_that_make_most_of_a_file_are_read_where_they_lie(
 
 
 def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
-    run = open_saved_binout(written(lasso))
+    run = open_saved_binout(write_hdf5(lasso))
     assert (run.title, run.version) == ("Sphere", "smp s 365")
     assert run.channels == ("internal_energy", "kinetic_energy")
     assert run.channel("kinetic_energy").tolist() == KINETIC.tolist()
@@ -127,7 +127,7 @@ def test_matrix_of_another_shape_is_refused() -> None:
         file["matsum/internal_energy"] = PARTS.T
 
     with pytest.raises(FormatError, match=r"has shape \(2, 4\), \(4, 2\) was expected"):
-        open_saved_binout(written(turned)).part_channel("internal_energy", [1])
+        open_saved_binout(write_hdf5(turned)).part_channel("internal_energy", [1])
 
 
 def test_several_candidates_are_listed() -> None:
@@ -149,18 +149,18 @@ def test_several_candidates_are_listed() -> None:
 
 def test_explicit_paths_win() -> None:
     history = read_hdf5(
-        written(plain), "kinetic_energy", "internal_energy", time="/time"
+        write_hdf5(plain), "kinetic_energy", "internal_energy", time="/time"
     )
     assert history.energy.tolist() == (KINETIC + ENERGY).tolist()
     assert (
-        read_hdf5(written(lasso), "glstat/kinetic_energy").energy.tolist()
+        read_hdf5(write_hdf5(lasso), "glstat/kinetic_energy").energy.tolist()
         == KINETIC.tolist()
     )
     with pytest.raises(
         FormatError,
         match=r"no column for 'kinetic'.*give its path: .*kinetic_energy \(4\)",
     ):
-        read_hdf5(written(plain), "kinetic")
+        read_hdf5(write_hdf5(plain), "kinetic")
 
 
 def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
@@ -224,11 +224,11 @@ def test_shape_far_too_large_for_the_file_is_refused() -> None:
         file.create_dataset("t", (10**12,), "f8", chunks=(1000,))
 
     with pytest.raises(FormatError, match="is the file damaged"):
-        read_hdf5(written(write), "internal_energy", time="t")
+        read_hdf5(write_hdf5(write), "internal_energy", time="t")
 
 
 SMALL = {
-    layout: written(LAYOUTS[layout]).getvalue()
+    layout: write_hdf5(LAYOUTS[layout]).getvalue()
     for layout in ("plain", "compound", "lasso")
 }
 
@@ -254,7 +254,7 @@ def check(layout: str, faults: list[Fault]) -> None:
 
 
 @pytest.mark.slow
-@cases(10)
+@make_settings(10)
 @given(FAULTS)
 def test_damaged_files(faults: list[Fault]) -> None:
     for layout in SMALL:
@@ -276,12 +276,12 @@ def chunked(file: h5py.File) -> None:
 
 
 def test_bytes_behind_the_end_are_refused() -> None:
-    content = written(plain).getvalue()
+    content = write_hdf5(plain).getvalue()
     with pytest.raises(
         FormatError,
         match=f"{len(content) + 4} bytes, {len(content)} by its own header; it is damaged",
     ):
-        history_of(hdf5_file, content + b"0000", name="run.h5")
+        read_contents(hdf5_file, content + b"0000", name="run.h5")
 
 
 def test_chunks_that_were_never_written_are_no_zeros() -> None:
@@ -292,12 +292,13 @@ def test_chunks_that_were_never_written_are_no_zeros() -> None:
         file.create_dataset("never", (40,), dtype="f8")
 
     assert (
-        read_hdf5(written(unfinished)).energy.tolist() == (np.arange(40.0) % 7).tolist()
+        read_hdf5(write_hdf5(unfinished)).energy.tolist()
+        == (np.arange(40.0) % 7).tolist()
     )
     with pytest.raises(FormatError, match="/later has 3 of 5 chunks of its data"):
-        read_hdf5(written(unfinished), "later")
+        read_hdf5(write_hdf5(unfinished), "later")
     with pytest.raises(FormatError, match="/never was never written"):
-        read_hdf5(written(unfinished), "never")
+        read_hdf5(write_hdf5(unfinished), "never")
 
 
 def odd_float() -> h5py.h5t.TypeFloatID:
@@ -343,7 +344,7 @@ def test_numbers_of_no_standard_type_are_refused(
             FormatError,
             match=r"numbers of [48] bytes that are no standard type of HDF5",
         ):
-            read_hdf5(written(damaged))
+            read_hdf5(write_hdf5(damaged))
 
 
 @pytest.mark.parametrize(
@@ -366,7 +367,7 @@ def test_numbers_of_every_standard_type_are_read(kind: str) -> None:
 
 
 def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
-    content = bytearray(written(chunked).getvalue())
+    content = bytearray(write_hdf5(chunked).getvalue())
     with h5py.File(io.BytesIO(content)) as file:
         content[file["internal_energy"].id.get_chunk_info(2).byte_offset + 5] ^= 1
     with pytest.raises(FormatError, match="HDF5 cannot be read"):
@@ -393,7 +394,7 @@ def test_a_crash_of_the_library_is_survived() -> None:
     with pytest.raises(
         FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"
     ):
-        check_file(Fatal(written(plain).getvalue()), "run.h5")
+        check_file(Fatal(write_hdf5(plain).getvalue()), "run.h5")
 
 
 @pytest.mark.slow
@@ -402,19 +403,22 @@ def test_a_library_that_comes_to_no_end_is_ended() -> None:
         FormatError,
         match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged",
     ):
-        check_file(Endless(written(plain).getvalue()), "run.h5", seconds=1)
+        check_file(Endless(write_hdf5(plain).getvalue()), "run.h5", seconds=1)
 
 
 @pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])
 def test_damaged_files_that_were_found_are_refused(name: str) -> None:
     with pytest.raises(FormatError, match="damaged"):
-        read_hdf5(io.BytesIO(unpacked(stored(f"faults/hdf5_{name}.h5.gz"))))
+        read_hdf5(io.BytesIO(read_unpacked(locate_stored(f"faults/hdf5_{name}.h5.gz"))))
 
 
 def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
     with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
         read_hdf5(
-            io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))), "energy"
+            io.BytesIO(
+                read_unpacked(locate_stored("faults/hdf5_newline_in_error.h5.gz"))
+            ),
+            "energy",
         )
 
 
@@ -428,7 +432,7 @@ def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
 def test_without_its_library_a_file_is_refused_with_what_to_do(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    content = written(plain)
+    content = write_hdf5(plain)
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(
         FormatError, match=r"run\.h5: HDF5 files need h5py; pip install h5py"

@@ -5,21 +5,27 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import matsum
-from tests.faults import cuts
-from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
+from tests.faults import list_cuts
+from tests.text_files import (
+    HEAD,
+    make_matsum_head,
+    make_matsum_part,
+    make_matsum_state,
+    make_matsum_text,
+)
 
 TIMES = [0.0, 0.1, 0.25, 0.3]
 IDS = [10, 1, 123456]
 ENERGIES = np.array(
     [[0.0, 1.0, 2.0], [3.0, -4.5, 5.0], [6.0, 7.0, 1e-22], [9.0, 10.0, 11.0]]
 )
-TEXT = matsum_text(TIMES, IDS, ENERGIES)
+TEXT = make_matsum_text(TIMES, IDS, ENERGIES)
 MASS = (
     b"       Maximum mass increase in solid elements      =   0.2122E-07 ID=   36456\n"
 )
-LUMPED = matsum_part(0, 0.0, lines=3)
+LUMPED = make_matsum_part(0, 0.0, lines=3)
 STATES = [
-    matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)
+    make_matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)
 ]
 LONG = 150  # states; from so many on, the reader remembers which bytes differ between blocks
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
@@ -41,12 +47,14 @@ def assert_as_written(run: matsum.Matsum) -> None:
 
 SAME = {
     "four lines": TEXT,
-    "three lines": matsum_text(TIMES, IDS, ENERGIES, lines=3),
+    "three lines": make_matsum_text(TIMES, IDS, ENERGIES, lines=3),
     "CRLF": TEXT.replace(b"\n", b"\r\n"),
     "trailing blanks": TEXT.replace(b"\n", b" \n"),
     "no legend": HEAD + b"\n\n" + TEXT[TEXT.index(b" time =") :],
     "no head": TEXT[TEXT.index(b" time =") :],
-    "legend in another order": TEXT.replace(matsum_head(IDS), matsum_head(IDS[::-1])),
+    "legend in another order": TEXT.replace(
+        make_matsum_head(IDS), make_matsum_head(IDS[::-1])
+    ),
     "titles like data": TEXT.replace(b"Part 10 ", b"mat.#=   10  inten=   1.0000E+00 "),
     "mass increase lines": TEXT.replace(b" time =   2.5", MASS + b" time =   2.5"),
     "lumped masses": TEXT.replace(b" mat.#=   10", LUMPED + b" mat.#=   10"),
@@ -58,7 +66,7 @@ SAME = {
         b"hgeng=   0.0000E+00     +mass=   0.0000E+00     eroded_he=   0.0000E+00",
     ),
     "parts in another order in state 3": TEXT.replace(
-        STATES[2], matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])
+        STATES[2], make_matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])
     ),
 }
 
@@ -78,10 +86,12 @@ def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(
     """States have the same time lines and are alike at both ends; the difference shows only when a part is read."""
     ids, indices = [11, 12, 13, *range(20, 30)], [*order, *range(3, 13)]
     energies = np.arange(8 * 13.0).reshape(8, 13)
-    states = [matsum_state(time, ids, row) for time, row in enumerate(energies)]
-    states[4] = matsum_state(4, [ids[index] for index in indices], energies[4][indices])
+    states = [make_matsum_state(time, ids, row) for time, row in enumerate(energies)]
+    states[4] = make_matsum_state(
+        4, [ids[index] for index in indices], energies[4][indices]
+    )
     for wanted_ids in ([12], [11, 12], ids):
-        run = read_matsum(matsum_head(ids) + b"".join(states))
+        run = read_matsum(make_matsum_head(ids) + b"".join(states))
         expected = energies[:, [ids.index(id_) for id_ in wanted_ids]]
         assert (
             run.part_channel("internal_energy", wanted_ids).tolist()
@@ -93,11 +103,11 @@ def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
     states = [
         *STATES[:2],
         *(
-            matsum_state(t, IDS[1:], e[1:])
+            make_matsum_state(t, IDS[1:], e[1:])
             for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True)
         ),
     ]
-    run = read_matsum(matsum_head(IDS) + b"".join(states))
+    run = read_matsum(make_matsum_head(IDS) + b"".join(states))
     assert run.notes == ("only some states have part 10",)
     assert (
         run.part_channel("internal_energy", [1])[:, 0].tolist()
@@ -111,7 +121,7 @@ def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
 
 def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
     states = [STATES[0].replace(b"=   10", b"=   20"), *STATES[1:]]
-    run = read_matsum(matsum_head([*IDS, 20]) + b"".join(states))
+    run = read_matsum(make_matsum_head([*IDS, 20]) + b"".join(states))
     with pytest.raises(FormatError, match=r"inten of part .* is missing"):
         run.part_channel("internal_energy", [10])
     assert (
@@ -121,7 +131,7 @@ def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
 
 
 def test_part_of_the_legend_that_is_in_no_state() -> None:
-    run = read_matsum(TEXT.replace(matsum_head(IDS), matsum_head([*IDS, 7])))
+    run = read_matsum(TEXT.replace(make_matsum_head(IDS), make_matsum_head([*IDS, 7])))
     assert_as_written(run)
     assert run.notes == ("no state has part 7 of the legend",)
     with pytest.raises(
@@ -145,7 +155,7 @@ def test_id_that_overflows_is_the_one_of_the_legend() -> None:
 def test_two_ids_that_overflow_are_left_out() -> None:
     ids = [10, 123456, 223456]
     text = (
-        matsum_text(TIMES, ids, ENERGIES)
+        make_matsum_text(TIMES, ids, ENERGIES)
         .replace(b"=  123456", b"=********")
         .replace(b"=  223456", b"=********")
     )
@@ -181,7 +191,9 @@ def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
     damaged = STATES[2].replace(
         b"=   10             i", id_text.replace(b"    1 ", b"   1 ")
     )
-    run = read_matsum(matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]]))
+    run = read_matsum(
+        make_matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]])
+    )
     with pytest.raises(FormatError, match="inten of part 10 is missing"):
         run.part_channel("internal_energy", [10])
     assert (
@@ -202,11 +214,12 @@ def test_numbers_that_are_the_same_in_most_states(
     if changed is not None:
         energies[changed, :3] = [1e-22, 3.0, -0.0]
     states = [
-        matsum_state(time, ids, row) for time, row in zip(times, energies, strict=True)
+        make_matsum_state(time, ids, row)
+        for time, row in zip(times, energies, strict=True)
     ]
     if swapped:
-        states[100] = matsum_state(times[100], ids[::-1], energies[100, ::-1])
-    run = read_matsum(matsum_head(ids) + b"".join(states))
+        states[100] = make_matsum_state(times[100], ids[::-1], energies[100, ::-1])
+    run = read_matsum(make_matsum_head(ids) + b"".join(states))
     for _ in range(
         2
     ):  # at the second request at the latest, the whole file is compared
@@ -222,7 +235,7 @@ def test_numbers_that_are_the_same_in_most_states(
 def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first() -> (
     None
 ):
-    text = matsum_text(np.arange(LONG), [11, 12], np.zeros((LONG, 2)))
+    text = make_matsum_text(np.arange(LONG), [11, 12], np.zeros((LONG, 2)))
     text = text.replace(b"y-mom=   0.0000E+00", b"y-mom=" + b"*" * 13)
     run = read_matsum(text)
     assert run.part_channel("internal_energy", [11, 12]).shape == (LONG, 2)
@@ -248,7 +261,7 @@ def test_what_is_no_number_is_refused_with_its_line(field: bytes) -> None:
 
 
 def test_quantity_that_was_not_written_is_refused() -> None:
-    run = read_matsum(matsum_text(TIMES, IDS, ENERGIES, lines=3))
+    run = read_matsum(make_matsum_text(TIMES, IDS, ENERGIES, lines=3))
     with pytest.raises(FormatError, match="hgeng of part 1 is missing"):
         run.part_channel("hourglass_energy", [1])
     with pytest.raises(
@@ -271,13 +284,13 @@ def test_something_else_is_no_matsum(text: bytes) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("lines", "legend"), [(3, True), (4, False)])
 def test_cut_anywhere_gives_whole_states_only(lines: int, legend: bool) -> None:
-    text = matsum_text(TIMES[:3], IDS, ENERGIES[:3], lines)
+    text = make_matsum_text(TIMES[:3], IDS, ENERGIES[:3], lines)
     first = text.index(b" time =")
     if not legend:
         text = HEAD + b"\n\n" + text[first:]
         first = text.index(b" time =")
     starts = [at for at in range(len(text)) if text.startswith(b" time =", at)]
-    for end in (cut for cut in cuts(text) if cut >= len(HEAD)):
+    for end in (cut for cut in list_cuts(text) if cut >= len(HEAD)):
         run = read_matsum(text[:end])
         n = run.part_time.size
         assert run.part_time.tolist() == TIMES[:n]

@@ -11,10 +11,10 @@ from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
 from tests.command import BOX, ROLLOVER
-from tests.computed import stored, unpacked
+from tests.computed import locate_stored, read_unpacked
 from tests.damaged_files import FILES, printed
-from tests.made_t01 import MadePart, T01TextWriter, T01Writer, t01, value
-from tests.reading import run_of
+from tests.made_t01 import MadePart, T01TextWriter, T01Writer, make_t01, make_value
+from tests.reading import open_contents
 
 SMALL = FILES["T01 as text"]
 FORMS: dict[str, Callable[[], T01Writer]] = {
@@ -43,7 +43,9 @@ def test_any_age_and_form_of_the_format(
         MadePart(12, "step"),
         MadePart(3, "half a box", is_group=True),
     ]
-    writer = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
+    writer = make_t01(
+        5, parts, globals_=globals_, code=code, title=title, writer=into()
+    )
     written = printed if isinstance(writer, T01TextWriter) else float
     assert recognises(bytes(writer.data)[:300])
     run = open_history(writer)
@@ -57,7 +59,7 @@ def test_any_age_and_form_of_the_format(
     assert len(run.channels) == globals_
     for number, name in enumerate(run.channels, start=1):
         assert run.channel(name).tolist() == [
-            written(value(state, 0, number)) for state in range(5)
+            written(make_value(state, 0, number)) for state in range(5)
         ]
     for number, name in (
         (1, "internal_energy"),
@@ -65,24 +67,29 @@ def test_any_age_and_form_of_the_format(
         (7, "hourglass_energy"),
     ):
         expected = [
-            [written(value(s, id_, number)) for id_ in (12, 3)] for s in range(5)
+            [written(make_value(s, id_, number)) for id_ in (12, 3)] for s in range(5)
         ]
         assert run.part_channel(name, [12, 3]).tolist() == expected
 
 
 @pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
 def test_control_bytes_in_titles_are_blanks(into: Callable[[], T01Writer]) -> None:
-    data = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(
+    data = bytes(make_t01(1, [MadePart(1, "part 7")], writer=into()).data).replace(
         b"part 7", b"p\nrt\x007"
     )
     assert open_history(data).parts[0].title == "p rt 7"
 
 
 @pytest.mark.parametrize(
-    "path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")]
+    "path",
+    [
+        BOX,
+        locate_stored("rollover_r100_T02.gz"),
+        locate_stored("chain_referenceT01.gz"),
+    ],
 )
 def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
-    run = open_history(unpacked(path))
+    run = open_history(read_unpacked(path))
     total = run.part_channel("internal_energy", [part.id for part in run.parts]).sum(
         axis=1
     )
@@ -93,7 +100,7 @@ def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
 
 def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
     """rollover_ref.csv was made apart from these files: seven digits of energies, parts box and step."""
-    run = open_history(unpacked(BOX))
+    run = open_history(read_unpacked(BOX))
     table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     at = np.searchsorted(run.time, table["time_s"] - 1e-7)
     box = run.part_channel("internal_energy", [1])[at, 0]
@@ -106,7 +113,8 @@ def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
 
 def test_legs_follow_one_another() -> None:
     legs = [
-        open_history(unpacked(stored(f"rollover_r100_T0{leg}.gz"))) for leg in (1, 2, 3)
+        open_history(read_unpacked(locate_stored(f"rollover_r100_T0{leg}.gz")))
+        for leg in (1, 2, 3)
     ]
     assert [leg.time.size for leg in legs] == [201, 541, 161]
     assert (np.diff(np.concatenate([leg.time for leg in legs])) > 0).all()
@@ -114,16 +122,16 @@ def test_legs_follow_one_another() -> None:
 
 def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> None:
     run = open_history(
-        t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)])
+        make_t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)])
     )
     assert [(part.id, part.title) for part in run.parts] == [(1, "box")]
     assert run.part_channel("internal_energy", [1])[:, 0].tolist() == [
-        value(s, 1, 1) for s in range(2)
+        make_value(s, 1, 1) for s in range(2)
     ]
 
 
 def test_a_part_without_variables_is_noted_and_refused() -> None:
-    run = open_history(t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
+    run = open_history(make_t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
     assert [part.id for part in run.parts] == [1]
     assert any("no variables of part 2 in the file" in note for note in run.notes)
     with pytest.raises(
@@ -133,7 +141,7 @@ def test_a_part_without_variables_is_noted_and_refused() -> None:
 
 
 def test_a_variable_that_was_not_asked_for_is_refused() -> None:
-    run = open_history(t01(2, [MadePart(1, "box", codes=(1, 2))]))
+    run = open_history(make_t01(2, [MadePart(1, "box", codes=(1, 2))]))
     with pytest.raises(
         FormatError,
         match="no x_momentum of part 1, only internal_energy, kinetic_energy;",
@@ -144,7 +152,7 @@ def test_a_variable_that_was_not_asked_for_is_refused() -> None:
 
 
 def test_no_states_is_a_legal_file() -> None:
-    run = open_history(t01(0))
+    run = open_history(make_t01(0))
     assert run.time.shape == (0,)
     assert run.complete
 
@@ -163,15 +171,15 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
 
 def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
     parts = [MadePart(id_, "piece", tuple(range(1, 501))) for id_ in range(1, 202)]
-    run = open_history(t01(1, parts, made=T01TextWriter()))
+    run = open_history(make_t01(1, parts, writer=T01TextWriter()))
     assert run.part_channel("internal_energy", [201]).tolist() == [
-        [printed(value(0, 201, 1))]
+        [printed(make_value(0, 201, 1))]
     ]
 
 
 @pytest.mark.parametrize("number", [-1.5e-120, 2.25e117, 0.0, -0.125])
 def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = make_t01(2, writer=T01TextWriter())
     writer.state(0.5, [number] * 22, [0.0] * 16)
     assert open_history(writer).channel("mass").tolist()[-1] == number
 
@@ -180,7 +188,7 @@ def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) ->
 def test_numbers_have_the_digits_in_which_the_solver_computed(
     single: bool, digits: int
 ) -> None:
-    writer = t01(0, made=T01TextWriter())
+    writer = make_t01(0, writer=T01TextWriter())
     for time in np.arange(4) / 7:
         writer.state(
             float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16
@@ -193,8 +201,8 @@ def test_numbers_have_the_digits_in_which_the_solver_computed(
 
 
 def test_legs_may_be_text_and_binary() -> None:
-    text, binary = t01(4, start=2, made=T01TextWriter()), t01(4)
-    run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
+    text, binary = make_t01(4, start=2, writer=T01TextWriter()), make_t01(4)
+    run = open_contents(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
     assert "if legs overlap the newer one is used" in run.notes[0]
 
@@ -236,7 +244,7 @@ def test_other_forms_of_text_are_refused_with_what_to_do(text: str) -> None:
 
 def test_as_a_table_it_is_refused() -> None:
     with pytest.raises(FormatError):
-        run_of(csv_table, SMALL.data).history(Selection())
+        open_contents(csv_table, SMALL.data).history(Selection())
 
 
 @pytest.mark.parametrize(
@@ -251,7 +259,7 @@ def test_as_a_table_it_is_refused() -> None:
     ],
 )
 def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = make_t01(2, writer=T01TextWriter())
     writer.state(0.25, [7.0] * 22, [0.0] * 16)
     data = bytes(writer.data).decode()
     end = data.rindex(number * 2) + len(number)
@@ -260,15 +268,16 @@ def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
 
 
 def test_a_number_that_is_none_is_refused() -> None:
-    writer = t01(2, made=T01TextWriter())
+    writer = make_t01(2, writer=T01TextWriter())
     writer.state(0.25, [float("nan")] * 22, [0.0] * 16)
     with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
-        run_of(radioss_th, bytes(writer.data)).history(Selection())
+        open_contents(radioss_th, bytes(writer.data)).history(Selection())
 
 
 def test_an_additional_history_without_global_values_is_no_leg() -> None:
     whole, additional = (
-        bytes(t01(5, [MadePart(3, "box")], globals_=count).data) for count in (12, 0)
+        bytes(make_t01(5, [MadePart(3, "box")], globals_=count).data)
+        for count in (12, 0)
     )
     for order in (("RUNT01", "RUNT01a"), ("RUNT01a", "RUNT01")):
         contents = {"RUNT01": whole, "RUNT01a": additional}

@@ -11,7 +11,7 @@ from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats.text import Text
 from d2rpick.histories.source import Source
 from tests.command import put
-from tests.reading import InPieces, on_disk
+from tests.reading import InPieces, open_on_disk
 
 CONTENTS = st.lists(
     st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]),
@@ -33,7 +33,7 @@ class Narrow(InPieces):
 
 def on_a_disk(file: Path) -> Text:
     """A text on disk that is read in small pieces."""
-    return Small(Source("text", on_disk(file, Narrow)))
+    return Small(Source("text", open_on_disk(file, Narrow)))
 
 
 def lines_of(data: bytes) -> list[str]:
@@ -78,7 +78,7 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
             raise MemoryError
 
     file = put(tmp_path / "text", b"time,IE\n" + b"0.125,17\n" * 50)
-    text = Small(Source("text", on_disk(file, TooBig)))
+    text = Small(Source("text", open_on_disk(file, TooBig)))
     assert [*text.lines(text.place(1))] == ["0.125,17"] * 50
 
 
