@@ -192,7 +192,8 @@ def better_about(answer: Suggestion, better: Pair) -> str:
     if recommended is None:
         return "there an acceptable tr exists"
     if better.residual is not None and recommended.residual is not None:
-        return f"residual {tables.measure(better.residual)} instead of {tables.measure(recommended.residual)}"
+        better_residual = tables.measure(better.residual)
+        return f"residual {better_residual} instead of {tables.measure(recommended.residual)}"
     level = answer.situation.vibration.whole.energy(better.td)
     own_level = answer.situation.energy_td
     return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"

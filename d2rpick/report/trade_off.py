@@ -137,7 +137,8 @@ def answer(trade_off: TradeOff) -> str:
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
         return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
-    return f"{quality_text}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
+    change = f"{_less(start, step)} and {_cost(start, step)}"
+    return f"{quality_text}; {_away(start, step, unit)} {change}"
 
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(

@@ -389,7 +389,8 @@ def describe_td(suggestion: dict[str, Any]) -> str:
     (best,) = (
         candidate for candidate in suggestion["candidates"] if candidate["recommended"]
     )
-    return f"td {short(suggestion['td'])}, tr {short(best['tr'])}, residual {measure(best['residual'])}"
+    times = f"td {short(suggestion['td'])}, tr {short(best['tr'])}"
+    return f"{times}, residual {measure(best['residual'])}"
 
 
 @mark_for_browser
