@@ -32,7 +32,7 @@ from d2rpick.base.errors import (
     HistoryError as HistoryError,
     RangeError as RangeError,
 )
-from d2rpick.choice.cost import Weights as Weights
+from d2rpick.choice.parts.cost import Weights as Weights
 from d2rpick.running.events import Event as Event
 from d2rpick.vibration.oscillator import Oscillator as Oscillator
 

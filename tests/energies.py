@@ -5,10 +5,10 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from d2rpick.choice.answers import Suggestion, suggest_of
+from d2rpick.choice.answers import PairSuggestion, suggest_in_run
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.histories.history import History
-from d2rpick.histories.run import Run
+from d2rpick.histories.run import OpenedRun
 from d2rpick.vibration.span import Fits
 from tests.command import ROLLOVER
 
@@ -21,7 +21,7 @@ def require(value: T | None) -> T:
     return value
 
 
-def list_codes(answer: Suggestion) -> set[str]:
+def list_codes(answer: PairSuggestion) -> set[str]:
     return {caution.code for caution in answer.cautions}
 
 
@@ -45,7 +45,7 @@ def make_vibration_energy(step: float = 0.01, decay: float = 0.0) -> History:
 def make_reference(history: History) -> Reference:
     """Wrap a history made in memory as a reference run without databases."""
     bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
-    return Reference(cast("Run", bare), history)
+    return Reference(cast(OpenedRun, bare), history)
 
 
 def suggest_in_window(
@@ -53,6 +53,6 @@ def suggest_in_window(
     window: tuple[float, float] | None,
     settings: Settings,
     fits: Fits | None = None,
-) -> Suggestion:
+) -> PairSuggestion:
     """Choose tr and td in a history made in memory."""
-    return suggest_of(make_reference(history), window, settings, fits=fits)
+    return suggest_in_run(make_reference(history), window, settings, fits=fits)

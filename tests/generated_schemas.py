@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-from d2rpick.report.fields import Document, Field, Kind, kind_of
+from d2rpick.report.fields import Document, Field, Kind, get_kind
 from d2rpick.report.formats import FORMATS
 from tests.command import ROOT
 from validation.published import reproduction
@@ -53,9 +53,9 @@ def make_schema(document: Document) -> dict[str, Any]:
 def _make_plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
     """Convert kinds and fields to JSON schema; put each named kind into ``defined`` and refer to it."""
     if isinstance(schema, Field):
-        plain = _make_plain(kind_of(schema.kind), defined, closed)
+        plain = _make_plain(get_kind(schema.kind), defined, closed)
         described = (
-            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else plain
+            defined[get_kind(schema.kind).name] if get_kind(schema.kind).name else plain
         )
         described.update({"description": schema.meaning} if schema.meaning else {})
         return plain

@@ -11,7 +11,13 @@ from d2rpick.choice.question import Reference
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.database import Legs
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
+from d2rpick.histories.opening import (
+    OpenedRun,
+    Reader,
+    Selection,
+    open_run,
+    open_sources,
+)
 from d2rpick.histories.source import Source
 from tests.command import ROOT
 from tests.computed import locate_stored
@@ -28,7 +34,7 @@ def open_contents(
     *contents: bytes | str,
     selection: Selection | None = None,
     name: str = "run",
-) -> Run:
+) -> OpenedRun:
     """Open contents as the restart segments of one run in one format; texts are latin-1."""
     data = [
         content.encode("latin-1") if isinstance(content, str) else content
@@ -43,7 +49,7 @@ def open_contents(
         [Source(*file) for file in zip(names, data, strict=True)],
         selection or Selection(),
     )
-    return Run(tuple(names), (Legs(legs),))
+    return OpenedRun(tuple(names), (Legs(legs),))
 
 
 def read_contents(
@@ -62,7 +68,7 @@ def read_contents(
 def read(
     names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
 ) -> Reference:
-    """Read as `d2rpick.choice.question.read` does; results for files of the repository are cached."""
+    """Read as `d2rpick.choice.question.read_reference` does; results for files of the repository are cached."""
     selection = selection or Selection()
     key = (
         tuple(names),
@@ -96,12 +102,12 @@ def open_on_disk(file: Path, disk_type: type[OnDisk] = InPieces) -> OnDisk:
         return disk_type(str(file), os.dup(opened.fileno()), state)
 
 
-def open_file(file: Path) -> Run:
+def open_file(file: Path) -> OpenedRun:
     """Open a file; a small file is held in memory."""
     return open_run([str(file)])
 
 
-def open_run_on_disk(file: Path) -> Run:
+def open_run_on_disk(file: Path) -> OpenedRun:
     """Open a file and leave it on disk."""
     return open_sources([Source(str(file), open_on_disk(file))])
 

@@ -18,9 +18,9 @@ from typing import Final, NamedTuple
 import h5py
 import numpy as np
 
-from d2rpick.api.runs import extracted, read as open_files
-from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.question import Settings, read
+from d2rpick.api.runs import extract_columns, read as open_files
+from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.question import Settings, read_reference
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
 from tests.made_binout import LsdaWriter
@@ -375,7 +375,9 @@ def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Aske
 
 def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     names = write_matsum(folder, run)
-    table, _notes = extracted(open_files(names).files, Selection(parts=(str(_IDS[0]),)))
+    table, _notes = extract_columns(
+        open_files(names).files, Selection(parts=(str(_IDS[0]),))
+    )
     columns = {name: table[name] for name in ("time", "internal_energy")}
     return make_question(run, names, parts=_IDS[0]), make_question(
         run, write_csv(folder, columns)
@@ -432,8 +434,8 @@ def choose(question: Asked) -> Chosen:
     """Read the files and choose tr."""
     parts = () if question.parts is None else (str(question.parts),)
     settings = Settings(after=question.after, landing=question.landing, margin=0.0)
-    answer = suggest_of(
-        read(question.names, Selection(parts=parts)),
+    answer = suggest_in_run(
+        read_reference(question.names, Selection(parts=parts)),
         question.td,
         settings,
         with_better=False,

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import pytest
 
-from d2rpick.choice.plan import plan_of
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings, read_reference
+from d2rpick.choice.td.plan import plan_run
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate
@@ -51,7 +51,7 @@ def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> Outco
         files = write_run_files(
             simulate(parameters, T_END, interval=interval), Path(folder)
         )
-        windows = plan_of(read(files, BOX), Settings()).windows
+        windows = plan_run(read_reference(files, BOX), Settings()).windows
     switched = simulate(
         parameters,
         T_END,

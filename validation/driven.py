@@ -16,8 +16,8 @@ import numpy as np
 
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import read_timing
 from d2rpick.histories.opening import Selection, open_run
@@ -154,7 +154,7 @@ def measure_model(
     yield "windows", len(switched), np.inf, bool(switched)
     history = open_run(names).history(Selection())
     for start, end in [
-        item.within(history.time) for item in flights_of(history, Settings())
+        item.within(history.time) for item in find_flights(history, Settings())
     ][: goal.flights]:
         lands = min(read(names).contacts(), key=lambda time: abs(time - end))
         shift = min(

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from d2rpick.api import arguments
-    from d2rpick.api.asked import Asked
+    from d2rpick.api.asked import RunQuestion
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
     from d2rpick.choice.judged_card import SolverInput
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.trade_off import TradeOff
+    from d2rpick.report.formats import DisplayOptions
     from d2rpick.report.page import PageContext
 
 
@@ -73,7 +73,7 @@ class Answer:
         """All warnings, each with ``code`` and ``message``."""
         return self.cautions
 
-    def text(self, form: str, display: Shown) -> str:
+    def text(self, form: str, display: DisplayOptions) -> str:
         """Return the answer in a form of the command line."""
         from d2rpick.report.formats import write
 
@@ -81,9 +81,9 @@ class Answer:
 
     def to_json(self) -> str:
         """Return the JSON document of the command line; it names its schema."""
-        from d2rpick.report.formats import Shown
+        from d2rpick.report.formats import DisplayOptions
 
-        return self.text("json", Shown(self.command))
+        return self.text("json", DisplayOptions(self.command))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON document of the command line as a dictionary."""
@@ -97,14 +97,14 @@ class Paged(Answer):
     """An answer that has a page, a figure, and a short form for notebooks."""
 
     def __repr__(self) -> str:
-        from d2rpick.report.pages import sentence
+        from d2rpick.report.pages import give_sentence
 
-        return f"{type(self).__name__}({sentence(self.kind, self)})"
+        return f"{type(self).__name__}({give_sentence(self.kind, self)})"
 
     def _repr_html_(self) -> str:
-        from d2rpick.report.pages import glance
+        from d2rpick.report.pages import show_at_a_glance
 
-        return glance(self.kind, self, give_if_written(self.plot))
+        return show_at_a_glance(self.kind, self, give_if_written(self.plot))
 
     def plot(self) -> Figure:
         """Draw the energy and the chosen or judged times as a matplotlib Figure."""
@@ -127,7 +127,7 @@ class Paged(Answer):
 
     def report(self, path: arguments.Path) -> Path:
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
-        return written(path, self.page(("d2rpick", *self.command)))
+        return write_page(path, self.page(("d2rpick", *self.command)))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -137,7 +137,7 @@ class RunAnswer(Paged):
     ``run`` is the run that was asked about.
     """
 
-    question: Asked = field(repr=False)
+    question: RunQuestion = field(repr=False)
     times: tuple[str, ...]
     name: ClassVar[str]  # name of the command
 
@@ -153,7 +153,7 @@ class RunAnswer(Paged):
 
     @classmethod
     def about(
-        cls, question: Asked, result: Any, *times: str, **further_fields: Any
+        cls, question: RunQuestion, result: Any, *times: str, **further_fields: Any
     ) -> Self:
         """Make the public answer from a question and the result of the core, with the cautions of the question."""
         return cls.of(
@@ -188,13 +188,13 @@ class RunAnswer(Paged):
         self, cards: Cards | None, situation: Situation, tr: float
     ) -> SolverInput:
         """Return the card of a tr with the notes of the run's deck, or the reason why there is none."""
-        from d2rpick.choice.judged_card import SolverInput, input_for
+        from d2rpick.choice.judged_card import SolverInput, print_solver_input
 
         try:
             suited, _ = (cards or Cards()).by_deck(self.question)
         except DeckError as error:
             return SolverInput("", "part", refusal=str(error))
-        return input_for(
+        return print_solver_input(
             self.question.reference, situation, tr, suited.request(self.question)
         )
 
@@ -210,25 +210,25 @@ class RunAnswer(Paged):
         return None
 
 
-def written(path: arguments.Path, page: str) -> Path:
+def write_page(path: arguments.Path, page: str) -> Path:
     """Write a page and return its path."""
     from pathlib import Path  # imported here since a table does not need it
 
     from d2rpick.api import arguments
 
-    target = Path(*arguments.paths("path", path))
+    target = Path(*arguments.list_paths("path", path))
     write_as_a_whole(target, page.encode())
     return target
 
 
-def frame_of(
+def build_frame(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any
 ) -> pd.DataFrame:
     """Return a table with one row per mapping; unknown values are NaN, also if the whole column is unknown.
 
     Examples
     --------
-    >>> frame_of([{"tr": 0.5, "residual": None}], ["tr", "residual"]).dtypes.astype(str).tolist()
+    >>> build_frame([{"tr": 0.5, "residual": None}], ["tr", "residual"]).dtypes.astype(str).tolist()
     ['float64', 'float64']
     """
     import pandas as pd

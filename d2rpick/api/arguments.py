@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
-from d2rpick.choice.grades import GRADES
+from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -62,20 +62,20 @@ class Choosing(TypedDict, total=False):
     step_ratio: float
 
 
-def number(name: str, value: object, limits: Number = TIME) -> float:
+def check_number(name: str, value: object, limits: Number = TIME) -> float:
     """Return a finite number within its limits, or raise TypeError or ValueError.
 
     Examples
     --------
-    >>> number("td", 1)
+    >>> check_number("td", 1)
     1.0
-    >>> number("margin", -1, Number(0.0))
+    >>> check_number("margin", -1, Number(0.0))
     Traceback (most recent call last):
     ValueError: margin is -1, a number of at least 0 was expected
     """
     if not is_number(value):
         raise TypeError(
-            f"{name} is {_shown(value)}, a number was expected{without_unit(value)}"
+            f"{name} is {_format_wrong_value(value)}, a number was expected{suggest_without_unit(value)}"
         )
     converted = float(value)  # type: ignore[arg-type]
     if not math.isfinite(converted):
@@ -106,7 +106,7 @@ def is_whole_number(value: object) -> bool:
     )
 
 
-def _shown(value: object) -> str:
+def _format_wrong_value(value: object) -> str:
     """Return a wrong value as one line of limited length."""
     text = " ".join(repr(value).split())
     if len(text) <= _LONGEST_SHOWN:
@@ -114,35 +114,39 @@ def _shown(value: object) -> str:
     return f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
 
 
-def flag(name: str, value: object, default: bool) -> bool:
+def check_flag(name: str, value: object, default: bool) -> bool:
     """Return True or False, the default for None; TypeError for anything else.
 
     Examples
     --------
-    >>> flag("replay", None, True), flag("replay", False, True)
+    >>> check_flag("replay", None, True), check_flag("replay", False, True)
     (True, False)
     """
     if value is None:
         return default
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if not isinstance(value, bool) and (kind != "b" or getattr(value, "ndim", 0)):
-        raise TypeError(f"{name} is {_shown(value)}, True or False was expected")
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, True or False was expected"
+        )
     return bool(value)
 
 
-def pairs(name: str, value: object) -> list[tuple[float, float]]:
+def check_windows(name: str, value: object) -> list[tuple[float, float]]:
     """Return windows of time, none for None.
 
     Examples
     --------
-    >>> pairs("done", [(0.1, 0.2), [0.3, 0.4]]), pairs("done", None)
+    >>> check_windows("done", [(0.1, 0.2), [0.3, 0.4]]), check_windows("done", None)
     ([(0.1, 0.2), (0.3, 0.4)], [])
     """
     if value is None:
         return []
     windows = []
-    for number_of_pair, pair in enumerate(_each(name, value, "pairs of times")):
-        times = window(f"{name}[{number_of_pair}]", pair)
+    for number_of_pair, pair in enumerate(
+        _check_iterable(name, value, "pairs of times")
+    ):
+        times = check_time_window(f"{name}[{number_of_pair}]", pair)
         if times is None:
             raise TypeError(
                 f"{name}[{number_of_pair}] is None, a pair of times was expected"
@@ -151,12 +155,12 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
     return windows
 
 
-def with_point(value: object) -> str:
+def suggest_decimal_point(value: object) -> str:
     """Return a hint how to write a number that has a decimal comma, empty for other texts.
 
     Examples
     --------
-    >>> with_point("0,064"), with_point("0.064 s")
+    >>> suggest_decimal_point("0,064"), suggest_decimal_point("0.064 s")
     (': write it with a decimal point, 0.064', '')
     """
     text = str(value).strip()
@@ -170,7 +174,7 @@ def with_point(value: object) -> str:
     return f": write it with a decimal point, {written}"
 
 
-def without_unit(value: object) -> str:
+def suggest_without_unit(value: object) -> str:
     """Return a hint how to write a time that has a unit, empty for other texts."""
     from d2rpick.histories.names import parse_seconds
 
@@ -180,17 +184,19 @@ def without_unit(value: object) -> str:
     return f": give a number in the unit of the history, {seconds:g} where it is s"
 
 
-def optional(name: str, value: object, limits: Number = TIME) -> float | None:
+def check_optional_number(
+    name: str, value: object, limits: Number = TIME
+) -> float | None:
     """Return a finite number within its limits, or None if none is given."""
-    return None if value is None else number(name, value, limits)
+    return None if value is None else check_number(name, value, limits)
 
 
-def window(name: str, value: object) -> tuple[float, float] | None:
+def check_time_window(name: str, value: object) -> tuple[float, float] | None:
     """Return a window of time, the lower time first, or None if none is given.
 
     Examples
     --------
-    >>> window("td_window", [0.06, 0.07])
+    >>> check_time_window("td_window", [0.06, 0.07])
     (0.06, 0.07)
     """
     if value is None:
@@ -201,9 +207,11 @@ def window(name: str, value: object) -> tuple[float, float] | None:
         and getattr(value, "ndim", 1) == 1
     )
     if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
-        raise TypeError(f"{name} is {_shown(value)}, a pair of times was expected")
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, a pair of times was expected"
+        )
     first, last = list(value)  # type: ignore[call-overload]
-    times = number(f"{name}[0]", first), number(f"{name}[1]", last)
+    times = check_number(f"{name}[0]", first), check_number(f"{name}[1]", last)
     if not times[0] < times[1]:
         raise ValueError(
             f"{name} is {times[0]:g} to {times[1]:g}, which is empty; the lower time comes first"
@@ -211,12 +219,12 @@ def window(name: str, value: object) -> tuple[float, float] | None:
     return times
 
 
-def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
+def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     """Return parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
 
     Examples
     --------
-    >>> part_names("parts", [3, "roof"]), part_names("parts", "10-19"), part_names("parts", None)
+    >>> list_part_names("parts", [3, "roof"]), list_part_names("parts", "10-19"), list_part_names("parts", None)
     (('3', 'roof'), ('10-19',), ())
     """
     if value is None:
@@ -229,23 +237,23 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     if single:
         listed = [value]
     else:
-        listed = list(_each(name, value, "a number, a title or several"))
+        listed = list(_check_iterable(name, value, "a number, a title or several"))
     for part in listed:
         if not (isinstance(part, str) or is_whole_number(part)):
             raise TypeError(
-                f"{name} holds {_shown(part)}; numbers and titles of parts were expected"
+                f"{name} holds {_format_wrong_value(part)}; numbers and titles of parts were expected"
             )
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(part) for part in listed)
 
 
-def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
+def list_rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     """Return the ids of rules or their prefixes; a string is a single id.
 
     Examples
     --------
-    >>> rule_ids("select", "D2R1"), rule_ids("ignore", ["D2R104", "D2R2"])
+    >>> list_rule_ids("select", "D2R1"), list_rule_ids("ignore", ["D2R104", "D2R2"])
     (('D2R1',), ('D2R104', 'D2R2'))
     """
     if value is None:
@@ -253,42 +261,46 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     if isinstance(value, str):
         listed = [value]
     else:
-        listed = list(_each(name, value, "ids of rules"))
+        listed = list(_check_iterable(name, value, "ids of rules"))
     for rule in listed:
         if not isinstance(rule, str):
             raise TypeError(f"{name} holds {rule!r}; ids of rules were expected")
     return tuple(listed)
 
 
-def whole(name: str, value: object, low: int) -> int:
+def check_whole_number(name: str, value: object, low: int) -> int:
     """Return a whole number of at least ``low``.
 
     Examples
     --------
-    >>> whole("steps", 2.5, 1)
+    >>> check_whole_number("steps", 2.5, 1)
     Traceback (most recent call last):
     TypeError: steps is 2.5, a whole number was expected
     """
     if not is_whole_number(value):
-        raise TypeError(f"{name} is {_shown(value)}, a whole number was expected")
-    return int(number(name, value, Number(low)))
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, a whole number was expected"
+        )
+    return int(check_number(name, value, Number(low)))
 
 
-def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
+def list_paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     """Return the names of files; a string is a single name.
 
     Examples
     --------
-    >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
+    >>> list_paths("source", "run/"), list_paths("source", ["glstat", "matsum"])
     (('run/',), ('glstat', 'matsum'))
     """
     if isinstance(value, str | os.PathLike):
         listed = [value]
     else:
-        listed = list(_each(name, value, "a path or several"))
+        listed = list(_check_iterable(name, value, "a path or several"))
     for path in listed:
         if not isinstance(path, str | os.PathLike):
-            raise TypeError(f"{name} holds {_shown(path)}; paths were expected")
+            raise TypeError(
+                f"{name} holds {_format_wrong_value(path)}; paths were expected"
+            )
     if not listed:
         raise ValueError(f"{name} is empty; give a file or folder")
     names = tuple(os.fsdecode(path) for path in listed)
@@ -332,7 +344,7 @@ def refuse_unknown(
     raise TypeError(f"there is no argument {name!r}; {meant}")
 
 
-def chosen(choosing: Choosing) -> dict[str, Any]:
+def read_choosing(choosing: Choosing) -> dict[str, Any]:
     """Return the fields of a request that contain how to choose."""
     annotations = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in annotations]:
@@ -352,11 +364,15 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     for name in arguments.keys() - of_other_kinds:
         limits: Any = OPTIONS[name].kind
         if arguments[name] is not None:
-            arguments[name] = number(name, arguments[name], limits)
-    arguments["fit_window"] = window("fit_window", arguments.get("fit_window"))
-    arguments["no_verify"] = not flag("replay", arguments.pop("replay", None), True)
-    arguments["strict"] = flag("strict", arguments.get("strict"), False)
-    arguments["keep_vibration"] = flag(
+            arguments[name] = check_number(name, arguments[name], limits)
+    arguments["fit_window"] = check_time_window(
+        "fit_window", arguments.get("fit_window")
+    )
+    arguments["no_verify"] = not check_flag(
+        "replay", arguments.pop("replay", None), True
+    )
+    arguments["strict"] = check_flag("strict", arguments.get("strict"), False)
+    arguments["keep_vibration"] = check_flag(
         "keep_vibration", arguments.get("keep_vibration"), False
     )
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
@@ -379,7 +395,7 @@ def check_grade(value: object) -> None:
     if value is None or value in GRADES:
         return
     raise ValueError(
-        f"min_quality is {_shown(value)}, one of {', '.join(GRADES)} was expected"
+        f"min_quality is {_format_wrong_value(value)}, one of {', '.join(GRADES)} was expected"
     )
 
 
@@ -392,42 +408,44 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
     if not isinstance(value, Oscillator):
         raise TypeError(
-            f"oscillator is {_shown(value)}, a d2rpick.Oscillator was expected"
+            f"oscillator is {_format_wrong_value(value)}, a d2rpick.Oscillator was expected"
         )
     return value
 
 
-def file_or_weights(value: object) -> Any:
+def check_weights(value: object) -> Any:
     """Return weights, or the name of the file that contains them, or None if none are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
-        return one_path("weights", value)
-    from d2rpick.choice.cost import (
+        return check_path("weights", value)
+    from d2rpick.choice.parts.cost import (
         Weights,
     )  # imported here since weights are rarely given
 
     if not isinstance(value, Weights):
         raise TypeError(
-            f"weights is {_shown(value)}, d2rpick.Weights or the name of a file was expected"
+            f"weights is {_format_wrong_value(value)}, d2rpick.Weights or the name of a file was expected"
         )
     return value
 
 
-def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
+def _check_iterable(name: str, value: Any, expected: str) -> Iterable[Any]:
     if (
         not hasattr(value, "__iter__")
         or isinstance(value, bytes | Mapping)
         or getattr(value, "ndim", 1) == 0
     ):
-        raise TypeError(f"{name} is {_shown(value)}; {expected} were expected")
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}; {expected} were expected"
+        )
     values: Iterable[Any] = value
     return values
 
 
-def one_path(name: str, value: Path) -> str:
+def check_path(name: str, value: Path) -> str:
     """Return the name of a single file."""
-    names = paths(name, value)
+    names = list_paths(name, value)
     if len(names) > 1:
         raise ValueError(f"{name} names {len(names)} files, one was expected")
     return names[0]
@@ -445,7 +463,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
     """
     windows: list[tuple[float, float]] = []
     if text.lstrip().startswith("{"):
-        windows = _of_journal(text)
+        windows = _read_journal(text)
         text = ""
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
@@ -465,7 +483,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
     return tuple(windows)
 
 
-def _of_journal(text: str) -> list[tuple[float, float]]:
+def _read_journal(text: str) -> list[tuple[float, float]]:
     """Return the windows of the rigid restart segments in a journal; of segments with one number, the last counts."""
     import json  # imported here to keep the start fast
 

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import CostModel, Weights
+    from d2rpick.choice.parts.cost import CostModel, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories import run as histories
 
 
-class Asked(NamedTuple):
+class RunQuestion(NamedTuple):
     """A question: the opened run, the selected energy, and how it is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
@@ -60,13 +60,13 @@ class Asked(NamedTuple):
     def options(self) -> tuple[str, ...]:
         """Options that follow the times in the command line of the same question."""
         from d2rpick.report.tables import (
-            positional,
+            make_positional,
         )  # imported here since most answers repeat no command
 
-        return (*self.request.asking(), *positional(self.request.history))
+        return (*self.request.asking(), *make_positional(self.request.history))
 
 
-def request_of(
+def make_request(
     run: Run | None,
     parts: Parts | None,
     flying: Parts | None,
@@ -81,41 +81,41 @@ def request_of(
     request = Request(
         deck=None
         if deck is None or deck is False
-        else arguments.one_path("deck", deck),
+        else arguments.check_path("deck", deck),
         no_deck=deck is False,
         run_folder=run.folder if run else None,
-        weights=arguments.file_or_weights(weights),
+        weights=arguments.check_weights(weights),
         history=run.sources if run else (),
         input_format=run.input_format if run else "auto",
         time=chosen.time,
         energy=chosen.energy,
-        part=arguments.part_names("parts", parts),
-        flying=arguments.part_names("flying", flying),
+        part=arguments.list_part_names("parts", parts),
+        flying=arguments.list_part_names("flying", flying),
         channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
-        **arguments.chosen(choosing),
+        **arguments.read_choosing(choosing),
     )
     return find_deck_in_folder(request)
 
 
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
     """Open the run of the request, or other files in the same way."""
-    from d2rpick.api.runs import Run, folder_of
+    from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening
 
     selection = request.selection(parts=False)
     names = names or request.history
     files = opening.open_run(names, selection, request.input_format)
-    return Run(files, selection, request.input_format, folder_of(names))
+    return Run(files, selection, request.input_format, find_folder(names))
 
 
-def on_card_only(request: Request, run: histories.Run) -> bool:
+def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
     """Return True if parts may be only on the card: a table has no parts, and a named energy stands for all."""
     return bool(request.energy) or not run.parts
 
 
-def ask(
+def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
-) -> Asked:
+) -> RunQuestion:
     """Select the energy of a run that a request asks for, with the data of its deck.
 
     Parameters
@@ -135,31 +135,34 @@ def ask(
         If the recommended set is requested together with other parts, or without a deck.
     """
     settings = request.settings
-    model = model_of(request)
+    model = read_cost_model(request)
     files = run.files
     selection = request.selection(parts=False)._replace(parts=request.part)
     if request.part:
         _check_recommended(request, files)
     foreign = False
     if model is not None:
-        from d2rpick.choice.deck_of_run import in_deck, of_another_model
+        from d2rpick.choice.parts.deck_of_run import (
+            add_surroundings,
+            check_model_of_deck,
+        )
 
-        foreign = of_another_model(files, model.inventory) is not None
-        files = in_deck(files, model.inventory)
-        selection = selected(files, selection, settings, model)
+        foreign = check_model_of_deck(files, model.inventory) is not None
+        files = add_surroundings(files, model.inventory)
+        selection = complete_selection(files, selection, settings, model)
     parts: tuple[str, ...] = ()
-    if card_alone and on_card_only(request, files):
+    if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
         request.selection()  # refuses a named energy together with parts
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
-        from d2rpick.choice.deck_of_run import with_deck
+        from d2rpick.choice.parts.deck_of_run import add_deck_to_settings
 
-        settings, cautions = with_deck(settings, reference, model)
+        settings, cautions = add_deck_to_settings(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
-    question = Asked(
+    question = RunQuestion(
         run,
         request,
         reference,
@@ -170,10 +173,10 @@ def ask(
         cautions,
         of_this_run=not foreign,
     )
-    return question if merge is None else _merged(question, merge)
+    return question if merge is None else _merge_parts(question, merge)
 
 
-def model_of(request: Request) -> CostModel | None:
+def read_cost_model(request: Request) -> CostModel | None:
     """Read the deck with its weights, or the weights alone; return None without either.
 
     Raises
@@ -183,7 +186,7 @@ def model_of(request: Request) -> CostModel | None:
     """
     if request.deck is None:
         return None
-    from d2rpick.choice.cost import CostModel, read_weights
+    from d2rpick.choice.parts.cost import CostModel, read_weights
     from d2rpick.deck import read_inventory
 
     weights = request.weights
@@ -193,8 +196,8 @@ def model_of(request: Request) -> CostModel | None:
     )
 
 
-def selected(
-    run: histories.Run, selection: Selection, settings: Settings, model: CostModel
+def complete_selection(
+    run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
     """Complete a selection: add the parts of the recommended set, and the springs of the deck that have energies.
 
@@ -203,11 +206,11 @@ def selected(
     FormatError
         If no set can be recommended.
     """
-    from d2rpick.choice.deck_of_run import of_another_model
-    from d2rpick.choice.sets_of_parts import recommended_parts
+    from d2rpick.choice.parts.deck_of_run import check_model_of_deck
+    from d2rpick.choice.parts.sets_of_parts import recommend_parts
     from d2rpick.deck.model import DISCRETE
 
-    if foreign := of_another_model(run, model.inventory):
+    if foreign := check_model_of_deck(run, model.inventory):
         if has_recommended(selection.parts, run.parts):
             raise FormatError(
                 f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
@@ -219,11 +222,11 @@ def selected(
     }
     parts = selection.parts
     if has_recommended(parts, run.parts):
-        parts = tuple(map(str, recommended_parts(run, settings, model)))
+        parts = tuple(map(str, recommend_parts(run, settings, model)))
     return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
-def _check_recommended(request: Request, run: histories.Run) -> None:
+def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
     """Refuse the recommended set together with other parts, or without a deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
@@ -236,9 +239,9 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
             )
 
 
-def _merged(question: Asked, merge: int) -> Asked:
+def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
     """Make the parts one rigid body, with a caution if nothing connects them."""
-    from d2rpick.choice.deck_of_run import merged
+    from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts
     if not parts:
@@ -252,7 +255,7 @@ def _merged(question: Asked, merge: int) -> Asked:
             *cautions,
             Caution("merged-apart", f"{message}; leave it out to keep them apart"),
         )
-    body = merged({part.id for part in parts} | {merge}, bodies)
+    body = merge_into_one_body({part.id for part in parts} | {merge}, bodies)
     return question._replace(
         settings=replace(question.settings, bodies=(body,)), cautions=cautions
     )

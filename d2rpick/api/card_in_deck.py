@@ -9,7 +9,7 @@ from d2rpick.base.errors import Caution, DeckError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.api.asked import Asked
+    from d2rpick.api.asked import RunQuestion
     from d2rpick.deck.printed_card import PrintedCard
 
 OBJECTION: Final = "card-objection"
@@ -17,7 +17,7 @@ UNJOINED: Final = "parts-not-joined"
 
 
 def collect_objections(
-    card: PrintedCard, question: Asked, parts: int
+    card: PrintedCard, question: RunQuestion, parts: int
 ) -> Iterator[Caution]:
     """Yield the findings of ``check`` in a deck with the card; without a deck, what is unknown about its parts.
 

@@ -15,9 +15,9 @@ from d2rpick.api.request import (
     Number,
     Option,
     Request,
-    dashed,
-    option,
-    options_of,
+    list_options,
+    make_option,
+    make_option_name,
 )
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.arguments import Parts
-    from d2rpick.api.asked import Asked
+    from d2rpick.api.asked import RunQuestion
     from d2rpick.api.runs import Run
-    from d2rpick.choice.answers import Verdict
+    from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.judged_card import CardRequest
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
@@ -71,13 +71,13 @@ class Judging(CardOptions, total=False):
     tolerance: float | None
 
 
-def _checked(name: str, value: Any, option: Option) -> Any:
+def _check_option(name: str, value: Any, option: Option) -> Any:
     """Return a value converted to the kind of its option."""
     from d2rpick.api import arguments
 
     kind = option.kind
     if option.many:
-        return arguments.part_names(name, value)
+        return arguments.list_part_names(name, value)
     if option.pair:
         is_pair = (
             hasattr(value, "__len__")
@@ -86,21 +86,23 @@ def _checked(name: str, value: Any, option: Option) -> Any:
         )
         if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
             raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
-        return tuple(arguments.whole(name, number, _IDS.start) for number in value)
+        return tuple(
+            arguments.check_whole_number(name, number, _IDS.start) for number in value
+        )
     if isinstance(kind, range):
-        return arguments.whole(name, value, kind.start)
+        return arguments.check_whole_number(name, value, kind.start)
     if isinstance(kind, Number):
-        return arguments.number(name, value, kind)
+        return arguments.check_number(name, value, kind)
     if not isinstance(value, str):
         raise TypeError(f"{name} is {value!r}, a text was expected")
-    if kind == "solver" and value not in solvers():
+    if kind == "solver" and value not in list_solvers():
         raise ValueError(
-            f"{name} is {value!r}, one of {', '.join(solvers())} was expected"
+            f"{name} is {value!r}, one of {', '.join(list_solvers())} was expected"
         )
     return value
 
 
-def solvers() -> Sequence[str]:
+def list_solvers() -> Sequence[str]:
     """Return the names of the solvers whose input can be printed."""
     from d2rpick.deck.printing import SOLVERS  # imported here to keep the start fast
 
@@ -111,37 +113,37 @@ def solvers() -> Sequence[str]:
 class Cards:
     """Options of a card, shared by all commands that print one."""
 
-    solver: str | None = option(
+    solver: str | None = make_option(
         "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
         "solver",
     )
-    merge: int | None = option(
+    merge: int | None = make_option(
         "LS-DYNA: lead part that all others are merged into (LRB).", _IDS, "ID"
     )
-    swset: tuple[int, int] | None = option(
+    swset: tuple[int, int] | None = make_option(
         "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]",
         _IDS,
         "ID ID",
         pair=True,
     )
-    step_cap: float | None = option(
+    step_cap: float | None = make_option(
         "Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT"
     )
-    node: tuple[str, ...] = option(
+    node: tuple[str, ...] = make_option(
         "Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True
     )
-    end: float | None = option(
+    end: float | None = make_option(
         "Radioss: end of the run.  [default: end of the history]", TIME, "T"
     )
-    name: str | None = option(
+    name: str | None = make_option(
         "Radioss: name of the run.  [default: Root]", metavar="NAME"
     )
-    contact: int | None = option(
+    contact: int | None = make_option(
         "Contact whose force switches (solvers ls-dyna-contact, radioss-contact).",
         _IDS,
         "ID",
     )
-    wall: int | None = option(
+    wall: int | None = make_option(
         "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
     )
     starter: str = ""  # cards to be added to the starter deck
@@ -157,12 +159,12 @@ class Cards:
         """Check the arguments of Python; raise TypeError or ValueError for a wrong one."""
         from d2rpick.api import arguments
 
-        known_options = options_of(Cards)
+        known_options = list_options(Cards)
         if unknown := [name for name in arguments_of_card if name not in known_options]:
             arguments.refuse_unknown(unknown[0], known_options)
         return cls(
             **{
-                name: _checked(name, option_value, known_options[name])
+                name: _check_option(name, option_value, known_options[name])
                 for name, option_value in arguments_of_card.items()
                 if option_value is not None
             }
@@ -173,7 +175,7 @@ class Cards:
         """Names of the given options, without the solver."""
         return [
             name
-            for name in options_of(Cards)
+            for name in list_options(Cards)
             if name != "solver" and getattr(self, name) not in (None, ())
         ]
 
@@ -183,7 +185,7 @@ class Cards:
 
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
-            values["node"] = tuple(numbers("--node", self.node))
+            values["node"] = tuple(parse_numbers("--node", self.node))
         return Printing(
             part=tuple(parts),
             starter=self.starter,
@@ -215,7 +217,7 @@ class Cards:
                     hint = f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
-    def by_deck(self, question: Asked) -> tuple[Cards, tuple[str, ...]]:
+    def by_deck(self, question: RunQuestion) -> tuple[Cards, tuple[str, ...]]:
         """Complete the options of a card from the deck of the run, unless they are given.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
@@ -258,22 +260,22 @@ class Cards:
         )
         return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
-    def request(self, question: Asked) -> CardRequest:
+    def request(self, question: RunQuestion) -> CardRequest:
         """Return how the card of a run is printed."""
         from d2rpick.choice.judged_card import CardRequest
 
         request = CardRequest(
-            self.solver, self.printing(numbers("--part", question.on_card))
+            self.solver, self.printing(parse_numbers("--part", question.on_card))
         )
         self.check_solver(request.of(question.reference.history)[0])
         return request
 
 
 # Keys in the settings that apply to all commands; other keys apply to the rules of check, or to one command.
-SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
+SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
-def needed(solver: Module) -> str:
+def name_needed_argument(solver: Module) -> str:
     """Return the argument that names what the card of ``solver`` switches."""
     arguments_by_kind = {
         "part": "`parts`, the parts to switch",
@@ -282,7 +284,7 @@ def needed(solver: Module) -> str:
     return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
-def numbers(name: str, texts: Sequence[str]) -> list[int]:
+def parse_numbers(name: str, texts: Sequence[str]) -> list[int]:
     """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
@@ -313,7 +315,7 @@ class JudgedCard(NamedTuple):
     """
 
     card: PrintedCard
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[PairVerdict, ...] = ()
     cautions: tuple[Caution, ...] = ()
 
     def __str__(self) -> str:
@@ -333,11 +335,11 @@ class JudgedCard(NamedTuple):
         )
 
 
-def judged(
-    question: Asked,
+def print_judged_card(
+    question: RunQuestion,
     cards: Cards,
     windows: Sequence[Times],
-    judge: Callable[[float, float], Verdict] | None = None,
+    judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
     """Print the card of windows, judged as printed like in `verify`, or by ``judge``.
@@ -348,18 +350,18 @@ def judged(
         If nobody says whom it switches, or an option belongs to another solver.
     """
     from d2rpick.api.card_in_deck import collect_objections
-    from d2rpick.choice.answers import verify_of
-    from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.answers import verify_run
+    from d2rpick.choice.judged_card import print_judged_card
     from d2rpick.deck.printing import SOLVERS
 
     cards, notes = cards.by_deck(question)
     reference = question.reference
     request = cards.request(question).by(question.settings)
-    judge = judge or partial(verify_of, reference, settings=question.settings)
-    result = judged_card(windows, reference.history, judge, request, done)
+    judge = judge or partial(verify_run, reference, settings=question.settings)
+    result = print_judged_card(windows, reference.history, judge, request, done)
     solver, printing = request.of(reference.history)
     if result is None:
-        raise ArgumentError(needed(SOLVERS[solver]))
+        raise ArgumentError(name_needed_argument(SOLVERS[solver]))
     card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
     if printing.merge or SOLVERS[solver].switches != "part":
@@ -369,15 +371,17 @@ def judged(
     return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
 
 
-def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
+def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
     """Return the cautions of a card and of its verdicts, each once, and a caution for each failed verdict."""
     of_verdicts = (
-        caution for verdict in card.verdicts for caution in _cautions(verdict)
+        caution
+        for verdict in card.verdicts
+        for caution in _list_verdict_cautions(verdict)
     )
     return tuple(dict.fromkeys((*of_verdicts, *card.cautions)))
 
 
-def _cautions(verdict: Verdict) -> Iterator[Caution]:
+def _list_verdict_cautions(verdict: PairVerdict) -> Iterator[Caution]:
     yield from verdict.cautions
     decision = verdict.decision
     if not decision.reaches(verdict.situation.settings.min_quality):
@@ -426,24 +430,24 @@ def card(
     ((0.02, 0.09), (0.2, 0.3))
     """
     from d2rpick.api import arguments
-    from d2rpick.api.asked import request_of
+    from d2rpick.api.asked import make_request
 
-    times = arguments.pairs("windows", windows)
+    times = arguments.check_windows("windows", windows)
     arguments_of_card: dict[str, Any] = dict(options)
     judging: Any = {
         name: arguments_of_card.pop(name)
         for name in ("after", "landing", "margin", "tolerance")
         if name in arguments_of_card
     }
-    return card_of(
+    return print_card(
         times,
         run,
-        request_of(run, parts, None, None, None, judging),
+        make_request(run, parts, None, None, None, judging),
         Cards.of(arguments_of_card),  # type: ignore[arg-type]
     )
 
 
-def card_of(
+def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
     """Print the card of windows, judged as printed if there is a run."""
@@ -452,31 +456,33 @@ def card_of(
     if run is None:
         request.without_history()
         solver = cards.solver or DEFAULT
-        return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
+        return JudgedCard(
+            print_cards(windows, _print_without_history(request, cards, solver), solver)
+        )
     from d2rpick.api.asked import (
-        ask,
+        ask_run,
     )  # imported here since a card alone does not need numpy
 
-    question = ask(run, request, card_alone=True)
+    question = ask_run(run, request, card_alone=True)
     wanted = cards.request(question)
     module = SOLVERS[wanted.of(question.reference.history)[0]]
     if wanted.printing.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
-    return judged(question, cards, windows)
+    return print_judged_card(question, cards, windows)
 
 
-def _alone(request: Request, cards: Cards, solver: str) -> Printing:
+def _print_without_history(request: Request, cards: Cards, solver: str) -> Printing:
     """Return the content of a card without a history; raise ArgumentError if something is missing."""
     from d2rpick.deck.printing import SOLVERS
 
     cards.check_solver(solver)
     module = SOLVERS[solver]
     if not {"part": request.part, "node": cards.node}[module.switches]:
-        raise ArgumentError(needed(module))
+        raise ArgumentError(name_needed_argument(module))
     if request.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
     if "end" in module.takes and cards.end is None:
         raise ArgumentError(
             f"a card for {module.title} needs `end`, the end of the run, or a `run`"
         )
-    return cards.printing(numbers("--part", request.part))
+    return cards.printing(parse_numbers("--part", request.part))

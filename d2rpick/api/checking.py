@@ -9,7 +9,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import Answer, frame_of
+from d2rpick.api.answer import Answer, build_frame
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
 from d2rpick.base.files import STDIN
@@ -17,7 +17,7 @@ from d2rpick.deck import find_main_decks
 from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.restarts import is_restart
 from d2rpick.report.findings import FINDING, Checks
-from d2rpick.report.tables import positional
+from d2rpick.report.tables import make_positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, find_configuration
 from d2rpick.rules.base import LS_DYNA, Severity, Unreadable
 
@@ -80,7 +80,7 @@ class Findings(Answer, Checks):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
-        return frame_of(
+        return build_frame(
             self.to_dict()["findings"], FINDING.keys, decks=list(self.decks)
         )
 
@@ -127,29 +127,36 @@ def check(
     [(11, 0.0687534), (12, 0.064)]
     """
     from d2rpick.api.asked import (
-        request_of,
+        make_request,
     )  # imported here since nothing is computed without a history
 
-    names = arguments.paths("decks", decks)
+    names = arguments.list_paths("decks", decks)
     if history is not None:
         arguments.check_run("history", history)
-    request = request_of(history, None, None, None, None, choosing)
+    request = make_request(history, None, None, None, None, choosing)
     rules = Configuration(
-        arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore)
+        arguments.list_rule_ids("select", select),
+        arguments.list_rule_ids("ignore", ignore),
     )
     rule_options: list[str] = []
     for name in ("select", "ignore"):
         for rule in getattr(rules, name):
             rule_options += [f"--{name}", rule]
     files = [text for name in request.history for text in ("--history", name)]
-    command = ("check", *files, *request.asking(), *rule_options, *positional(names))
-    findings = findings_of(names, history, request, *rules[:2], command=command)
+    command = (
+        "check",
+        *files,
+        *request.asking(),
+        *rule_options,
+        *make_positional(names),
+    )
+    findings = find_findings(names, history, request, *rules[:2], command=command)
     for failed_deck in findings.failed:
         raise failed_deck.error
     return findings
 
 
-def findings_of(
+def find_findings(
     decks: Sequence[str],
     run: Run | None,
     request: Request,
@@ -171,7 +178,7 @@ def findings_of(
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
     rules.verify(RULES)
-    outcomes = list(_each(decks, rules, judge))
+    outcomes = list(_check_each(decks, rules, judge))
     results = tuple(outcome for outcome in outcomes if isinstance(outcome, Checked))
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     unused_settings = dict.fromkeys(note for result in results for note in result.notes)
@@ -201,7 +208,7 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
     )
 
 
-def _each(
+def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
     """Yield the result of each deck once, for a run by its first file; a folder stands for its main decks."""
@@ -212,14 +219,14 @@ def _each(
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
-    found_by_name = {name: _decks(name) for name in dict.fromkeys(deck_names)}
+    found_by_name = {name: _list_decks(name) for name in dict.fromkeys(deck_names)}
     listed = [
         deck
         for decks in found_by_name.values()
         if not isinstance(decks, DeckError)
         for deck in decks
     ]
-    restarts = _restarts(listed)
+    restarts = _find_restarts(listed)
     for name, decks in found_by_name.items():
         if isinstance(decks, DeckError):
             yield Unreadable(name, decks)
@@ -234,7 +241,7 @@ def _each(
             if real not in visited and not any(
                 deck in legs for legs in restarts.values()
             ):
-                outcome = _found(
+                outcome = _check_one(
                     deck, configured, judge, folder, restarts.get(deck, ())
                 )
                 if isinstance(outcome, Checked) and outcome.solver == LS_DYNA:
@@ -245,7 +252,7 @@ def _each(
                 yield outcome
 
 
-def _decks(name: str) -> list[str] | DeckError:
+def _list_decks(name: str) -> list[str] | DeckError:
     """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
     try:
         return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
@@ -253,7 +260,7 @@ def _decks(name: str) -> list[str] | DeckError:
         return error
 
 
-def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
+def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     """Return for each deck of LS-DYNA its small restarts: the only other decks in its folder."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
@@ -269,7 +276,7 @@ def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     return legs
 
 
-def _found(
+def _check_one(
     name: str,
     configured: Callable[[str], Configuration],
     judge: HistoryJudge | None,

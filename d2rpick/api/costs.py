@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import Answer, Paged, frame_of, written
-from d2rpick.api.asked import model_of, request_of
+from d2rpick.api.answer import Answer, Paged, build_frame, write_page
+from d2rpick.api.asked import make_request, read_cost_model
 from d2rpick.api.deck_in_folder import name_deck
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice import calibration, sets_of_parts
-from d2rpick.choice.cost import Weights, weights_as_toml
-from d2rpick.report.tables import positional
+from d2rpick.choice.parts import calibration, sets_of_parts
+from d2rpick.choice.parts.cost import Weights, format_weights_as_toml
+from d2rpick.report.tables import make_positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -52,7 +52,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         """
         from d2rpick.report.parts import PART
 
-        return frame_of(
+        return build_frame(
             list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources)
         )
 
@@ -60,7 +60,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         """Return a table with a row per set; the columns are the keys of ``sets`` in the JSON."""
         from d2rpick.report.parts import SET
 
-        return frame_of(
+        return build_frame(
             list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources)
         )
 
@@ -116,19 +116,24 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    request = request_of(run, given, None, deck, weights, choosing)
-    return tabled(
-        run, request, arguments.optional("tr", tr), arguments.optional("td", td)
+    request = make_request(run, given, None, deck, weights, choosing)
+    return compare_parts(
+        run,
+        request,
+        arguments.check_optional_number("tr", tr),
+        arguments.check_optional_number("td", td),
     )
 
 
-def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
+def compare_parts(
+    run: Run, request: Request, tr: float | None, td: float | None
+) -> PartTable:
     """Determine which parts may be switched; compare sets of them from tr to td, or up to td."""
     times = check_times(tr, td)
-    model = model_of(request)
+    model = read_cost_model(request)
     deck_names = [request.deck] if request.deck else []
-    ids = sets_of_parts.given_parts(run.files, request.part)
-    table = sets_of_parts.parts_of(
+    ids = sets_of_parts.find_given_parts(run.files, request.part)
+    table = sets_of_parts.compare_sets_of_parts(
         run.files,
         request.settings,
         model,
@@ -142,7 +147,7 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
         if time is not None
         for text in (f"--{name}", repr(time))
     ]
-    command = ("parts", *window, *request.asking(), *positional(request.history))
+    command = ("parts", *window, *request.asking(), *make_positional(request.history))
     return PartTable.of(table, run=run, command=command, cautions=name_deck(request))
 
 
@@ -156,7 +161,7 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibration(Answer, calibration.Calibration):
+class Calibration(Answer, calibration.FittedWeights):
     """Answer of `calibrate`; it is immutable.
 
     ``weights`` are an argument of `parts`, `suggest`, `plan`, `explore` and `verify`.  ``told`` names the formulations
@@ -177,14 +182,14 @@ class Calibration(Answer, calibration.Calibration):
         >>> d2.calibrate("sample_data/flying_box").to_frame()["formulation"].tolist()
         ['QBAT', 'QEPH', 'point']
         """
-        from d2rpick.report.calibration import COLUMNS, plain_rows
+        from d2rpick.report.calibration import COLUMNS, list_plain_rows
 
-        rows = [dict(zip(COLUMNS, row, strict=True)) for row in plain_rows(self)]
-        return frame_of(rows, COLUMNS, source=[leg.name for leg in self.legs])
+        rows = [dict(zip(COLUMNS, row, strict=True)) for row in list_plain_rows(self)]
+        return build_frame(rows, COLUMNS, source=[leg.name for leg in self.legs])
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
-        return written(path, f"{weights_as_toml(self.weights)}\n")
+        return write_page(path, f"{format_weights_as_toml(self.weights)}\n")
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
@@ -213,9 +218,9 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     >>> round(found.weights.element_share, 2)
     0.65
     """
-    names = arguments.paths("runs", runs)
-    observations, cautions = calibration.observations_of_runs(names)
-    command = ("calibrate", *positional(names))
+    names = arguments.list_paths("runs", runs)
+    observations, cautions = calibration.read_observations_of_runs(names)
+    command = ("calibrate", *make_positional(names))
     return Calibration.of(
-        calibration.calibrate(observations), cautions=cautions, command=command
+        calibration.fit_weights(observations), cautions=cautions, command=command
     )

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
-from d2rpick.api.cards import Cards, numbers
+from d2rpick.api.cards import Cards, parse_numbers
 from d2rpick.base.errors import ConfigurationError, D2RPickError
-from d2rpick.choice.cost import CostModel
-from d2rpick.choice.deck_of_run import doubts_of_solver
+from d2rpick.choice.parts.cost import CostModel
+from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.writing import read_driven_deck
 from d2rpick.histories.opening import open_run
@@ -79,7 +79,9 @@ class Driving:
     ) -> None:
         self.name, self.folder, self._told = deck, folder, told
         self.commands = Commands(starter, engine, threads)
-        self.deck = read_driven_deck(deck, numbers("--part", part) if part else ())
+        self.deck = read_driven_deck(
+            deck, parse_numbers("--part", part) if part else ()
+        )
         self.inventory = read_inventory(deck)
         deck_wait = wait_of_deck(self.inventory)
         if wait is not None:
@@ -97,7 +99,7 @@ class Driving:
         self.observer = Observer(self.deck.parts, self.inventory, wait, deck_wait)
         self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(
-            doubts_of_solver(self.deck.parts, self.inventory)
+            warn_about_solver(self.deck.parts, self.inventory)
         )
 
     @contextmanager
@@ -169,7 +171,7 @@ class Driving:
             windows=tuple(windows(legs, self.limits)),
             legs=tuple(legs),
             why=reasons[-1] if reasons else "",
-            saved=(self._by_model(legs), _by_time(legs, self.deck.end)),
+            saved=(self._by_model(legs), _estimate_saving_by_time(legs, self.deck.end)),
             cautions=(*self.cautions, *driver.out_of_place),
             command=tuple(command),
         )
@@ -194,7 +196,7 @@ class Driving:
         return 1 - took / self.deck.end
 
 
-def _by_time(legs: Sequence[Leg], end: float) -> float | None:
+def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
     """Return the saved share if a deformable run takes as long per time as the deformable segments do on average."""
     if any(leg.cpu is None for leg in legs):
         return None

@@ -12,8 +12,8 @@ from d2rpick.api.request import (
     TIME,
     UNLIMITED,
     Request,
-    dashed,
-    option,
+    make_option,
+    make_option_name,
 )
 from d2rpick.base.errors import ArgumentError, Caution
 
@@ -53,7 +53,7 @@ T_END = {
 BALANCED = 0.01  # largest imbalance of the energy of a run [-]
 
 
-def _same(name: str, **changes: Any) -> Any:
+def _copy_option(name: str, **changes: Any) -> Any:
     """Return an option of a request, changed for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
@@ -62,35 +62,35 @@ def _same(name: str, **changes: Any) -> Any:
 class Motion:
     """Request for a motion of the oscillator: its parameters, its start, and when it is rigid."""
 
-    stiffness: float = _same("stiffness")
-    mass: float = _same("mass")
-    frame_mass: float | None = _same("frame_mass")
-    beta: float | None = _same("beta")
-    alpha: float = _same("alpha")
-    v0: float | None = _same("v0", help="Velocity of the frame at time 0.")
-    z0: float | None = option(
+    stiffness: float = _copy_option("stiffness")
+    mass: float = _copy_option("mass")
+    frame_mass: float | None = _copy_option("frame_mass")
+    beta: float | None = _copy_option("beta")
+    alpha: float = _copy_option("alpha")
+    v0: float | None = _copy_option("v0", help="Velocity of the frame at time 0.")
+    z0: float | None = make_option(
         "Displacement of the frame at time 0.  [default: 0]", TIME
     )
-    y0: float | None = option(
+    y0: float | None = make_option(
         "Displacement of the suspended mass at time 0.  [default: 0]", TIME
     )
-    vz0: float | None = option(
+    vz0: float | None = make_option(
         "Velocity of the frame at time 0; the same as --v0.  [default: 0]",
         TIME,
         instead_of=("v0",),
     )
-    vy0: float | None = option(
+    vy0: float | None = make_option(
         "Velocity of the suspended mass at time 0.  [default: 0]", TIME
     )
-    tr: float | None = option(
+    tr: float | None = make_option(
         "Switch to rigid at this time; with --td.", NOT_NEGATIVE, "T"
     )
-    td: float | None = option(
+    td: float | None = make_option(
         "Switch back to deformable at this time.", NOT_NEGATIVE, "T"
     )
-    t_end: float = option("Last time.", POSITIVE, "T")
-    dt: float = option("Output interval.", POSITIVE, "T")
-    write_as: str | None = option(
+    t_end: float = make_option("Last time.", POSITIVE, "T")
+    dt: float = make_option("Output interval.", POSITIVE, "T")
+    write_as: str | None = make_option(
         "Format of the result.  [default: by the name of -o, else csv]", HISTORIES
     )
 
@@ -156,52 +156,52 @@ class Motion:
 class Box:
     """Request for the rollover box in SI units: the box, its windows and the scan."""
 
-    tr: tuple[float, ...] = option(
+    tr: tuple[float, ...] = make_option(
         "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
         *(NOT_NEGATIVE, "T"), many=True,
     )  # fmt: skip
-    td: tuple[float, ...] = option(
+    td: tuple[float, ...] = make_option(
         "Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True
     )
-    drop: float | None = option(
+    drop: float | None = make_option(
         "Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
         *(NOT_NEGATIVE, "HEIGHT"),
     )
-    tilt: float | None = option(
+    tilt: float | None = make_option(
         "Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG"
     )
-    ground_stiffness: float | None = option(
+    ground_stiffness: float | None = make_option(
         "Of the ground at a point, N/m.  [default: 5e5]", POSITIVE
     )
-    scan: bool = option(
+    scan: bool = make_option(
         "Compute many tr, and hold each run against the one without switching.",
         "flag",
         default=False,
     )
-    jobs: int | None = option(
+    jobs: int | None = make_option(
         "Processes of a scan.  [default: one for each core]", range(1, UNLIMITED)
     )
-    t_end: float | None = option(
+    t_end: float | None = make_option(
         "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
     )
-    dt: float = option("Output interval.", POSITIVE, "T", default=1e-4)
-    speed: float | None = option(
+    dt: float = make_option("Output interval.", POSITIVE, "T", default=1e-4)
+    speed: float | None = make_option(
         "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]",
         NOT_NEGATIVE,
     )
-    stiffness: float | None = option(
+    stiffness: float | None = make_option(
         "Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE
     )
-    yield_strain: float | None = option(
+    yield_strain: float | None = make_option(
         "Of the bars of the box.  [default: 4.5e-3]", POSITIVE
     )
-    damping: float | None = option(
+    damping: float | None = make_option(
         "Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE
     )
-    mesh: int | None = option(
+    mesh: int | None = make_option(
         "Cells along each side of the box.  [default: 16]", range(4, 201)
     )
-    write_as: str | None = option(
+    write_as: str | None = make_option(
         "Format of a history.  [default: by the name of -o, else csv]", HISTORIES
     )
 
@@ -213,7 +213,7 @@ class Box:
             ] * (self.drop is not None)
             if lost:
                 raise ArgumentError(
-                    f"--scan and --{dashed(lost[0])} exclude each other"
+                    f"--scan and --{make_option_name(lost[0])} exclude each other"
                 )
             if len(self.td) > 1:
                 raise ArgumentError("--scan takes one --td")
@@ -297,15 +297,17 @@ class Scanning:
         from d2rpick.base.workers import count_cores, start_importing
 
         start_importing(box.jobs or count_cores(), "d2rpick.models.box_run")
-        from d2rpick.choice.answers import suggest
+        from d2rpick.choice.answers import suggest_in_history
         from d2rpick.choice.question import Settings
         from d2rpick.models.box_run import find_comparison_end, make_history, scan_times
 
         self.box, self.td, self.reference = box, next(iter(box.td), TD), box.simulated()
         find_comparison_end(self.reference, self.td)
         times = scan_times(self.reference.released or self.td / 3, self.td)
-        self.answer = suggest(make_history(self.reference), self.td, Settings())
-        self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
+        self.answer = suggest_in_history(
+            make_history(self.reference), self.td, Settings()
+        )
+        self.cautions = (*warn_if_unbalanced(self.reference), *self.answer.cautions)
         if self.answer.recommended:
             self.times = sorted({*times, self.answer.recommended.tr})
         else:
@@ -326,7 +328,7 @@ class Scanning:
         return Scan(self.reference, outcomes, self.answer, self.cautions)
 
 
-def unbalanced(record: Record) -> tuple[Caution, ...]:
+def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
     """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:

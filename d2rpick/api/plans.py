@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import Asked, ask, request_of
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
+from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.asked import RunQuestion, ask_run, make_request
+from d2rpick.api.cards import CardOptions, Cards, JudgedCard, print_judged_card
 from d2rpick.api.request import NOT_NEGATIVE, check_window
 from d2rpick.base.errors import ArgumentError, DeckError
-from d2rpick.choice import plan as planning, trade_off
+from d2rpick.choice.td import plan as planning, trade_off
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.checking import Findings
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.switched.switched_run import Times
 
 _STEPS: Final = 200  # number of td that are explored
 
@@ -43,9 +43,9 @@ class Exploration(RunAnswer, trade_off.TradeOff):
     @property
     def answer(self) -> str:
         """The result in one sentence."""
-        from d2rpick.report.trade_off import answer
+        from d2rpick.report.trade_off import give_answer
 
-        return answer(self)
+        return give_answer(self)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row per td and a column per single value of ``offers`` in the JSON; unknown values are NaN.
@@ -59,7 +59,7 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         """
         from d2rpick.report.trade_off import COLUMNS
 
-        return frame_of(
+        return build_frame(
             self.to_dict()["offers"],
             COLUMNS,
             source=list(self.situation.history.source),
@@ -131,19 +131,22 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    wanted = arguments.optional("td", td)
-    window = arguments.window("td_window", td_window)
-    count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
-    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return explored(question, wanted, window, count)
+    wanted = arguments.check_optional_number("td", td)
+    window = arguments.check_time_window("td_window", td_window)
+    count = arguments.check_whole_number("steps", _STEPS if steps is None else steps, 1)
+    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    return explore_run(question, wanted, window, count)
 
 
-def explored(
-    question: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
+def explore_run(
+    question: RunQuestion,
+    td: float | None,
+    td_window: tuple[float, float] | None,
+    steps: int,
 ) -> Exploration:
     """Find what each td costs in a window, or in the longest flight."""
     check_window("td_window", td_window)
-    result = trade_off.explore_of(
+    result = trade_off.explore_run(
         question.reference, question.settings, td_window, td=td, steps=steps
     )
     times = [] if td is None else ["--td", repr(td)]
@@ -152,7 +155,7 @@ def explored(
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Plan(RunAnswer, planning.Plan):
+class Plan(RunAnswer, planning.RunPlan):
     """Answer of `plan`; it is immutable.
 
     ``flights`` has a row per flight with ``window``, ``status`` and ``reason``.  ``windows`` are the (tr, td) that this
@@ -174,7 +177,7 @@ class Plan(RunAnswer, planning.Plan):
         """
         from d2rpick.report.plan import WINDOW
 
-        return frame_of(
+        return build_frame(
             self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source)
         )
 
@@ -183,7 +186,7 @@ class Plan(RunAnswer, planning.Plan):
     ) -> JudgedCard | None:
         """Print the card of the next run, judged as printed, with ``every`` new window or only the supported ones."""
         return self.printed(
-            Cards.of(options), every=arguments.flag("every", every, False)
+            Cards.of(options), every=arguments.check_flag("every", every, False)
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
@@ -193,7 +196,7 @@ class Plan(RunAnswer, planning.Plan):
         question = question._replace(
             reference=question.reference._replace(history=self.history)
         )
-        return judged(question, cards, new, done=self.done) if new else None
+        return print_judged_card(question, cards, new, done=self.done) if new else None
 
     def page(
         self,
@@ -206,7 +209,7 @@ class Plan(RunAnswer, planning.Plan):
 
         card = self._card_of_windows(cards or Cards())
         explorer = self._explorer(
-            trade_off.explored_flights(self.question.reference, self)
+            trade_off.explore_flights(self.question.reference, self)
         )
         return plan_page(
             self,
@@ -273,16 +276,19 @@ def plan(
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
     [(0.124, 0.37)]
     """
-    shortest = arguments.optional("min_rigid", min_rigid, NOT_NEGATIVE)
-    windows = arguments.pairs("done", done)
+    shortest = arguments.check_optional_number("min_rigid", min_rigid, NOT_NEGATIVE)
+    windows = arguments.check_windows("done", done)
     if before is not None:
         arguments.check_run("before", before)
-    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return planned(question, shortest, windows, before)
+    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    return plan_run(question, shortest, windows, before)
 
 
-def planned(
-    question: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
+def plan_run(
+    question: RunQuestion,
+    min_rigid: float | None,
+    done: Sequence[Times],
+    before: Run | None,
 ) -> Plan:
     """Plan the rigid windows of a run, or those after the windows that are ``done``."""
     if before is not None and not done:
@@ -299,7 +305,7 @@ def planned(
     earlier = (
         question.reference.like(before.files, question.selection) if before else None
     )
-    result = planning.plan_of(
+    result = planning.plan_run(
         question.reference,
         question.settings,
         min_rigid=min_rigid,
@@ -318,7 +324,7 @@ def planned(
     return Plan.about(question, result, *times)
 
 
-def written(
+def write_deck(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
     """Write a copy of a plan's deck with the card of the plan, and check the copy by the history.

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.grades import GRADES
+from d2rpick.choice.pair.grades import GRADES
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
-    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
@@ -101,7 +101,7 @@ class Option(NamedTuple):
     short: tuple[str, ...] = ()
 
 
-def option(
+def make_option(
     text: str,
     kind: Any = "text",
     metavar: str | None = None,
@@ -116,12 +116,12 @@ def option(
     )
 
 
-def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
-    return option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
+def _make_oscillator_option(text: str, kind: Number = POSITIVE, *others: str) -> Any:
+    return make_option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
 
 
 @cache
-def options_of(table: Any) -> dict[str, Option]:
+def list_options(table: Any) -> dict[str, Option]:
     """Return the options of a table by the names of their fields."""
     return {
         field.name: field.metadata["option"]
@@ -139,113 +139,113 @@ class Request:
     ``given`` names the options that were given, also those given with their default value.
     """
 
-    deck: str | None = option(
+    deck: str | None = make_option(
         "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
     )
-    no_deck: bool = option(
+    no_deck: bool = make_option(
         "Use no deck.  [default: if HISTORY is the folder of a run, the main deck in it]",
         *("flag",), default=False, instead_of=("deck",),
     )  # fmt: skip
-    weights: str | Weights | None = option(  # noqa: RUF009
+    weights: str | Weights | None = make_option(  # noqa: RUF009
         "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
         *("file", "FILE"),
     )
-    history: tuple[str, ...] = option(
+    history: tuple[str, ...] = make_option(
         "Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
-    input_format: str = option(
+    input_format: str = make_option(
         f"Format of the history: auto, which recognises it by content, or {', '.join(READERS)}.",
         *(("auto", *READERS), "FORMAT"), default="auto", short=("-F",),
     )  # fmt: skip
-    time: str | None = option(
+    time: str | None = make_option(
         "Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER"
     )
-    energy: tuple[str, ...] = option(
+    energy: tuple[str, ...] = make_option(
         "Energy column, label or HDF5 path; repeat it to add several.",
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
-    part: tuple[str, ...] = option(
+    part: tuple[str, ...] = make_option(
         "Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         *("parts", "IDS"), many=True, instead_of=("energy",),
     )  # fmt: skip
-    flying: tuple[str, ...] = option(
+    flying: tuple[str, ...] = make_option(
         "Parts that fly together with the switched parts.", "parts", "IDS", many=True
     )
-    channel: tuple[str, ...] = option(
+    channel: tuple[str, ...] = make_option(
         "Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
-    after: float | None = option(
+    after: float | None = make_option(
         "End of the load.  [default: found from the record]", TIME, "T"
     )
-    landing: float | None = option(
+    landing: float | None = make_option(
         "Next contact after the flight; td keeps the margin before it.  [default: found from the record]",
         TIME,
         "T",
     )
-    margin: float | None = option(
+    margin: float | None = make_option(
         "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, or before "
         "--landing, derived]",
         *(NOT_NEGATIVE, "T"),
     )
-    tolerance: float = option(
+    tolerance: float = make_option(
         "Limit on the lock-in error, or on the level error where no oscillator is known.",
         FRACTION,
         "L",
         default=0.2,
     )
-    max_kinetic_share: float | None = option(
+    max_kinetic_share: float | None = make_option(
         "Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K"
     )
-    max_residual: float | None = option(
+    max_residual: float | None = make_option(
         "Reject a pair with a larger residual.", NOT_NEGATIVE, "R"
     )
-    stiffness: float | None = _of_oscillator("Spring k.")
-    mass: float | None = _of_oscillator("Suspended mass M.")
-    frame_mass: float | None = _of_oscillator(
+    stiffness: float | None = _make_oscillator_option("Spring k.")
+    mass: float | None = _make_oscillator_option("Suspended mass M.")
+    frame_mass: float | None = _make_oscillator_option(
         "Frame mass m (or give --beta).", POSITIVE, "beta"
     )
-    beta: float | None = _of_oscillator(
+    beta: float | None = _make_oscillator_option(
         "Mass ratio M/m (instead of --frame-mass).", POSITIVE, "frame_mass"
     )
-    alpha: float | None = _of_oscillator(
+    alpha: float | None = _make_oscillator_option(
         "Rate of damping proportional to mass.", NOT_NEGATIVE
     )
-    v0: float | None = _of_oscillator(
+    v0: float | None = _make_oscillator_option(
         "Velocity of the frame at time 0; all else at rest.", TIME, "vz0"
     )
-    fit_window: tuple[float, float] | None = option(
+    fit_window: tuple[float, float] | None = make_option(
         "Identify the oscillator only here.",
         TIME,
         "LO HI",
         pair=True,
         instead_of=("stiffness", "no_verify"),
     )
-    no_verify: bool = option(
+    no_verify: bool = make_option(
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    strict: bool = option(
+    strict: bool = make_option(
         "Recommend nothing where the energy alone shows when the load is over.",
         "flag",
         default=False,
     )
-    keep_vibration: bool = option(
+    keep_vibration: bool = make_option(
         "Grade the vibration by itself, however little its error is worth in the next contact.",
         "flag",
         default=False,
     )
-    min_quality: str | None = option(
+    min_quality: str | None = make_option(
         "Least grade of a pair that is not reported as a problem (exit code 1).  [default: fair; poor where --td alone "
         "is given]",
         GRADES,
     )
-    cost_share: float | None = option(
+    cost_share: float | None = make_option(
         "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
         *(FRACTION, "C"),
     )
-    step_ratio: float | None = option(
+    step_ratio: float | None = make_option(
         "Time step while rigid over that before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,
         "N",
@@ -370,7 +370,7 @@ class Request:
             )
         part = self.part if parts else ()
         return Selection(
-            self.time, self.energy, part, self.flying, channels_of(self.channel)
+            self.time, self.energy, part, self.flying, read_channels(self.channel)
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
@@ -381,7 +381,7 @@ class Request:
         return tuple(
             text
             for name in chosen
-            for text in typed(name, getattr(self, name), many=OPTIONS[name].many)
+            for text in write_option(name, getattr(self, name), many=OPTIONS[name].many)
         )
 
     def judging(self) -> tuple[str, ...]:
@@ -412,24 +412,24 @@ class Request:
                 yield entry.name
 
 
-def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
+def write_option(name: str, value: Any, *, many: bool) -> Iterator[str]:
     """Yield the words of an option with its value, or its ``many`` values, as typed."""
     if isinstance(value, bool):
-        yield from (f"--{dashed(name)}",) * value
+        yield from (f"--{make_option_name(name)}",) * value
         return
     for single_value in value if many else [value]:
         words = single_value if isinstance(single_value, tuple) else (single_value,)
         yield from (
-            f"--{dashed(name)}",
-            *(word if isinstance(word, str) else _word(word) for word in words),
+            f"--{make_option_name(name)}",
+            *(word if isinstance(word, str) else _write_word(word) for word in words),
         )
 
 
-def _word(value: Any) -> str:
+def _write_word(value: Any) -> str:
     return repr(value) if isinstance(value, int | float) else _IN_MEMORY
 
 
-def channels_of(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
+def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     """Read ``QUANTITY=NAME``; raise ArgumentError for an unknown quantity, or one that is given twice."""
     from d2rpick.histories.names import QUANTITIES
 
@@ -454,7 +454,7 @@ def check_window(name: str, window: tuple[float, float] | None) -> None:
         )
 
 
-def time_or_window(
+def choose_time_or_window(
     td: float | None, window: tuple[float, float] | None
 ) -> float | tuple[float, float] | None:
     """Return the given td or the window for it; raise ArgumentError for both."""
@@ -464,9 +464,9 @@ def time_or_window(
     return window if td is None else td
 
 
-def dashed(name: str) -> str:
+def make_option_name(name: str) -> str:
     """Return the name of an option as it is typed."""
     return name.replace("_", "-")
 
 
-OPTIONS: Final[Mapping[str, Option]] = options_of(Request)
+OPTIONS: Final[Mapping[str, Option]] = list_options(Request)

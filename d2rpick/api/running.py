@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
-from d2rpick.api.cards import numbers
+from d2rpick.api.cards import parse_numbers
 from d2rpick.api.request import NOT_NEGATIVE
 from d2rpick.histories.names import Selection
 
@@ -80,19 +80,19 @@ def first(
     from d2rpick.deck.writing import write_deck
     from d2rpick.running.first import first_card
 
-    names = arguments.part_names("parts", parts)
+    names = arguments.list_part_names("parts", parts)
     times = (
-        arguments.optional("wait", wait, NOT_NEGATIVE),
-        arguments.optional("after", after, NOT_NEGATIVE),
+        arguments.check_optional_number("wait", wait, NOT_NEGATIVE),
+        arguments.check_optional_number("after", after, NOT_NEGATIVE),
     )
-    main = arguments.one_path("deck", deck)
-    folder = arguments.one_path("output_dir", output_dir)
-    copies = first_card(main, numbers("parts", names), *times)
+    main = arguments.check_path("deck", deck)
+    folder = arguments.check_path("output_dir", output_dir)
+    copies = first_card(main, parse_numbers("parts", names), *times)
     files = write_deck(
         main,
         copies.card,
         folder,
-        overwrite=arguments.flag("overwrite", overwrite, False),
+        overwrite=arguments.check_flag("overwrite", overwrite, False),
     )
     return FirstRun(tuple(files), copies.wait.time, copies.wait.reason, copies.notes)
 
@@ -138,16 +138,16 @@ def follow(
     """
     from d2rpick.running import watch  # imported here since `first` does not need it
 
-    selection = Selection(parts=arguments.part_names("parts", parts))
+    selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
     if deck is not None:
         from d2rpick.deck import (
             read_inventory,
         )  # imported here since a deck is rarely named
 
-        inventory = read_inventory(arguments.one_path("deck", deck))
-    time = arguments.optional("wait", wait)
-    seconds = arguments.optional("lasting", lasting)
+        inventory = read_inventory(arguments.check_path("deck", deck))
+    time = arguments.check_optional_number("wait", wait)
+    seconds = arguments.check_optional_number("lasting", lasting)
     return watch.follow(
-        [arguments.one_path("run", run)], selection, time, inventory, lasting=seconds
+        [arguments.check_path("run", run)], selection, time, inventory, lasting=seconds
     )

@@ -35,7 +35,7 @@ class Run:
     Energies are read only when they are needed.
     """
 
-    files: histories.Run
+    files: histories.OpenedRun
     chosen: Selection
     input_format: str = "auto"
     folder: str | None = None
@@ -54,21 +54,21 @@ class Run:
         return self.sources, digests, self.chosen, self.input_format
 
     def __repr__(self) -> str:
-        from d2rpick.report.pages import of_run
+        from d2rpick.report.pages import describe_run
 
-        return f"Run({of_run(self.files)})"
+        return f"Run({describe_run(self.files)})"
 
     def _repr_html_(self) -> str | None:
-        from d2rpick.report.pages import glance
+        from d2rpick.report.pages import show_at_a_glance
 
         overview = give_if_written(self.overview)
         history = give_if_written(lambda: self.files.history(self.chosen))
         if overview is None or history is None:
-            return glance("overview", overview, None) if overview else None
+            return show_at_a_glance("overview", overview, None) if overview else None
         from d2rpick.report.figures_choice import draw_run
 
         flights = [(flight.start, flight.end) for _, flight in overview.flights]
-        return glance("overview", overview, draw_run(history, flights))
+        return show_at_a_glance("overview", overview, draw_run(history, flights))
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -100,10 +100,10 @@ class Run:
         The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
         folder that was read; False for none.
         """
-        from d2rpick.choice.overview import survey
+        from d2rpick.choice.overview import describe_run
 
-        deck_name = arguments.one_path("deck", deck) if deck else None
-        return survey(
+        deck_name = arguments.check_path("deck", deck) if deck else None
+        return describe_run(
             self.files, self.chosen, self._deck_in_folder if deck is None else deck_name
         )
 
@@ -149,7 +149,9 @@ class Run:
         import pandas as pd
 
         is_all = isinstance(parts, str) and parts == "all"
-        names = ("0-4294967295",) if is_all else arguments.part_names("parts", parts)
+        names = (
+            ("0-4294967295",) if is_all else arguments.list_part_names("parts", parts)
+        )
         history = self.files.history(
             self.chosen._replace(energy=(), parts=names) if names else self.chosen
         )
@@ -216,18 +218,20 @@ def read(
             f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)"
         )
     if hasattr(source, "read"):
-        return _opened(
-            [_in_memory(source)], selection_of(time, energy, channels), input_format
+        return _open_sources(
+            [_read_into_memory(source)],
+            make_selection(time, energy, channels),
+            input_format,
         )
-    names = arguments.paths("source", source)
+    names = arguments.list_paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen = selection_of(time, energy, channels)
-    kind = known_format(input_format)
-    return Run(open_run(names, chosen, kind), chosen, kind, folder_of(names))
+    chosen = make_selection(time, energy, channels)
+    kind = check_format(input_format)
+    return Run(open_run(names, chosen, kind), chosen, kind, find_folder(names))
 
 
-def folder_of(names: Sequence[str]) -> str | None:
+def find_folder(names: Sequence[str]) -> str | None:
     """Return the folder that names a run; None if files name it."""
     import os
 
@@ -276,21 +280,21 @@ def from_frame(
     >>> from_frame(table).to_frame()["internal_energy"].tolist()
     [0.0, 4.0, 1.0]
     """
-    from d2rpick.api.tables import frame_of_table, is_plain_array
+    from d2rpick.api.tables import convert_to_frame, is_plain_array
     from d2rpick.histories.source import Source
 
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}, a text was expected")
-    table = frame_of_table(frame)
-    chosen = selection_of(time, energy, channels)
+    table = convert_to_frame(frame)
+    chosen = make_selection(time, energy, channels)
     is_named = not is_plain_array(frame)
     if is_named:
-        table = _timed(table, chosen.time)
-    text = table.apply(_seconds).to_csv(index=False, header=is_named)
-    return _opened([Source(name or "frame", text.encode())], chosen, "csv")
+        table = _set_time_column(table, chosen.time)
+    text = table.apply(_convert_to_seconds).to_csv(index=False, header=is_named)
+    return _open_sources([Source(name or "frame", text.encode())], chosen, "csv")
 
 
-def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
+def _set_time_column(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
     """Make the index a column if it is the time; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
@@ -315,12 +319,12 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
     )
 
 
-def _seconds(column: pd.Series[Any]) -> pd.Series[Any]:
+def _convert_to_seconds(column: pd.Series[Any]) -> pd.Series[Any]:
     """Convert timedeltas to seconds, and return other values unchanged."""
     return column.dt.total_seconds() if column.dtype.kind == "m" else column
 
 
-def _in_memory(file: Any) -> Source:
+def _read_into_memory(file: Any) -> Source:
     from d2rpick.histories.source import Source
 
     data = file.read()
@@ -331,14 +335,16 @@ def _in_memory(file: Any) -> Source:
     return Source(str(getattr(file, "name", "file")), data)
 
 
-def _opened(sources: list[Source], chosen: Selection, input_format: str | None) -> Run:
+def _open_sources(
+    sources: list[Source], chosen: Selection, input_format: str | None
+) -> Run:
     from d2rpick.histories.opening import open_sources
 
-    kind = known_format(input_format)
+    kind = check_format(input_format)
     return Run(open_sources(sources, chosen, kind), chosen, kind)
 
 
-def known_format(input_format: str | None) -> str:
+def check_format(input_format: str | None) -> str:
     """Return the name of a format, or ``"auto"``; raise ValueError for any other name."""
     from d2rpick.histories.formats import READERS
 
@@ -353,7 +359,7 @@ def known_format(input_format: str | None) -> str:
     return input_format
 
 
-def selection_of(
+def make_selection(
     time: str | int | None,
     energy: str | int | Iterable[str | int] | None,
     channels: Mapping[str, str | int] | None = None,
@@ -397,16 +403,16 @@ def selection_of(
     )
 
 
-def extracted(
-    run: histories.Run, selection: Selection
+def extract_columns(
+    run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return the selected columns of a run with all that is known at its times, and the notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum that shows the flight, each of shape (n,).
     """
-    from d2rpick.choice.flights import momentum_of_flight
     from d2rpick.choice.question import Reference
+    from d2rpick.choice.td.flights import list_momentum_columns
 
     history = Reference.of(run, selection).history
     table = {"time": history.time, "internal_energy": history.energy}
@@ -416,12 +422,12 @@ def extracted(
             f"part_{part.id}": column
             for part, column in zip(history.parts, energies.T, strict=True)
         }
-    return table | run.quantities(history.time) | _of_model(
+    return table | run.quantities(history.time) | _list_model_columns(
         history
-    ) | momentum_of_flight(history), history.notes
+    ) | list_momentum_columns(history), history.notes
 
 
-def _of_model(history: History) -> dict[str, Samples]:
+def _list_model_columns(history: History) -> dict[str, Samples]:
     """Return the columns of the whole model's energy balance that are written at the times of the energy.
 
     The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.

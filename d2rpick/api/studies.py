@@ -15,16 +15,23 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import Paged, frame_of
-from d2rpick.api.asked import request_of
-from d2rpick.api.request import Request, time_or_window
+from d2rpick.api.answer import Paged, build_frame
+from d2rpick.api.asked import make_request
+from d2rpick.api.request import Request, choose_time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
 from d2rpick.base.workers import Farm, choose_farm
-from d2rpick.choice import study as core
-from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
+from d2rpick.choice.runs import study as core
+from d2rpick.choice.runs.study import (
+    FAILED,
+    UNREADABLE,
+    Question,
+    Stamp,
+    StudyRow,
+    stamp_files,
+)
 from d2rpick.report.study import PLAIN, RUN
-from d2rpick.report.tables import positional
+from d2rpick.report.tables import make_positional
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -38,7 +45,7 @@ _LAST: Final = b'{"schema": '  # beginning of the summary after the rows
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Study(Paged, core.Study):
+class Study(Paged, core.StudyOfRuns):
     """Answer of `study`; it is immutable.
 
     ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None without a tr.  ``common`` is
@@ -58,7 +65,7 @@ class Study(Paged, core.Study):
         >>> d2.study(["sample_data/energy.csv"], td=0.0687534).to_frame()["status"].tolist()
         ['ok']
         """
-        return frame_of(self.to_dict()["runs"], RUN.keys, td=self.td)
+        return build_frame(self.to_dict()["runs"], RUN.keys, td=self.td)
 
 
 def study(
@@ -109,24 +116,27 @@ def study(
     >>> found.agree, round(found.common.tr, 4)
     (True, 0.0136)
     """
-    from d2rpick.api.runs import known_format, selection_of
+    from d2rpick.api.runs import check_format, make_selection
 
-    td_or_window = time_or_window(
-        arguments.optional("td", td), arguments.window("td_window", td_window)
+    td_or_window = choose_time_or_window(
+        arguments.check_optional_number("td", td),
+        arguments.check_time_window("td_window", td_window),
     )
-    processes = arguments.whole("jobs", 1 if jobs is None else jobs, 1)
+    processes = arguments.check_whole_number("jobs", 1 if jobs is None else jobs, 1)
     names = find_runs(
-        arguments.paths("runs", [runs] if isinstance(runs, str) else runs)
+        arguments.list_paths("runs", [runs] if isinstance(runs, str) else runs)
     )
-    request = request_of(None, parts, flying, None, None, choosing)
-    chosen = selection_of(time, energy, channels)
+    request = make_request(None, parts, flying, None, None, choosing)
+    chosen = make_selection(time, energy, channels)
     request = replace(
         request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(pair) for pair in chosen.channels),
-        input_format=known_format(input_format),
+        input_format=check_format(input_format),
     )  # fmt: skip
-    question = question_of(request, td_or_window, curve=True)
-    with choose_farm(min(processes, len(names)), "d2rpick.choice.study") as farm:
-        return summary(request, question, names, list(rows_of(question, names, farm)))
+    question = make_question(request, td_or_window, curve=True)
+    with choose_farm(min(processes, len(names)), "d2rpick.choice.runs.study") as farm:
+        return compare_rows(
+            request, question, names, list(compute_rows(question, names, farm))
+        )
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:
@@ -136,17 +146,17 @@ def find_runs(names: Iterable[str]) -> tuple[str, ...]:
     runs: list[str] = []
     for name in names:
         pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        runs += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+        runs += (pattern and _remove_repeated(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
     return tuple(runs)
 
 
-def _once(names: Iterable[str]) -> list[str]:
+def _remove_repeated(names: Iterable[str]) -> list[str]:
     """Return each file or folder once, by its shortest name: circular links give it many names."""
     shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
-def question_of(
+def make_question(
     request: Request, td: float | tuple[float, float] | None, *, curve: bool
 ) -> Question:
     """Return the question to every run; with its ``curve`` if the energies of all runs are drawn."""
@@ -155,7 +165,7 @@ def question_of(
     )
 
 
-def summary(
+def compare_rows(
     request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]
 ) -> Study:
     """Compare the rows of all runs."""
@@ -166,12 +176,12 @@ def summary(
     # neither the study nor its command mentions the CPU time
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
-        core.summarise(td, rows),
-        command=("study", *times, *options, *positional(names)),
+        core.compare_rows(td, rows),
+        command=("study", *times, *options, *make_positional(names)),
     )
 
 
-def rows_of(
+def compute_rows(
     question: Question,
     sources: Sequence[str],
     farm: Farm,
@@ -203,11 +213,13 @@ def rows_of(
     names = [sources[number] for number in new]
     if absolute:
         names = [abspath(name) for name in names]  # noqa: PTH100
-    for answer in chain((None,), farm.answers(partial(core.ask, question), names)):
+    for answer in chain(
+        (None,), farm.answers(partial(core.judge_run, question), names)
+    ):
         if answer:
             number = new[answer.number]
             if answer.error:
-                row = core.failed(sources[number], answer.error)
+                row = core.make_failed_row(sources[number], answer.error)
             else:
                 row = answer.result
             known_rows[number] = replace(row, source=sources[number])
@@ -221,13 +233,13 @@ def rows_of(
             following += 1
 
 
-def fingerprint(question: Question) -> str:
+def compute_fingerprint(question: Question) -> str:
     """Return a digest of all that a row depends on besides its files: options and version, not the drawn curves."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def line(row: StudyRow, question_digest: str) -> str:
+def write_row(row: StudyRow, question_digest: str) -> str:
     """Return a row as one line: its values, and what is needed to read it back later.
 
     ``asked`` is the ``fingerprint`` of the question.
@@ -255,7 +267,11 @@ class Ledger:
     """
 
     def __init__(self, name: str, question: Question) -> None:
-        self.name, self.asked, self.curve = name, fingerprint(question), question.curve
+        self.name, self.asked, self.curve = (
+            name,
+            compute_fingerprint(question),
+            question.curve,
+        )
         self.taken = self.outdated = self.damaged = 0
         self._rows: dict[tuple[Stamp, ...], StudyRow] = {}
         self.known: dict[int, StudyRow] = {}
@@ -310,7 +326,7 @@ class Ledger:
 
     def find(self, source: str) -> StudyRow | None:
         """Return the row of a run whose files are unchanged, None if there is none."""
-        files = stamps(source)
+        files = stamp_files(source)
         row = self._rows.get(files)
         if row:
             self.taken += 1
@@ -351,7 +367,7 @@ class Ledger:
             return
         try:
             append_as_a_whole(
-                Path(self.name), self._end + line(row, self.asked).encode() + b"\n"
+                Path(self.name), self._end + write_row(row, self.asked).encode() + b"\n"
             )
         except OSError as error:
             raise FormatError(

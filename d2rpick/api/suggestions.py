@@ -7,10 +7,15 @@ from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import Asked, ask, request_of
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
-from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, time_or_window
+from d2rpick.api.answer import RunAnswer, build_frame
+from d2rpick.api.asked import RunQuestion, ask_run, make_request
+from d2rpick.api.cards import (
+    CardOptions,
+    Cards,
+    JudgedCard,
+    print_judged_card as card_judged,
+)
+from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers
 from d2rpick.histories.digits import round_as_read
@@ -22,12 +27,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.candidates import Pair
-    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.parts.cost import Weights
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestion(RunAnswer, answers.Suggestion):
+class Suggestion(RunAnswer, answers.PairSuggestion):
     """Answer of `suggest`; it is immutable.
 
     ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
@@ -58,7 +63,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
         source = list(self.situation.history.source)
         rows = self.to_dict()["candidates"]
-        return frame_of(
+        return build_frame(
             rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source
         )
 
@@ -71,7 +76,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
         pair = self.recommended
         question = self.question
         judge = partial(
-            answers.verify_of,
+            answers.verify_run,
             question.reference,
             settings=self.situation.settings,
             earlier=self.situation,
@@ -87,11 +92,11 @@ class Suggestion(RunAnswer, answers.Suggestion):
         cards: Cards | None = None,
     ) -> str:
         """Return the page, with the card of the recommended pair."""
-        from d2rpick.choice.trade_off import explored_around
+        from d2rpick.choice.td.trade_off import explore_around
         from d2rpick.report.pages import suggestion_page
 
         chosen = (self.situation, self.recommended.tr) if self.recommended else None
-        explored = explored_around(
+        explored = explore_around(
             self.question.reference, self.situation, self.td_window
         )
         return suggestion_page(
@@ -100,7 +105,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verdict(RunAnswer, answers.Verdict):
+class Verdict(RunAnswer, answers.PairVerdict):
     """Answer of `verify`; it is immutable.
 
     ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
@@ -127,10 +132,10 @@ class Verdict(RunAnswer, answers.Verdict):
         >>> verdict.to_frame()["verified"].tolist()
         [True]
         """
-        from d2rpick.report.verdict import measures
+        from d2rpick.report.verdict import list_all_measures
 
-        values = measures(self)
-        return frame_of(
+        values = list_all_measures(self)
+        return build_frame(
             [values],
             list(values),
             basis=self.basis,
@@ -144,11 +149,11 @@ class Verdict(RunAnswer, answers.Verdict):
         cards: Cards | None = None,
     ) -> str:
         """Return the page, with the card of the pair if it is good."""
-        from d2rpick.choice.trade_off import explored_around
+        from d2rpick.choice.td.trade_off import explore_around
         from d2rpick.report.pages import verdict_page
 
         chosen = (self.situation, self.tr) if self.verified else None
-        explored = explored_around(self.question.reference, self.situation)
+        explored = explore_around(self.question.reference, self.situation)
         context = self._context(command, judging, cards, chosen, explored)
         return verdict_page(
             self,
@@ -212,17 +217,20 @@ def suggest(
     >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
     '0.013587 0.068753'
     """
-    wanted = time_or_window(
-        arguments.optional("td", td), arguments.window("td_window", td_window)
+    wanted = choose_time_or_window(
+        arguments.check_optional_number("td", td),
+        arguments.check_time_window("td_window", td_window),
     )
-    return suggested(
-        ask(run, request_of(run, parts, flying, deck, weights, choosing)), wanted
+    return suggest_for_question(
+        ask_run(run, make_request(run, parts, flying, deck, weights, choosing)), wanted
     )
 
 
-def suggested(question: Asked, td: float | tuple[float, float] | None) -> Suggestion:
+def suggest_for_question(
+    question: RunQuestion, td: float | tuple[float, float] | None
+) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
-    result = answers.suggest_of(question.reference, td, question.settings)
+    result = answers.suggest_in_run(question.reference, td, question.settings)
     if (
         result.better_pair
         and result.recommended
@@ -286,16 +294,19 @@ def verify(
     >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
     True
     """
-    pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    min_ratio = arguments.number(
+    pair = (
+        arguments.check_optional_number("tr", tr),
+        arguments.check_optional_number("td", td),
+    )
+    min_ratio = arguments.check_number(
         "min_mean_energy",
         MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,
         FRACTION,
     )
     if switched is not None:
         arguments.check_run("switched", switched)
-    question = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return judged(question, *pair, switched, min_ratio)
+    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    return judge_pair(question, *pair, switched, min_ratio)
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
@@ -306,8 +317,8 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
         )
 
 
-def judged(
-    question: Asked,
+def judge_pair(
+    question: RunQuestion,
     tr: float | None,
     td: float | None,
     switched: Run | None = None,
@@ -319,14 +330,16 @@ def judged(
         switched.files, question.selection
     )
     if switched_reference and (tr is None or td is None):
-        from d2rpick.choice.comparison import times_of
+        from d2rpick.choice.switched.comparison import find_switch_times
 
-        switch_times = times_of(switched_reference.history, question.reference.history)
+        switch_times = find_switch_times(
+            switched_reference.history, question.reference.history
+        )
         tr = switch_times[0] if tr is None else tr
         td = switch_times[1] if td is None else td
     assert tr is not None
     assert td is not None
-    result = answers.verify_of(question.reference, tr, td, question.settings)
+    result = answers.verify_run(question.reference, tr, td, question.settings)
     times = ["--tr", repr(tr), "--td", repr(td)]
     if switched is not None and switched_reference:
         result = answers.compare_with(

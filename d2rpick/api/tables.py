@@ -41,7 +41,7 @@ def is_plain_array(table: Any) -> bool:
     return hasattr(table, "__array_interface__") and table.dtype.names is None
 
 
-def frame_of_table(table: Any) -> pd.DataFrame:
+def convert_to_frame(table: Any) -> pd.DataFrame:
     """Return a table as a pandas.DataFrame.
 
     Parameters

@@ -12,34 +12,34 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import Kept, kept_mean_energy
-from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
-from d2rpick.choice.decision import Decision, decide
-from d2rpick.choice.grades import POOR
 from d2rpick.choice.health import (
     OF_THE_MODEL,
-    assess,
-    cautions_of_engine,
-    cautions_of_health,
+    assess_health,
     refuse_unsound,
+    warn_about_engine,
+    warn_about_health,
 )
-from d2rpick.choice.quality import (
+from d2rpick.choice.pair.aftermath import Kept, bound_mean_energy
+from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_times
+from d2rpick.choice.pair.decision import Decision, decide
+from d2rpick.choice.pair.grades import POOR
+from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     ROUNDING,
     Quality,
-    candidates_at,
-    over_limits,
+    list_exceeded_limits,
+    rank_candidates,
 )
-from d2rpick.choice.situation import OfTd, Situation, examine
-from d2rpick.choice.warnings import (
+from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
+from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
     POOR_RESIDUAL,
     Expectation,
-    against_td,
-    cautions_of,
-    expectation,
-    most_energy,
-    out_of_place,
+    estimate_time_after,
+    find_largest_energy,
+    list_objections_to_td,
+    warn_about_place,
+    warn_about_td,
 )
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.balance import read_balance
@@ -48,16 +48,16 @@ from d2rpick.histories.digits import round_as_read
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
+    from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.histories.history import History
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.span import Fits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(OfTd):
+class PairVerdict(AnswerAtTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``computed`` is the energy of the finished
@@ -99,7 +99,7 @@ class Verdict(OfTd):
     @cached_property
     def better(self) -> Pair | None:
         """A pair that is not poor: another tr for this td, or a pair at the nearest better td; None without one."""
-        return way_out(self.situation)
+        return find_good_pair(self.situation)
 
     @property
     def quality(self) -> Quality | None:
@@ -109,16 +109,16 @@ class Verdict(OfTd):
     @cached_property
     def kept(self) -> Kept | None:
         """Bounds of the mean energy after td, over that of the reference run; None if they are unknown."""
-        return kept_mean_energy(self.situation, self.candidate)
+        return bound_mean_energy(self.situation, self.candidate)
 
 
-def verify(
+def verify_in_history(
     history: History,
     tr: float,
     td: float,
     settings: Settings,
     earlier: Situation | None = None,
-) -> Verdict:
+) -> PairVerdict:
     """Judge one pair; the situation ``earlier`` is used if its td is ``td``, else its fits.
 
     Raises
@@ -126,14 +126,14 @@ def verify(
     RangeError
         If a time lies outside the record, or tr is not before td.
     """
-    _in_order(tr, td)
+    _check_order(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
     fits = earlier.fits if earlier else None
-    return verify_at(examine(history, td, settings, fits), tr)
+    return verify_at(examine_td(history, td, settings, fits), tr)
 
 
-def verify_at(situation: Situation, tr: float) -> Verdict:
+def verify_at(situation: Situation, tr: float) -> PairVerdict:
     """Judge one pair in a known situation.
 
     Raises
@@ -143,9 +143,9 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     """
     settings = situation.settings
     td = situation.td
-    _in_order(tr, td)
+    _check_order(tr, td)
     situation.history.energy_at(tr, "tr")
-    judged = judge(situation, [tr])
+    judged = judge_times(situation, [tr])
     candidate = judged[0]
     is_known = situation.flight.start is not None
     share = situation.kinetic_share
@@ -159,18 +159,18 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     td_ok = None if share is None else share <= limit
     if outside:
         td_ok = False
-    return Verdict(
+    return PairVerdict(
         situation=situation,
         candidate=candidate,
         tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
         admissible=bool(judged.kept[0]),
-        reasons=(*candidate.notes, *over_limits(situation, candidate)),
-        cautions=(*cautions_of(situation), *out_of_place(situation, tr)),
+        reasons=(*candidate.notes, *list_exceeded_limits(situation, candidate)),
+        cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
 
 
-def _in_order(tr: float, td: float) -> None:
+def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
     if not tr < td:
         raise RangeError(
@@ -191,7 +191,7 @@ class AcceptableWindow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Suggestion(OfTd):
+class PairSuggestion(AnswerAtTd):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
     ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
@@ -230,7 +230,9 @@ class Suggestion(OfTd):
         """Estimate of the time after td on basis "energy"; None on other bases."""
         if self.situation.basis != "energy":
             return None
-        return expectation(self.situation, self.chosen.energy if self.chosen else None)
+        return estimate_time_after(
+            self.situation, self.chosen.energy if self.chosen else None
+        )
 
     @cached_property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
@@ -238,11 +240,11 @@ class Suggestion(OfTd):
         if not self.situation.in_flight:
             return ()
         # imported here: an oscillator does not need it
-        from d2rpick.choice.windows import (
-            acceptable_windows,
+        from d2rpick.choice.pair.windows import (
+            find_acceptable_windows,
         )
 
-        windows = acceptable_windows(
+        windows = find_acceptable_windows(
             self.situation, self.candidates, self.chosen.tr if self.chosen else None
         )
         return tuple((start, end) for start, end in windows.tolist())
@@ -277,7 +279,7 @@ class Suggestion(OfTd):
     def decision_on(self, candidate: Candidate) -> Decision:
         """Decide on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
-        limits = over_limits(self.situation, candidate)
+        limits = list_exceeded_limits(self.situation, candidate)
         return decide(self.situation, candidate, objections=(*objections, *limits))
 
     @property
@@ -288,7 +290,7 @@ class Suggestion(OfTd):
     @cached_property
     def kept(self) -> Kept | None:
         """Bounds of the mean energy after td for the recommended tr, over that of the reference; None if unknown."""
-        return kept_mean_energy(self.situation, self.chosen) if self.chosen else None
+        return bound_mean_energy(self.situation, self.chosen) if self.chosen else None
 
     @property
     def clearly_better(self) -> Pair | None:
@@ -313,26 +315,30 @@ class Suggestion(OfTd):
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
-def suggest(history: History, td: float, settings: Settings) -> Suggestion:
+def suggest_in_history(
+    history: History, td: float, settings: Settings
+) -> PairSuggestion:
     """Rank the candidates for tr at ``td`` and recommend one; RangeError if td lies outside the record."""
-    return suggest_at(examine(history, td, settings))
+    return suggest_at(examine_td(history, td, settings))
 
 
 def suggest_at(
     situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
-) -> Suggestion:
+) -> PairSuggestion:
     """Rank the candidates for tr in a known situation, recommend one, and search for a better td.
 
     ``ranked`` are the ranked candidates if they are known, up to the recommended one at least.
     """
-    candidates = next(candidates_at([situation])) if ranked is None else ranked
+    candidates = next(rank_candidates([situation])) if ranked is None else ranked
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
-    cautions = list(cautions_of(situation))
+    cautions = list(warn_about_td(situation))
     if best:
-        cautions += out_of_place(situation, best.tr)
+        cautions += warn_about_place(situation, best.tr)
     else:
-        cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
+        cautions.append(
+            Caution("no-candidate", _explain_why_none(situation, candidates))
+        )
     if with_better and not better:
         cautions.append(
             Caution(
@@ -340,7 +346,7 @@ def suggest_at(
                 "no peak of the energy in the flight has an acceptable tr",
             )
         )
-    return Suggestion(situation, candidates, better, tuple(cautions))
+    return PairSuggestion(situation, candidates, better, tuple(cautions))
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
@@ -361,14 +367,14 @@ def find_better_pair(situation: Situation) -> Pair | None:
         situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)
     ):
         peak_situation = situation.at(td)
-        if peak_situation.vibration.doubts or _level_refuses(peak_situation):
+        if peak_situation.vibration.doubts or _is_level_refused(peak_situation):
             continue
-        best = _saving(peak_situation)
+        best = _find_saving_pair(peak_situation)
         if best is None:
             continue
-        examined = _anew(situation, td)
-        best = best if examined.sees_as(peak_situation) else _saving(examined)
-        if best and _holds_as_printed(situation, best.tr, td):
+        examined = _examine_anew(situation, td)
+        best = best if examined.sees_as(peak_situation) else _find_saving_pair(examined)
+        if best and _is_admissible_as_printed(situation, best.tr, td):
             return best
         refused += 1
         if refused == _MOST_REFUSED:
@@ -376,7 +382,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
     return None
 
 
-def way_out(situation: Situation) -> Pair | None:
+def find_good_pair(situation: Situation) -> Pair | None:
     """Return a pair that is not poor: the recommended tr for this td, else the pair of the nearest better td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
@@ -387,7 +393,7 @@ def way_out(situation: Situation) -> Pair | None:
     return better
 
 
-def _level_refuses(situation: Situation) -> bool:
+def _is_level_refused(situation: Situation) -> bool:
     """Return True if no tr can suit the level at td, which is negative or too high.
 
     Noise makes thousands of such peaks, so that this test saves time.
@@ -398,50 +404,50 @@ def _level_refuses(situation: Situation) -> bool:
     smallest_share = max(0.0, 1 - situation.settings.tolerance - ROUNDING)
     return level < -round_off(
         situation.history
-    ) or level * smallest_share**2 > most_energy(situation)
+    ) or level * smallest_share**2 > find_largest_energy(situation)
 
 
-def _saving(situation: Situation) -> Pair | None:
+def _find_saving_pair(situation: Situation) -> Pair | None:
     """Return the recommended pair at a td if it saves run time, else None."""
-    return next(candidates_at([situation], in_flight=True)).saving
+    return next(rank_candidates([situation], in_flight=True)).saving
 
 
-def _anew(situation: Situation, td: float) -> Situation:
+def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, as if that td had been given."""
     # an oscillator is searched again, the reason why there is none is not
     quick = situation.evidence.span is None
-    return examine(
+    return examine_td(
         situation.history, td, situation.settings, situation.fits, quick=quick
     )
 
 
-def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
+def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` admits a pair as rounded to the six printed digits."""
     # rounding moved a time beyond the record, or both onto each other
     try:
         return verify_at(
-            _anew(situation, round_as_read(td)), round_as_read(tr)
+            _examine_anew(situation, round_as_read(td)), round_as_read(tr)
         ).admissible
     except RangeError:
         return False
 
 
-def _why_none(situation: Situation, ranked: Candidates) -> str:
+def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     """Return the reason why no candidate is acceptable."""
     if not ranked:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
     if situation.td > situation.latest_td:
-        return f"td = {situation.td:.6g}: {'; '.join(against_td(situation))}"
+        return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
     nearest = ranked[0]
-    reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
+    reasons = "; ".join((*nearest.notes, *list_exceeded_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"
 
 
-_Answer = TypeVar("_Answer", Suggestion, Verdict)
+_Answer = TypeVar("_Answer", PairSuggestion, PairVerdict)
 
 
-def suggest_of(
+def suggest_in_run(
     reference: Reference,
     td: float | tuple[float, float] | None,
     settings: Settings,
@@ -450,7 +456,7 @@ def suggest_of(
     fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
-) -> Suggestion:
+) -> PairSuggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high), or for None in the longest flight [time].
 
     With ``with_better`` False no better td is searched for a given td.  ``fits`` are those of an earlier call for the
@@ -465,7 +471,7 @@ def suggest_of(
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
         # imported here: a given td needs no search
-        from d2rpick.choice.suggest_td import (
+        from d2rpick.choice.td.suggest_td import (
             choose_td,
         )
 
@@ -476,28 +482,31 @@ def suggest_of(
         )
     else:
         answer = suggest_at(
-            examine(reference.history, td, settings, fits), with_better=with_better
+            examine_td(reference.history, td, settings, fits), with_better=with_better
         )
-    return _with_health(answer, reference.run)
+    return _add_health(answer, reference.run)
 
 
-def verify_of(
+def verify_run(
     reference: Reference,
     tr: float,
     td: float,
     settings: Settings,
     earlier: Situation | None = None,
-) -> Verdict:
+) -> PairVerdict:
     """Judge one pair of a reference run; errors and ``earlier`` as for one pair of a history."""
     refuse_unsound(reference.history, settings, td, choosing=False)
-    return _with_health(
-        verify(reference.history, tr, td, settings, earlier), reference.run
+    return _add_health(
+        verify_in_history(reference.history, tr, td, settings, earlier), reference.run
     )
 
 
 def compare_with(
-    verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0
-) -> Verdict:
+    verdict: PairVerdict,
+    reference: Reference,
+    switched: Reference,
+    min_mean: float = 0.0,
+) -> PairVerdict:
     """Add to a verdict the comparison of a finished switched run with the reference run that the verdict is based on.
 
     Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
@@ -508,9 +517,9 @@ def compare_with(
     RangeError
         If one of the two runs does not continue after td.
     """
-    from d2rpick.choice.comparison import compare
+    from d2rpick.choice.switched.comparison import compare_with_reference
 
-    comparison = compare(
+    comparison = compare_with_reference(
         verdict.situation, verdict.candidate.tr, reference, switched, min_mean
     )
     return replace(
@@ -520,24 +529,24 @@ def compare_with(
         # a wrong motion overrules the verdict
         admissible=verdict.admissible and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,
-        cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
+        cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
     )
 
 
-def _with_health(answer: _Answer, run: Run) -> _Answer:
+def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
     """Add the health of the run in the rigid window, else in the flight up to td, with its warnings.
 
     The time after td does not matter for the choice.
     """
     answer = replace(
-        answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources))
+        answer, cautions=(*answer.cautions, *warn_about_engine(run.sources))
     )
     history = answer.situation.history
     td = answer.situation.td
     balance = read_balance(run.databases, history.parts, td)
     if balance is None:
         return answer
-    if isinstance(answer, Verdict):
+    if isinstance(answer, PairVerdict):
         start: float | None = answer.candidate.tr
     else:
         if answer.recommended:
@@ -546,14 +555,14 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
             start = answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked, td)
+    health = assess_health(balance, window, locked, td)
     flight = answer.situation.flight
     flies = (
         window is not None
         and flight.within(history.time)[0] <= window[0]
         and answer.situation.in_flight
     )
-    health_cautions = cautions_of_health(health, at_rest=answer.situation.at_rest)
+    health_cautions = warn_about_health(health, at_rest=answer.situation.at_rest)
     relevant: list[Caution] = [
         caution
         for caution in health_cautions

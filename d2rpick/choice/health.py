@@ -78,7 +78,7 @@ class Health(NamedTuple):
     until: float | None = None
 
 
-def assess(
+def assess_health(
     balance: Balance,
     window: tuple[float, float] | None = None,
     locked: float | None = None,
@@ -96,31 +96,33 @@ def assess(
     until : float, optional
         End of the balance, which messages give with each figure [time].
     """
-    peak = _peak(balance)
+    peak = _find_peak(balance)
     if balance.internal is not None and peak is None:
         reason = (
             "the internal energy never exceeds a millionth of the energy of the run, so "
             "shares of it are meaningless"
         )
-        return Health(**_ratio(balance), window=window, reason=reason, until=until)
+        return Health(
+            **_find_ratio_range(balance), window=window, reason=reason, until=until
+        )
     negative_sliding = None
     if balance.sliding is not None:
         negative_sliding = -balance.sliding
     return Health(
-        hourglass_share=_share(balance.against_hourglassing, peak),
-        **_worst_part(balance),
-        **_ratio(balance),
-        sliding_share=_share(_without_friction(balance), peak),
-        negative_sliding_share=_share(negative_sliding, peak),
-        eroded_share=_share(balance.eroded, peak),
+        hourglass_share=_compute_share(balance.against_hourglassing, peak),
+        **_find_worst_part(balance),
+        **_find_ratio_range(balance),
+        sliding_share=_compute_share(_subtract_friction(balance), peak),
+        negative_sliding_share=_compute_share(negative_sliding, peak),
+        eroded_share=_compute_share(balance.eroded, peak),
         window=window,
-        **(_in_window(balance, *window, locked) if window else {}),
-        window_reason=_too_short(balance, window) if window else None,
+        **(_measure_window(balance, *window, locked) if window else {}),
+        window_reason=_explain_few_states(balance, window) if window else None,
         until=until,
     )
 
 
-def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
+def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | None:
     """Return a message if the window has too few states to distinguish a load from gravity, else None."""
     states = int(
         np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
@@ -130,7 +132,7 @@ def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
     return f"the window holds {states} states: at least {FEWEST_STATES} are needed to tell a load from gravity"
 
 
-def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
+def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
     """Yield the warnings about the health of a run, with stable codes.
 
     If nothing vibrates (``at_rest``), no level of the internal energy is matched, so hourglass energy does not matter.
@@ -142,7 +144,7 @@ def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Cau
             yield Caution(code, sentence.format(h=health, up_to=up_to, where=where))
 
 
-def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
+def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
     if not any("T0" in name for name in sources):  # not an engine run of Radioss
         return
@@ -158,12 +160,12 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
         yield Caution(WRONG_ENERGY, text)
 
 
-def _above(value: float | None, limit: float) -> bool:
+def _is_above(value: float | None, limit: float) -> bool:
     """Return True if a value is known and exceeds its limit."""
     return value is not None and value > limit
 
 
-def _gains_or_loses(health: Health) -> bool:
+def _is_unbalanced(health: Health) -> bool:
     """Return True if the energy ratio leaves its limits."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
@@ -177,34 +179,34 @@ def _gains_or_loses(health: Health) -> bool:
 _UNRELIABLE: Final = "do not rely on the internal energy"
 # Code of each warning, the condition for it, and its text.
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
-    ("hourglass", lambda h: _above(h.hourglass_share, MOST_HOURGLASS),
+    ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
      f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
-    ("part-hourglass", lambda h: _above(h.part_hourglass_share, MOST_HOURGLASS),
+    ("part-hourglass", lambda h: _is_above(h.part_hourglass_share, MOST_HOURGLASS),
      ("hourglass energy of {h.part.name} reaches {h.part_hourglass_share:.0%} of its internal energy{up_to}: "
      f"{_UNRELIABLE}")),
-    ("energy-ratio", _gains_or_loses,
+    ("energy-ratio", _is_unbalanced,
      ("total energy over initial energy and external work ranges from {h.energy_ratio_min:.3g} to "
      "{h.energy_ratio_max:.3g}{up_to}: the run gains or loses energy")),
-    ("negative-sliding", lambda h: _above(h.negative_sliding_share, MOST_NEGATIVE_SLIDING),
+    ("negative-sliding", lambda h: _is_above(h.negative_sliding_share, MOST_NEGATIVE_SLIDING),
      "contact energy falls to -{h.negative_sliding_share:.0%} of the internal energy{up_to}: check for penetrations"),
-    ("sliding", lambda h: _above(h.sliding_share, MOST_SLIDING),
+    ("sliding", lambda h: _is_above(h.sliding_share, MOST_SLIDING),
      "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; only friction can explain that"),
-    ("eroded-energy", lambda h: _above(h.eroded_share, MOST_WORK),
+    ("eroded-energy", lambda h: _is_above(h.eroded_share, MOST_WORK),
      ("deleted elements hold {h.eroded_share:.0%} of the internal energy{up_to}: it counts as internal energy of the "
      "model but does not spring back")),
     ("window-not-judged", lambda h: h.window_reason is not None, "{h.window_reason}"),
-    ("contact-in-window", lambda h: _above(h.window_sliding, MOST_WORK),
+    ("contact-in-window", lambda h: _is_above(h.window_sliding, MOST_WORK),
      ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: where the parts touch "
      "something, they do not fly freely")),
-    ("work-in-window", lambda h: _above(h.window_work, MOST_WORK),
+    ("work-in-window", lambda h: _is_above(h.window_work, MOST_WORK),
      ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: where it acts on the "
      "parts, they do not fly freely")),
-    ("erosion", lambda h: _above(h.window_eroded, 0.0),
+    ("erosion", lambda h: _is_above(h.window_eroded, 0.0),
      "elements are eroded {where}; elements of rigid parts would not be"),
 )  # fmt: skip
 
 
-def _peak(balance: Balance) -> float | None:
+def _find_peak(balance: Balance) -> float | None:
     """Return the peak of the internal energy [energy]; None if it is unknown or tiny."""
     if balance.internal is None:
         return None
@@ -215,21 +217,21 @@ def _peak(balance: Balance) -> float | None:
     return peak if peak > max(_FLOOR, _TINY_SHARE * highest) else None
 
 
-def _share(energy: Samples | None, peak: float | None) -> float | None:
+def _compute_share(energy: Samples | None, peak: float | None) -> float | None:
     """Return the highest value over the peak of the internal energy [-], 0 if it is never positive."""
     if energy is None or peak is None:
         return None
     return max(0.0, float(energy.max())) / peak
 
 
-def _without_friction(balance: Balance) -> Samples | None:
+def _subtract_friction(balance: Balance) -> Samples | None:
     """Return the contact energy minus the frictional part, if that is known."""
     if balance.sliding is None or balance.friction is None:
         return balance.sliding
     return balance.sliding - balance.friction
 
 
-def _worst_part(balance: Balance) -> dict[str, Any]:
+def _find_worst_part(balance: Balance) -> dict[str, Any]:
     """Return the largest hourglass share of a part, and the part, as fields of `Health`."""
     smallest_peak = max(
         _FLOOR,
@@ -244,13 +246,13 @@ def _worst_part(balance: Balance) -> dict[str, Any]:
     return {"part_hourglass_share": share, "part": part}
 
 
-def _ratio(balance: Balance) -> dict[str, Any]:
+def _find_ratio_range(balance: Balance) -> dict[str, Any]:
     """Return the range of the energy ratio, as fields of `Health`, while the reference energy is large enough.
 
     The ratio is that of the solver, or else computed from the terms.
     """
     ratio = balance.ratio
-    total = _total(balance)
+    total = _compute_total(balance)
     reference = None
     if ratio is not None and balance.total is not None:
         reference = np.divide(
@@ -273,7 +275,7 @@ def _ratio(balance: Balance) -> dict[str, Any]:
     }
 
 
-def _total(balance: Balance) -> Samples | None:
+def _compute_total(balance: Balance) -> Samples | None:
     """Return the total energy of the solver, else the sum of all terms; None if a main term is unknown."""
     if balance.total is not None:
         return balance.total
@@ -287,7 +289,7 @@ def _total(balance: Balance) -> Samples | None:
     )
 
 
-def _in_window(
+def _measure_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
     """Return contact, eroded and external energy in the window as fields of `Health`: shares of its energy."""
@@ -337,7 +339,7 @@ def refuse_unsound(
     With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
     and end of the flight in the settings.
     """
-    for caution in unsound(history):
+    for caution in list_flaws(history):
         if choosing or caution.code != "nothing-to-judge":
             raise RangeError(f"{', '.join(history.source)}: {caution.message}")
     times = {"after": settings.after, "landing": settings.landing}
@@ -351,7 +353,7 @@ def refuse_unsound(
             )
 
 
-def unsound(history: History) -> Iterator[Caution]:
+def list_flaws(history: History) -> Iterator[Caution]:
     """Yield the reasons why a run cannot be judged, with stable codes."""
     highest = find_largest(history.energy)
     if highest > LARGEST_ENERGY:
@@ -360,15 +362,15 @@ def unsound(history: History) -> Iterator[Caution]:
             f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
         )
         return
-    reason = _blew_up(history)
+    reason = _describe_divergence(history)
     if reason:
         yield Caution("blew-up", reason)
-    elif _has_nothing(history):
+    elif _has_no_energy(history):
         reason = f"nothing to judge: no internal energy exceeds {highest:.3g}, so nothing deforms"
         yield Caution("nothing-to-judge", reason)
 
 
-def _blew_up(history: History) -> str | None:
+def _describe_divergence(history: History) -> str | None:
     """Return a message with the time at which the energy diverges; None for a sound run."""
     balance = history.balance
     if (
@@ -404,7 +406,7 @@ def _blew_up(history: History) -> str | None:
     )
 
 
-def _has_nothing(history: History) -> bool:
+def _has_no_energy(history: History) -> bool:
     """Return True if the internal energies of chosen parts and model are always 0, or all energies are negligible."""
     balance = history.balance
     if balance is None:

@@ -7,17 +7,17 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.answers import verify_of
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.answers import verify_run
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.answers import Verdict
+    from d2rpick.choice.answers import PairVerdict
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
 
 
@@ -40,7 +40,7 @@ class CardRequest(NamedTuple):
         solver = self.solver or find_solver(history.format)
         printing = self.printing._replace(part=ids, end=end)
         if "contact" in SOLVERS[solver].takes:
-            printing = _with_pushes(printing, history, SOLVERS[solver].title)
+            printing = _add_pushes(printing, history, SOLVERS[solver].title)
         return solver, printing
 
     def whom(self, history: History) -> tuple[int, ...]:
@@ -62,7 +62,7 @@ class CardRequest(NamedTuple):
         )
 
 
-def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
+def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
     """Add the times at which the named contact or rigid wall pushes, and the closing speed of the parts.
 
     The contact force of the solver shows the times, or else the momenta of the parts; only momenta show the speed.
@@ -101,17 +101,17 @@ class SolverInput(NamedTuple):
     refusal: str | None = None
 
 
-def input_for(
+def print_solver_input(
     reference: Reference, situation: Situation, tr: float, request: CardRequest
 ) -> SolverInput:
     """Print the card of ``tr`` and the td of a situation, judged by the printed times."""
     solver, _ = request.of(situation.history)
     solver_and_option = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
     judge = partial(
-        verify_of, reference, settings=situation.settings, earlier=situation
+        verify_run, reference, settings=situation.settings, earlier=situation
     )
     try:
-        card = judged_card(
+        card = print_judged_card(
             [(tr, situation.td)],
             situation.history,
             judge,
@@ -122,13 +122,13 @@ def input_for(
     return SolverInput(*solver_and_option, card[0].text if card else None)
 
 
-def judged_card(
+def print_judged_card(
     windows: Sequence[Times],
     history: History,
-    judge: Callable[[float, float], Verdict],
+    judge: Callable[[float, float], PairVerdict],
     request: CardRequest,
     done: Sequence[Times] = (),
-) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
     """Print the card of windows with the verdicts that ``judge`` gives for the printed tr and td.
 
     ``done`` are windows in which the run was switched already: they are printed too, but cannot be judged by it.  The
@@ -141,17 +141,17 @@ def judged_card(
     plain = print_cards(all_windows, printing, solver)
     printed = plain.windows
     if "contact" in SOLVERS[solver].takes:
-        printed = _narrowed(printed, history)
+        printed = _narrow_windows(printed, history)
     verdicts = tuple(
         judge(*times)
         for requested, times in zip(all_windows, printed, strict=True)
         if requested not in done
     )
-    remarks = tuple(_remarks(done, history, verdicts))
+    remarks = tuple(_list_card_remarks(done, history, verdicts))
     return print_cards(all_windows, printing, solver, remarks), verdicts
 
 
-def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
+def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
     """Return the windows of switches by force as they are judged: between states."""
     from d2rpick.flight.contact_times import narrow_to_states  # as above
 
@@ -159,8 +159,8 @@ def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
     return tuple((tr, td) for tr, td in narrowed if td is not None)
 
 
-def _remarks(
-    done: Sequence[Times], history: History, verdicts: Sequence[Verdict]
+def _list_card_remarks(
+    done: Sequence[Times], history: History, verdicts: Sequence[PairVerdict]
 ) -> Iterator[str]:
     """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
     if done:
@@ -173,14 +173,14 @@ def _remarks(
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
         else:
             which = ""
-        yield from _judgement(verdict, which)
+        yield from _describe_verdict(verdict, which)
     cautions = chain.from_iterable(verdict.cautions for verdict in verdicts)
     yield from dict.fromkeys(
         f"{caution.code}: {caution.message}." for caution in cautions
     )
 
 
-def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
+def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     """Yield comments with the verdict on a pair."""
     candidate = verdict.candidate
     history = verdict.situation.history
@@ -188,7 +188,7 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     word = decision.verdict
     verdict_text = word.upper() if word == DO_NOT_USE else word
     judged = f"Judged by {', '.join(history.source)}, {history.channel}"
-    yield f"{judged}:{which} {verdict_text}. {_sentence(decision.reason)}"
+    yield f"{judged}:{which} {verdict_text}. {_format_as_sentence(decision.reason)}"
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
@@ -208,6 +208,6 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
         yield f"{', '.join(measures).capitalize()}."
 
 
-def _sentence(text: str) -> str:
+def _format_as_sentence(text: str) -> str:
     """Return a reason as a sentence."""
     return f"{text[:1].upper()}{text[1:]}."

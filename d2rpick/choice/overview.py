@@ -15,18 +15,22 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.flights import flights_of
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.health import (
     Health,
-    assess,
-    cautions_of_engine,
-    cautions_of_health,
+    assess_health,
+    list_flaws,
     refuse_unsound,
-    unsound,
+    warn_about_engine,
+    warn_about_health,
 )
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
+from d2rpick.choice.switched.switched_run import (
+    Times,
+    find_rigid_times,
+    select_model_momenta,
+)
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import read_balance
@@ -40,7 +44,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 
 # Output that contains the momenta of parts.
@@ -116,13 +120,13 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
             return "no free flight is seen, so nothing can be made rigid"
-        summary = f"{_flights_of(self.flights)}; {_health_of(self.health)}"
+        summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
 
     @property
     def _doubts(self) -> list[str]:
         """Reasons why a run with flights is not good."""
-        health = cautions_of_health(self.health) if self.health else ()
+        health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
             doubts.append("the files end within a state")
@@ -135,18 +139,18 @@ class Overview(NamedTuple):
     @property
     def cautions(self) -> tuple[Caution, ...]:
         """Warnings about the health of the run and its engine, and reasons why it cannot be judged."""
-        health = cautions_of_health(self.health) if self.health else ()
-        return (*self.alarms, *health, *cautions_of_engine(self.source))
+        health = warn_about_health(self.health) if self.health else ()
+        return (*self.alarms, *health, *warn_about_engine(self.source))
 
 
-def _flights_of(flights: Sequence[tuple[str, FreeFlight]]) -> str:
+def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
     """Describe the number of flights and the duration of the longest."""
     longest = max(flight.end - flight.start for _, flight in flights)
     count = f"{len(flights)} free flight{'s' * (len(flights) > 1)}"
     return f"{count}, the longest for {longest:.6g}"
 
 
-def _health_of(health: Health | None) -> str:
+def _describe_health(health: Health | None) -> str:
     """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
         return (
@@ -155,15 +159,17 @@ def _health_of(health: Health | None) -> str:
     return "energies within the limits of practice"
 
 
-def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
+def describe_run(
+    run: OpenedRun, selection: Selection, deck: str | None = None
+) -> Overview:
     """Describe all databases of a run; ``selection`` and ``deck`` matter for the flights."""
     deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
-        run, deck_warnings = _in_deck(run, deck)
+        run, deck_warnings = _apply_deck(run, deck)
     first = run.databases[0]
     notes = list(run.left_out)
     for database in run.databases:
-        notes += _notes(database)
+        notes += _read_notes(database)
     notes += note_doubts(run.databases)
     notes += run.unused_energies(selection)
     states = None
@@ -180,16 +186,26 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         ):
             raise  # one energy shows which column is the time, so the table itself cannot be read
         notes.append(str(error))
-    history = _history(run, selection)
-    flaws = tuple(unsound(history)) if history else tuple(_of_energy(run, selection))
-    rigid = rigid_times(Reference(run, history)) if history else ()
-    flights = _flights(by_the_model(history) if rigid else history) if history else ()
+    history = _read_history(run, selection)
+    flaws = (
+        tuple(list_flaws(history))
+        if history
+        else tuple(_warn_about_missing_energy(run, selection))
+    )
+    rigid = find_rigid_times(Reference(run, history)) if history else ()
+    flights = (
+        _find_flights_to_choose_from(
+            select_model_momenta(history) if rigid else history
+        )
+        if history
+        else ()
+    )
     channels: dict[str, None] = {}
     for database in run.databases:
         channels |= dict.fromkeys(database.channels)
     should_write = None
     if states != 0 and not any(momenta.parts for momenta in run.momenta(None, None)):
-        should_write = _missing(run)
+        should_write = _name_missing_output(run)
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -199,15 +215,21 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=_sampling(time),
+        sampling=_measure_sampling(time),
         complete=all(database.complete for database in run.databases),
         channels=tuple(channels),
-        parts=tuple(_overviews(run)),
+        parts=tuple(_list_part_overviews(run)),
         flights=flights,
         should_write=should_write,
-        health=_health(run, history, [flight for _, flight in flights], rigid),
+        health=_assess_health_of_run(
+            run, history, [flight for _, flight in flights], rigid
+        ),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(*(flaws if history else ()), *_of_rigid_legs(rigid), *deck_warnings),
+        alarms=(
+            *(flaws if history else ()),
+            *_warn_about_rigid_legs(rigid),
+            *deck_warnings,
+        ),
         unjudged=flaws,
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
@@ -215,7 +237,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     )
 
 
-def _sampling(time: Samples) -> Sampling | None:
+def _measure_sampling(time: Samples) -> Sampling | None:
     """Return the output intervals between the states; None for fewer than two states."""
     steps = np.diff(time)
     if not steps.size:
@@ -225,24 +247,24 @@ def _sampling(time: Samples) -> Sampling | None:
     )
 
 
-def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
+def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
     """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
     # imported here: few runs are given with a deck
-    from d2rpick.choice.deck_of_run import (
-        doubts_of_solver,
-        in_deck,
-        of_another_model,
+    from d2rpick.choice.parts.deck_of_run import (
+        add_surroundings,
+        check_model_of_deck,
+        warn_about_solver,
     )
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
-    foreign = of_another_model(run, inventory)
+    foreign = check_model_of_deck(run, inventory)
     if foreign:
         return run, (foreign,)
-    return in_deck(run, inventory), tuple(doubts_of_solver((), inventory))
+    return add_surroundings(run, inventory), tuple(warn_about_solver((), inventory))
 
 
-def _missing(run: Run) -> str:
+def _name_missing_output(run: OpenedRun) -> str:
     """Name the output of the solver that contains the momenta of parts, which these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
@@ -260,7 +282,7 @@ def _missing(run: Run) -> str:
     return f"{output}: only momenta of the parts show for sure when they fly"
 
 
-def _notes(database: Legs) -> tuple[str, ...]:
+def _read_notes(database: Legs) -> tuple[str, ...]:
     """Return the notes of a database, or its error as a note."""
     try:
         return database.notes
@@ -268,31 +290,33 @@ def _notes(database: Legs) -> tuple[str, ...]:
         return (str(error),)
 
 
-def _overviews(run: Run) -> Iterator[PartOverview]:
+def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
     """Yield each part with its highest internal energy."""
     if run.parts:
         energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
     if energies is None:  # some parts come and go, so their columns have gaps
-        return (PartOverview(part, _highest(run, part)) for part in run.parts)
+        return (
+            PartOverview(part, _find_highest_energy(run, part)) for part in run.parts
+        )
     return (
-        PartOverview(part, _most(column))
+        PartOverview(part, _find_maximum(column))
         for part, column in zip(run.parts, energies.T, strict=True)
     )
 
 
-def _highest(run: Run, part: Part) -> float | None:
+def _find_highest_energy(run: OpenedRun, part: Part) -> float | None:
     """Return the highest internal energy of a part [energy]; None if it is not written."""
-    return give_if_written(lambda: _most(run.part_energies([part])))
+    return give_if_written(lambda: _find_maximum(run.part_energies([part])))
 
 
-def _most(energies: Samples) -> float | None:
+def _find_maximum(energies: Samples) -> float | None:
     """Return the highest of some energies; None without any."""
     return float(energies.max()) if energies.size else None
 
 
-def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
+def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
@@ -300,8 +324,8 @@ def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
 
-def _health(
-    run: Run,
+def _assess_health_of_run(
+    run: OpenedRun,
     history: History | None,
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
@@ -321,19 +345,19 @@ def _health(
                 reason="its legs are rigid: energies mean nothing there",
                 until=float(balance.time[-1]),
             )
-        return assess(
+        return assess_health(
             replace(select_states(balance, states), hourglass_of_parts=()),
             until=float(balance.time[-1]),
         )
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
-    return assess(
+    return assess_health(
         balance,
         (longest.start, longest.end) if longest else None,
         until=float(balance.time[-1]),
     )
 
 
-def _history(run: Run, selection: Selection) -> History | None:
+def _read_history(run: OpenedRun, selection: Selection) -> History | None:
     """Return the history that would be judged; None if an energy has to be chosen first, or there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
@@ -343,7 +367,9 @@ def _history(run: Run, selection: Selection) -> History | None:
     return give_if_written(lambda: run.history(selection))
 
 
-def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
+def _warn_about_missing_energy(
+    run: OpenedRun, selection: Selection
+) -> Iterator[Caution]:
     """Yield a warning if no internal energy can be read: one has to be chosen first, or there is none."""
     try:
         run.history(selection)
@@ -351,12 +377,14 @@ def _of_energy(run: Run, selection: Selection) -> Iterator[Caution]:
         yield Caution("no-energy", str(error))
 
 
-def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
+def _find_flights_to_choose_from(
+    history: History,
+) -> tuple[tuple[str, FreeFlight], ...]:
     """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
     try:
         settings = Settings()
         refuse_unsound(history, settings)
-        flights = flights_of(history, settings)
+        flights = find_flights(history, settings)
     except RangeError:
         return ()
     return tuple(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.grades import FAIR
+from d2rpick.choice.pair.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
@@ -14,11 +14,11 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.cost import ByDeck
+    from d2rpick.choice.parts.cost import ByDeck
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import History
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.modes import Mode
 
 _DEFAULT = Selection()
@@ -27,11 +27,11 @@ _DEFAULT = Selection()
 class Reference(NamedTuple):
     """A reference run, and the energy of it that a choice is about."""
 
-    run: Run
+    run: OpenedRun
     history: History
 
     @classmethod
-    def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
+    def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the selected energy of an open run; FormatError if it is missing."""
         if selection.parts:
             # imported here: a table has no parts
@@ -42,7 +42,7 @@ class Reference(NamedTuple):
             selection = replace_words_by_part_ids(run, selection)
         return cls(run, run.history(selection))
 
-    def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
+    def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the same parts from another run of the model, whatever names they were requested by."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
@@ -52,7 +52,7 @@ class Reference(NamedTuple):
         )
 
 
-def read(
+def read_reference(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> Reference:
     """Open the files of a run and read the selected energy; arguments and errors as for `open_run`."""

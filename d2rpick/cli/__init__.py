@@ -95,17 +95,17 @@ class Documented(click.Command):
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the examples, no wider than the help."""
         from d2rpick.report.tables import (
-            continued,
+            wrap_command,
         )  # imported here since most commands do not need it
 
         lines = [
-            continued(f"  {line}", formatter.width)
+            wrap_command(f"  {line}", formatter.width)
             for line in (self.epilog or "").split("\n")
         ]
         formatter.write("\n" + "\n".join(lines) + "\n")
 
 
-class _Group(Documented, click.Group):
+class _CommandGroup(Documented, click.Group):
     """Loads commands on demand, and turns errors into messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
@@ -161,10 +161,10 @@ class _Group(Documented, click.Group):
         except Exception as error:  # the user gets one line for any error
             if _is_interrupt(error):
                 raise click.Abort from None
-            from d2rpick.cli.output import explained
+            from d2rpick.cli.output import explain_error
 
             raise click.ClickException(
-                explained(error, ctx.meta.get("d2rpick.history", ()))
+                explain_error(error, ctx.meta.get("d2rpick.history", ()))
             ) from error
 
     def main(  # type: ignore[override]
@@ -178,11 +178,11 @@ class _Group(Documented, click.Group):
             code = super().main(args, prog_name or "d2rpick", **extra)
         except click.UsageError as error:
             where = f" (see '{error.ctx.command_path} --help')" if error.ctx else ""
-            _fail(error.format_message().rstrip(".") + where)
+            stop_with_error(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
-            _fail(error.format_message())
+            stop_with_error(error.format_message())
         except OSError as error:  # raised if a help or version text cannot be written
-            _fail(format_in_one_line(error))
+            stop_with_error(format_in_one_line(error))
         except click.Abort:  # click turns an interrupt into this
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
@@ -200,7 +200,8 @@ def _is_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _fail(message: str) -> NoReturn:
+def stop_with_error(message: str) -> NoReturn:
+    """Print an error and end with exit code 2."""
     _tell_error(message)
     sys.exit(COULD_NOT_RUN)
 
@@ -211,7 +212,7 @@ def _tell_error(message: str) -> None:
     tell(f"d2rpick: {message}")
 
 
-def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+def _print_versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     """Print the versions that a bug report needs."""
     if not value or ctx.resilient_parsing:
         return
@@ -228,7 +229,7 @@ def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.exit()
 
 
-def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
+def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     """Make a command from a function; its docstring is the help text, with the examples at its end."""
 
     def made(function: Any) -> _Made:
@@ -244,8 +245,8 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     return made
 
 
-@documented(
-    _Group,
+@make_documented(
+    _CommandGroup,
     context_settings={"auto_envvar_prefix": "D2RPICK", "max_content_width": 100},
 )
 @click.option(
@@ -253,7 +254,7 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     is_flag=True,
     is_eager=True,
     expose_value=False,
-    callback=_versions,
+    callback=_print_versions,
     help=_VERSIONS,
 )
 def d2rpick() -> None:

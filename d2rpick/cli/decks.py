@@ -6,12 +6,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, all_cautions, card_of
+from d2rpick.api.cards import Cards, collect_cautions, print_card
 from d2rpick.base.errors import INTERNAL_ERROR
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
-from d2rpick.cli.output import Output, explained, in_words, tell, text_bytes
-from d2rpick.cli.values import CARDS, click_type
+from d2rpick.cli.output import (
+    Output,
+    encode_text,
+    explain_error,
+    replace_arguments_for_people,
+    tell,
+)
+from d2rpick.cli.values import CARDS, choose_click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -20,16 +26,20 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
 
 
-@options.command
-@options.time("--tr", "Switch to rigid at this time; repeatable.", many=True)
-@options.time("--td", "Switch back at this time, one for each --tr.", many=True)
-@options.file("--windows", "Instead of both: a file with lines 'tr td'.")
-@options.takes(
+@options.make_command
+@options.make_time_option(
+    "--tr", "Switch to rigid at this time; repeatable.", many=True
+)
+@options.make_time_option(
+    "--td", "Switch back at this time, one for each --tr.", many=True
+)
+@options.make_file_option("--windows", "Instead of both: a file with lines 'tr td'.")
+@options.add_options(
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
     deck="Main deck of the run of --history: tells which parts become one rigid body.",
     part={
         "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
-        "type": click_type("names"),
+        "type": choose_click_type("names"),
         "instead_of": (),
     },
 )
@@ -55,27 +65,27 @@ def card(
     """
     if cards.solver:
         cards.check_solver(cards.solver)
-    times = _windows(tr, td, windows)
-    run = options.judging_run(request)
+    times = _read_windows(tr, td, windows)
+    run = options.open_judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
-    judged_card = card_of(times, run, request, cards)
+    judged_card = print_card(times, run, request, cards)
     history_notes = (
         judged_card.verdicts[0].situation.history.notes if judged_card.verdicts else ()
     )
-    output.notes(history_notes, all_cautions(judged_card))
+    output.notes(history_notes, collect_cautions(judged_card))
     output.notes(judged_card.card.notes, ())
-    output.content(text_bytes(judged_card.card.text))
+    output.content(encode_text(judged_card.card.text))
     output.finish(objection=not judged_card.passed)
 
 
-def _windows(
+def _read_windows(
     tr: Sequence[float], td: Sequence[float], file: str | None
 ) -> Sequence[tuple[float, float]]:
     """Return the windows from pairs of times or from the file; raise UsageError if neither gives windows."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
-        return options.windows_in(file)
+        return options.read_windows_in(file)
     if not tr or not td:
         raise click.UsageError(
             f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'"
@@ -87,27 +97,27 @@ def _windows(
     return list(zip(tr, td, strict=True))
 
 
-@options.command
+@options.make_command
 @click.argument(
-    "deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file")
+    "deck", metavar="DECK...", nargs=-1, required=True, type=choose_click_type("file")
 )
-@options.takes(*REFERENCE)
+@options.add_options(*REFERENCE)
 @click.option(
-    "--select", metavar="IDS", multiple=True, type=click_type("rules"),
+    "--select", metavar="IDS", multiple=True, type=choose_click_type("rules"),
     help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
 )  # fmt: skip
 @click.option(
     "--ignore",
     metavar="IDS",
     multiple=True,
-    type=click_type("rules"),
+    type=choose_click_type("rules"),
     help="Skip these rules; overrules --select.",
 )
 @click.option(
     "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
     help="Least severe finding that sets exit code 1.",
 )  # fmt: skip
-@options.takes(*RESULT, forms=FORMATS["findings"])
+@options.add_options(*RESULT, forms=FORMATS["findings"])
 def check(
     deck: tuple[str, ...],
     select: tuple[str, ...],
@@ -128,11 +138,13 @@ def check(
     d2rpick check sample_data/switching.k --history sample_data/energy.glstat
     d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
     """
-    from d2rpick.api.checking import findings_of
+    from d2rpick.api.checking import find_findings
 
-    run = options.judging_run(request)
+    run = options.open_judging_run(request)
     output = output.beside(*deck, *(run.sources if run else ()))
-    findings = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
+    findings = find_findings(
+        deck, run, request, _split_ids(select), _split_ids(ignore), fail_on
+    )
     output.spare(
         file
         for results in (findings.results, findings.failed)
@@ -144,11 +156,13 @@ def check(
         [note for note in findings.notes if note not in notes_before], findings.cautions
     )
     for result in findings.failed:
-        tell(f"d2rpick: {explained(result.error, [result.deck])}")
+        tell(f"d2rpick: {explain_error(result.error, [result.deck])}")
     form = output.output_format
     if findings.results or form != "table":
         output.result(
-            in_words(findings.text(form, output.shown()), form, output.columns)
+            replace_arguments_for_people(
+                findings.text(form, output.shown()), form, output.columns
+            )
         )
     if not findings.results or any(
         result.code == INTERNAL_ERROR for result in findings.failed
@@ -157,7 +171,7 @@ def check(
     output.finish(objection=not findings.passed)
 
 
-def _ids(texts: Sequence[str]) -> tuple[str, ...]:
+def _split_ids(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(
         name.strip().upper()
         for text in texts
@@ -166,9 +180,9 @@ def _ids(texts: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-@options.command
-@click.argument("id", metavar="[ID]...", nargs=-1, type=click_type("rules"))
-@options.takes(*FILES)
+@options.make_command
+@click.argument("id", metavar="[ID]...", nargs=-1, type=choose_click_type("rules"))
+@options.add_options(*FILES)
 def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
     """Explain a rule of `d2rpick check` or a warning by its code; without ID, list all rules.
 
@@ -178,8 +192,10 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name i
     d2rpick rule D2R105
     d2rpick rule poor-td
     """
-    from d2rpick.report.findings import as_list, explained_rules
+    from d2rpick.report.findings import explain_rules, list_rules
 
     output = output.beside()
-    text = explained_rules(id, output.shown().width)
-    output.result(text or in_words(as_list(), "table", output.columns))
+    text = explain_rules(id, output.shown().width)
+    output.result(
+        text or replace_arguments_for_people(list_rules(), "table", output.columns)
+    )

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, unbalanced
-from d2rpick.api.request import options_of
+from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, warn_if_unbalanced
+from d2rpick.api.request import list_options
 from d2rpick.base.errors import ArgumentError, D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
-from d2rpick.cli.progress import counting
+from d2rpick.cli.progress import show_counting
 from d2rpick.report.formats import FORMATS, PLAIN, write
 
 if TYPE_CHECKING:
@@ -34,12 +34,12 @@ _ABSENT = (
 )
 
 
-@options.command
-@options.takes(
-    *options_of(Motion), of=[Motion],
+@options.make_command
+@options.add_options(
+    *list_options(Motion), of=[Motion],
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
 )  # fmt: skip
-@options.takes(
+@options.add_options(
     "plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf)."
 )
 def replay(motion: Motion, output: Output) -> None:
@@ -56,9 +56,9 @@ def replay(motion: Motion, output: Output) -> None:
         --t-end 0.15 --dt 1e-4 -o switched.csv
     d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --y0 0.02 --vy0 -1.5 --t-end 0.01 --dt 0.001
     """
-    from d2rpick.report.history_files import OSCILLATOR_WRITERS, format_of
+    from d2rpick.report.history_files import OSCILLATOR_WRITERS, choose_history_format
 
-    form = motion.write_as or format_of(output.output_file, HISTORIES)
+    form = motion.write_as or choose_history_format(output.output_file, HISTORIES)
     output = output.beside()
     trajectory, switched = motion.computed()
     if output.plot:
@@ -74,9 +74,9 @@ def replay(motion: Motion, output: Output) -> None:
         output.content(OSCILLATOR_WRITERS[form](trajectory, motion.oscillator))
 
 
-@options.command
-@options.takes(*options_of(Box), of=[Box])
-@options.takes(
+@options.make_command
+@options.add_options(*list_options(Box), of=[Box])
+@options.add_options(
     *("output_format", "plot", *FILES, "exit_zero"),
     output_format={
         "type": click.Choice(list(FORMATS["rollover"])),
@@ -106,14 +106,14 @@ def rollover(box: Box, output: Output) -> None:
 
 def _run(box: Box, output: Output) -> None:
     """Compute one run; for a plot also the reference run."""
-    from d2rpick.report.history_files import BOX_WRITERS, format_of
+    from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
-    form = box.write_as or format_of(output.output_file, HISTORIES)
+    form = box.write_as or choose_history_format(output.output_file, HISTORIES)
     output = output.beside()
     windows = box.windows
     plot = output.plot
     record = box.simulated(*windows)
-    output.notes((), unbalanced(record))
+    output.notes((), warn_if_unbalanced(record))
     if plot:
         from d2rpick.report import figures, figures_models
 
@@ -132,7 +132,7 @@ def _scan(box: Box, output: Output) -> None:
     scanning = Scanning(box)
     plot = output.plot
     output.notes((), scanning.cautions)
-    with counting(len(scanning.times), quiet=output.quiet) as count:
+    with show_counting(len(scanning.times), quiet=output.quiet) as count:
         scan = scanning.run(count.tell)
     if plot:
         from d2rpick.report import figures, figures_models
@@ -144,8 +144,8 @@ def _scan(box: Box, output: Output) -> None:
     output.finish(objection=scan.answer.recommended is None)
 
 
-@options.command
-@options.file(
+@options.make_command
+@options.make_file_option(
     "--output-dir",
     "Folder for figures and tables; created if missing.",
     "DIR",
@@ -157,13 +157,13 @@ def _scan(box: Box, output: Output) -> None:
     help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
     "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
 )  # fmt: skip
-@options.file(
+@options.make_file_option(
     "--solver",
     "A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
     f"{', or '.join(', '.join(columns) for columns in SOLVER.values())}; repeatable.",
     many=True,
 )
-@options.takes(
+@options.add_options(
     "report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN
 )
 def reproduce(

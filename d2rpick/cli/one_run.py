@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, JudgedCard, all_cautions
+from d2rpick.api.cards import Cards, JudgedCard, collect_cautions
 from d2rpick.api.request import (
     CHOOSING,
     FRACTION,
@@ -18,7 +18,7 @@ from d2rpick.api.request import (
     Option,
     Request,
     check_window,
-    time_or_window,
+    choose_time_or_window,
 )
 from d2rpick.base.errors import ArgumentError, DeckError, make_printable
 from d2rpick.cli import options
@@ -32,8 +32,14 @@ from d2rpick.cli.options import (
     RESULT,
     WINDOW,
 )
-from d2rpick.cli.output import IN_WORDS, Output, check_switched, in_words, opened
-from d2rpick.cli.progress import reading
+from d2rpick.cli.output import (
+    IN_WORDS,
+    Output,
+    check_switched,
+    open_with_output,
+    replace_arguments_for_people,
+)
+from d2rpick.cli.progress import show_reading
 from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, write
 
@@ -42,8 +48,8 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import Caution
 
 
-@options.command
-@options.takes(
+@options.make_command
+@options.add_options(
     *("deck", "no_deck", HISTORY, *READING, *RESULT),
     deck="Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.",
     forms=FORMATS["overview"],
@@ -59,24 +65,26 @@ def info(request: Request, output: Output) -> None:
     from d2rpick.api.deck_in_folder import name_deck
 
     selection = request.selection()
-    with opened(request, output) as (run, output):
+    with open_with_output(request, output) as (run, output):
         overview = replace(run, chosen=selection).overview(request.deck or False)
     output.notes((), (*name_deck(request), *overview.cautions))
     form = output.output_format
     display = output.shown()
     output.result(
-        in_words(write("overview", form, overview, display), form, display.width)
+        replace_arguments_for_people(
+            write("overview", form, overview, display), form, display.width
+        )
     )
 
 
-@options.command
-@options.takes(HISTORY, *READING)
+@options.make_command
+@options.add_options(HISTORY, *READING)
 @click.option(
     "--write-as",
     type=click.Choice(["csv", "hdf5"]),
     help="Format of the result.  [default: by the name of -o, else csv]",
 )
-@options.takes(*FILES)
+@options.add_options(*FILES)
 def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
@@ -89,28 +97,28 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     d2rpick extract sample_data/energy.glstat
     d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
     """
-    from d2rpick.api.runs import extracted
-    from d2rpick.report.history_files import TABLES, format_of, write_table
+    from d2rpick.api.runs import extract_columns
+    from d2rpick.report.history_files import TABLES, choose_history_format, write_table
 
-    form = write_as or format_of(output.output_file, TABLES)
+    form = write_as or choose_history_format(output.output_file, TABLES)
     selection = request.selection()
-    with opened(request, output) as (run, output):
-        table, notes = extracted(run.files, selection)
+    with open_with_output(request, output) as (run, output):
+        table, notes = extract_columns(run.files, selection)
     output.notes(notes, ())
     output.content(write_table(form, table))
 
 
-@options.command
-@options.time(
+@options.make_command
+@options.make_time_option(
     "--td", "Switch back to deformable at this time.", instead_of=("td_window",)
 )
-@options.time(
+@options.make_time_option(
     "--td-window",
     "Choose the time to switch back within this window.",
     instead_of=("td",),
     pair=True,
 )
-@options.takes(
+@options.add_options(
     "limit",
     *ONE_RUN,
     *ANSWER,
@@ -137,17 +145,17 @@ def suggest(
     d2rpick suggest --td 0.37 --part box -f card --node 1001 sample_data/rolloverT01.gz
     d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
     """
-    from d2rpick.api.asked import ask
-    from d2rpick.api.suggestions import suggested
+    from d2rpick.api.asked import ask_run
+    from d2rpick.api.suggestions import suggest_for_question
 
-    wanted = time_or_window(td, td_window)
+    wanted = choose_time_or_window(td, td_window)
     card = output.output_format == "card"
     if card:
         check_switched("-f card", request, cards)
     output.check(cards)
-    with opened(request, output) as (run, output):
-        question = ask(run, request, merge=cards.merge)
-    answer = suggested(question, wanted)
+    with open_with_output(request, output) as (run, output):
+        question = ask_run(run, request, merge=cards.merge)
+    answer = suggest_for_question(question, wanted)
     # a given td is answered, however poor it is
     min_grade = request.min_quality or ("poor" if td is not None else "fair")
     passed = answer.decision is not None and answer.decision.reaches(min_grade)
@@ -158,7 +166,7 @@ def suggest(
     ]
     output.notes(question.reference.history.notes, new_cautions)
     output.beside_answer(
-        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+        answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     if card:
         judged_card = answer.printed(cards)
@@ -167,7 +175,7 @@ def suggest(
         else:
             new_cautions = [
                 caution
-                for caution in all_cautions(judged_card)
+                for caution in collect_cautions(judged_card)
                 if caution not in answer.cautions
             ]
         return output.finish(
@@ -177,14 +185,16 @@ def suggest(
     return output.finish(objection=not passed)
 
 
-@options.command
-@options.time("--td", "A time to switch back that others are compared with.")
-@options.time(
+@options.make_command
+@options.make_time_option(
+    "--td", "A time to switch back that others are compared with."
+)
+@options.make_time_option(
     "--td-window",
     "Explore the times to switch back within this window.  [default: the longest flight]",
     pair=True,
 )
-@options.option(
+@options.make_click_option(
     "steps",
     Option(
         "Number of evenly spaced td; peaks of the energy come on top.",
@@ -192,7 +202,7 @@ def suggest(
     ),
     default=200,
 )
-@options.takes(
+@options.add_options(
     *("limit", *ONE_RUN, *ANSWER),
     limit={
         "default": 10,
@@ -222,17 +232,17 @@ def explore(
     d2rpick explore --part recommended --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
     d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
     """
-    from d2rpick.api.asked import ask
-    from d2rpick.api.plans import explored
+    from d2rpick.api.asked import ask_run
+    from d2rpick.api.plans import explore_run
 
     check_window("td_window", td_window)
     output.check(cards)
-    with opened(request, output) as (run, output):
-        question = ask(run, request, merge=cards.merge)
-    answer = explored(question, td, td_window, steps)
+    with open_with_output(request, output) as (run, output):
+        question = ask_run(run, request, merge=cards.merge)
+    answer = explore_run(question, td, td_window, steps)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
-        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+        answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
     chosen = answer.recommended
@@ -241,20 +251,20 @@ def explore(
     output.finish(objection=not passed)
 
 
-@options.command
-@options.time(
+@options.make_command
+@options.make_time_option(
     "--tr", "Switch to rigid at this time.  [with --switched: read off that run]"
 )
-@options.time(
+@options.make_time_option(
     "--td",
     "Switch back to deformable at this time.  [with --switched: read off that run]",
 )
-@options.file(
+@options.make_file_option(
     "--switched",
     "Compare a finished switched run with the reference: file, folder or glob; repeatable.",
     many=True,
 )
-@options.option(
+@options.make_click_option(
     "min_mean_energy",
     Option(
         "Mean energy after td over the reference's, at least; it may be as far above 1 as below.",
@@ -263,7 +273,7 @@ def explore(
     ),
     default=MIN_MEAN_ENERGY,
 )
-@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
+@options.add_options(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
 def verify(
     tr: float | None,
     td: float | None,
@@ -281,34 +291,34 @@ def verify(
     d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
     d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
     """
-    from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.suggestions import check_pair, judged
+    from d2rpick.api.asked import ask_run, open_run
+    from d2rpick.api.suggestions import check_pair, judge_pair
 
     check_pair(tr, td, switched)
     output.check(cards)
-    with opened(request, output) as (run, output):
-        question = ask(run, request, merge=cards.merge)
+    with open_with_output(request, output) as (run, output):
+        question = ask_run(run, request, merge=cards.merge)
     switched_run = None
     if switched:
-        with reading(switched, quiet=output.quiet):
+        with show_reading(switched, quiet=output.quiet):
             switched_run = open_run(request, switched)
         output.spare(switched_run.sources)
-    answer = judged(question, tr, td, switched_run, min_mean_energy)
+    answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
-        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+        answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
     output.finish(objection=not answer.decision.reaches(question.settings.min_quality))
 
 
-@options.command
-@options.time("--tr", "With --td: compare the sets in this window.")
-@options.time(
+@options.make_command
+@options.make_time_option("--tr", "With --td: compare the sets in this window.")
+@options.make_time_option(
     "--td",
     "Compare the sets in a window that ends here.  [default: at the end of the longest flight]",
 )
-@options.takes(
+@options.add_options(
     *(
         "deck",
         "no_deck",
@@ -338,23 +348,23 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     d2rpick parts --deck sample_data/rollover_box.k -f json sample_data/rollover_box.matsum
     d2rpick parts --deck sample_data/rollover_box.k --report parts.html sample_data/rollover_box.matsum
     """
-    from d2rpick.api.costs import check_times, tabled
+    from d2rpick.api.costs import check_times, compare_parts
 
     check_times(tr, td)
     if request.energy:
         raise ArgumentError(
             "`energy` names one energy for the whole model; parts compares those of its parts"
         )
-    with opened(request, output) as (run, output):
-        answer = tabled(run, request, tr, td)
+    with open_with_output(request, output) as (run, output):
+        answer = compare_parts(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
-    output.beside_answer(answer, lambda: answer.page(options.repeat()))
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
     output.answer(answer)
     output.finish(objection=answer.recommended is None)
 
 
-@options.command
-@options.option("min_rigid", Option(
+@options.make_command
+@options.make_click_option("min_rigid", Option(
     "Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
@@ -362,23 +372,23 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     "--all", "every", is_flag=True,
     help="With -f value, -f card and --write-deck: all windows, not only the supported ones.",
 )  # fmt: skip
-@options.file(
+@options.make_file_option(
     "--done",
     "Windows in which HISTORY was switched, a line 'tr td' for each, or a journal: plan those after.  -f value, "
     "-f card and --write-deck hold both, as the next run needs them.",
 )
-@options.file(
+@options.make_file_option(
     "--before",
     "The run that the windows of --done were planned from: its landings are compared; repeatable.",
     *("HISTORY",), many=True,
 )  # fmt: skip
-@options.file(
+@options.make_file_option(
     "--write-deck",
     "Write a copy of --deck with the cards of the windows into this folder, and check it.",
     "DIR",
     kind="output",
 )
-@options.takes(
+@options.add_options(
     *(
         "deck",
         "no_deck",
@@ -416,8 +426,8 @@ def plan(
     d2rpick plan --part flying -f card sample_data/rollover_box.matsum
     d2rpick plan --part flying --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
-    from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.plans import planned
+    from d2rpick.api.asked import ask_run, open_run
+    from d2rpick.api.plans import plan_run
 
     form = output.output_format
     if every and form not in ("value", "card") and not write_deck:
@@ -426,8 +436,8 @@ def plan(
         )
     _check_deck(request, cards, form, write_deck)
     output.check(cards, by_itself=bool(write_deck))
-    with opened(request, output, done, *before) as (run, output):
-        question = ask(run, request, merge=cards.merge)
+    with open_with_output(request, output, done, *before) as (run, output):
+        question = ask_run(run, request, merge=cards.merge)
         if write_deck and (
             foreign := [
                 caution
@@ -437,11 +447,13 @@ def plan(
         ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
         earlier = open_run(request, before) if before else None
-    answer = planned(
-        question, min_rigid, options.windows_in(done) if done else (), earlier
+    answer = plan_run(
+        question, min_rigid, options.read_windows_in(done) if done else (), earlier
     )
     output.notes(answer.history.notes, answer.cautions)
-    output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
+    output.beside_answer(
+        answer, lambda: answer.page(options.repeat_command(), (), cards)
+    )
     judged_card = (
         answer.printed(cards, every=every) if form == "card" or write_deck else None
     )
@@ -454,7 +466,8 @@ def plan(
     if form == "card":
         return output.finish(
             objection=not (
-                output.card(judged_card, _untold(judged_card, answer)) and passed
+                output.card(judged_card, _select_new_cautions(judged_card, answer))
+                and passed
             )
         )
     if judged_card:
@@ -463,7 +476,7 @@ def plan(
     return output.finish(objection=not (answer.supported and passed))
 
 
-def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
+def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     """Return the cautions of the card that the plan lacks: of unverified windows, and of the card itself."""
     if card is None:
         return []
@@ -474,7 +487,7 @@ def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     )
     return [
         caution
-        for caution in all_cautions(card._replace(verdicts=failed))
+        for caution in collect_cautions(card._replace(verdicts=failed))
         if caution not in plan.cautions
     ]
 
@@ -501,9 +514,9 @@ def _write_and_check(
     passed : bool
         True if no finding is an error.
     """
-    from d2rpick.api.plans import written
+    from d2rpick.api.plans import write_deck
 
-    names, checked = written(plan, card, folder, overwrite=output.overwrite)
+    names, checked = write_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
     return "\n".join(
         [*listed, "", checked.text("table", output.shown())]

@@ -18,14 +18,20 @@ from d2rpick.api.request import (
     TIME,
     Option,
     Request,
-    dashed,
-    options_of,
+    list_options,
+    make_option_name,
 )
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.settings import find_nearest_settings
-from d2rpick.cli import Documented, documented
-from d2rpick.cli.output import Output, tell, text_bytes, with_options
-from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
+from d2rpick.cli import Documented, make_documented
+from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
+from d2rpick.cli.values import (
+    CARDS,
+    choose_click_type,
+    list_words,
+    read_settings,
+    spell_option,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -111,10 +117,12 @@ class Command(Documented):
                 self, ctx.parent, ctx.info_name, resilient_parsing=True
             )
             super().parse_args(without, list(args))
-            ctx.default_map = settings_of(ctx, without, table, source)
+            ctx.default_map = read_settings(ctx, without, table, source)
         remaining = super().parse_args(ctx, args)
-        if words := words_of(ctx):
-            ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)
+        if words := list_words(ctx):
+            ctx.meta["d2rpick.command"] = insert_options(
+                ctx.meta["d2rpick.command"], words
+            )
         return remaining
 
     def format_options(
@@ -127,7 +135,7 @@ class Command(Documented):
             if isinstance(parameter, click.Option)
         )
         records = {
-            spelled(parameter).replace("-", "_"): parameter.get_help_record(ctx)
+            spell_option(parameter).replace("-", "_"): parameter.get_help_record(ctx)
             for parameter in shown_options
         }
         grouped = {name for names in GROUPS.values() for name in names}
@@ -145,8 +153,8 @@ class Command(Documented):
             for note in ctx.meta["d2rpick.unused"]:
                 tell(f"note: {note}")
         if ctx.meta.get("d2rpick.show-settings"):
-            return click.echo(text_bytes("\n".join(_settings(ctx))))
-        if (words := words_of(ctx)) and not ctx.params.get("quiet"):
+            return click.echo(encode_text("\n".join(_list_settings(ctx))))
+        if (words := list_words(ctx)) and not ctx.params.get("quiet"):
             import shlex  # imported here to keep the start fast
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
@@ -157,7 +165,7 @@ class Command(Documented):
         try:
             return super().invoke(ctx)
         except ArgumentError as error:
-            raise click.UsageError(with_options(str(error)), ctx) from error
+            raise click.UsageError(replace_arguments(str(error)), ctx) from error
 
 
 class Either(click.Option):
@@ -181,12 +189,12 @@ class Either(click.Option):
         return value, source
 
 
-def command(function: Decorated) -> click.Command:
+def make_command(function: Decorated) -> click.Command:
     """Make a command of a function."""
-    return documented(Command)(function)
+    return make_documented(Command)(function)
 
 
-def takes(
+def add_options(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
     """Give a command the options of tables; it gets one object per table, named like its class in lower case.
@@ -204,7 +212,7 @@ def takes(
     """
     tables = {
         table: [
-            option_name for option_name in names if option_name in options_of(table)
+            option_name for option_name in names if option_name in list_options(table)
         ]
         for table in of
     }
@@ -249,16 +257,16 @@ def takes(
         for name in reversed(names):
             as_in_table = of is TABLES and name not in overrides
             run = (
-                _as_in_table(name)
+                _make_option_of_table(name)
                 if as_in_table
-                else _decorator(of, name, overrides.get(name, {}))
+                else _make_decorator(of, name, overrides.get(name, {}))
             )(run)
         return run
 
     return decorate
 
 
-def _shared(
+def _share_option(
     decorate: Callable[[Decorated], Decorated],
 ) -> Callable[[Decorated], Decorated]:
     """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
@@ -268,11 +276,11 @@ def _shared(
 
 
 @cache
-def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
-    return _shared(_decorator(TABLES, name, {}))
+def _make_option_of_table(name: str) -> Callable[[Decorated], Decorated]:
+    return _share_option(_make_decorator(TABLES, name, {}))
 
 
-def _decorator(
+def _make_decorator(
     tables: Sequence[Any], name: str, override: Any
 ) -> Callable[[Decorated], Decorated]:
     if name == HISTORY:
@@ -281,22 +289,22 @@ def _decorator(
             metavar="HISTORY...",
             nargs=-1,
             required=True,
-            type=click_type("file"),
+            type=choose_click_type("file"),
         )
     table = next(
         table_of_option
         for table_of_option in tables
-        if name in options_of(table_of_option)
+        if name in list_options(table_of_option)
     )
     arguments = {"help": override} if isinstance(override, str) else override
-    return option(
+    return make_click_option(
         name,
-        options_of(table)[name],
+        list_options(table)[name],
         **{"default": table.__dataclass_fields__[name].default, **arguments},
     )
 
 
-def option(
+def make_click_option(
     name: str, entry: Option, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
     """Make click's option from an entry of a table."""
@@ -304,7 +312,7 @@ def option(
     if entry.kind == "flag":
         about["is_flag"] = True
     else:
-        kind = click_type(entry.kind)
+        kind = choose_click_type(entry.kind)
         about |= {"type": kind, "nargs": 2 if entry.pair else 1, "multiple": entry.many}
     about |= {"instead_of": entry.instead_of} | arguments
     if about["instead_of"]:
@@ -319,21 +327,23 @@ def option(
         about.pop("default", None)
     else:
         about.setdefault("show_default", True)
-    return click.option(*entry.short, f"--{dashed(name)}", name, **about)
+    return click.option(*entry.short, f"--{make_option_name(name)}", name, **about)
 
 
-def time(name: str, text: str, **arguments: Any) -> Callable[[Decorated], Decorated]:
+def make_time_option(
+    name: str, text: str, **arguments: Any
+) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that is a time, or a window of time."""
     pair = arguments.get("pair", False)
     required = arguments.pop("required", False)
-    return option(
+    return make_click_option(
         name[2:].replace("-", "_"),
         Option(text, TIME, "LO HI" if pair else "T", **arguments),
         required=required,
     )
 
 
-def file(
+def make_file_option(
     name: str, text: str, metavar: str = "FILE", **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that names a file, or ``many`` files, by repeating the option.
@@ -342,14 +352,14 @@ def file(
     """
     required = arguments.pop("required", False)
     kind = arguments.pop("kind", "file")
-    return option(
+    return make_click_option(
         name[2:].replace("-", "_"),
         Option(text, kind, metavar, **arguments),
         required=required,
     )
 
 
-def windows_in(file: str) -> Sequence[tuple[float, float]]:
+def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
     """Read the windows in a file with lines 'tr td'."""
     from d2rpick.api.arguments import read_windows
 
@@ -357,7 +367,7 @@ def windows_in(file: str) -> Sequence[tuple[float, float]]:
         return read_windows(stream.read(), file)
 
 
-def judging_run(request: Request) -> Run | None:
+def open_judging_run(request: Request) -> Run | None:
     """Open the history by which cards are judged; return None without one."""
     if not request.history:
         return None
@@ -368,15 +378,19 @@ def judging_run(request: Request) -> Run | None:
     return open_run(request)
 
 
-def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
-    ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
+def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -> None:
+    ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
 # Options that every command accepts but none uses itself: they are kept in the context.
 _FLAGS: Final = [
-    _shared(
+    _share_option(
         click.option(
-            *names, is_flag=True, expose_value=False, callback=_remember, help=text
+            *names,
+            is_flag=True,
+            expose_value=False,
+            callback=_keep_in_context,
+            help=text,
         )
     )
     for names, text in (
@@ -393,52 +407,52 @@ _FLAGS: Final = [
 ]
 
 
-def repeat() -> list[str]:
+def repeat_command() -> list[str]:
     """Return the typed command line, preceded by the environment variables that set options.
 
     The line may overwrite the files that it has written, so that it can be run again.
     """
     context = click.get_current_context()
     names = [
-        _variable(context, name)
+        _name_variable(context, name)
         for name in context.params
-        if _source(context, name) == "environment"
+        if _name_source(context, name) == "environment"
     ]
     variables = [f"{name}={os.environ[name]}" for name in names]
     words = context.meta["d2rpick.command"]
     if not context.params["overwrite"] and any(
         context.params.get(name) for name in _WRITTEN
     ):
-        words = inserted(words, ["--overwrite"])
+        words = insert_options(words, ["--overwrite"])
     return [*(["env", *variables] if variables else []), "d2rpick", *words]
 
 
-def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
+def insert_options(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     """Add options to a command line, before the names that follow ``--``.
 
     Examples
     --------
-    >>> inserted(["info", "--", "-x.csv"], ["--quiet"])
+    >>> insert_options(["info", "--", "-x.csv"], ["--quiet"])
     ('info', '--quiet', '--', '-x.csv')
     """
     position = command.index("--") if "--" in command else len(command)
     return (*command[:position], *words, *command[position:])
 
 
-def _settings(ctx: click.Context) -> Iterator[str]:
+def _list_settings(ctx: click.Context) -> Iterator[str]:
     """Yield a line for every option with its value and the source of the value."""
     from d2rpick.report.tables import as_json
 
     for parameter in ctx.command.get_params(ctx):
         if parameter.expose_value and parameter.name:
             value = ctx.params[parameter.name]
-            source = _source(ctx, parameter.name)
+            source = _name_source(ctx, parameter.name)
             origin_details = {
-                "environment": f", {_variable(ctx, parameter.name)}",
+                "environment": f", {_name_variable(ctx, parameter.name)}",
                 "settings": f", {ctx.meta['d2rpick.settings']}",
             }
             name = (
-                spelled(parameter)
+                spell_option(parameter)
                 if isinstance(parameter, click.Option)
                 else parameter.name
             )
@@ -446,11 +460,11 @@ def _settings(ctx: click.Context) -> Iterator[str]:
             yield f"{name} = {written_value}  # {source}{origin_details.get(source, '')}"
 
 
-def _source(ctx: click.Context, name: str) -> str:
+def _name_source(ctx: click.Context, name: str) -> str:
     source = ctx.get_parameter_source(name)
     return _SOURCES.get(source, "default") if source else "default"
 
 
-def _variable(ctx: click.Context, name: str) -> str:
+def _name_variable(ctx: click.Context, name: str) -> str:
     """Return the name of the environment variable that sets an option."""
     return f"{ctx.auto_envvar_prefix}_{name.upper()}"

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 import click
 
 from d2rpick.api.cards import Cards, JudgedCard
-from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
+from d2rpick.api.request import (
+    OPTIONS,
+    UNLIMITED,
+    Request,
+    list_options,
+    make_option,
+    make_option_name,
+)
 from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,
@@ -22,7 +29,7 @@ from d2rpick.base.errors import (
     make_printable,
 )
 from d2rpick.base.files import write_as_a_whole
-from d2rpick.cli.progress import on_terminal, reading
+from d2rpick.cli.progress import is_on_terminal, show_reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.api.answer import Answer, Paged
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
 
 OBJECTION = 1
@@ -48,7 +55,7 @@ _ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R)
 # Arguments that messages name in backticks, with the options that set them if these have other names.
 ARGUMENTS: Final = (
     *OPTIONS,
-    *options_of(Cards),
+    *list_options(Cards),
     *(
         "td",
         "td_window",
@@ -79,29 +86,31 @@ IN_WORDS: Final = {
 class Output:
     """Writes results to stdout or a file, and all else to stderr unless ``quiet``; ``inputs`` are never overwritten."""
 
-    plot: str | None = option(
+    plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
     )
-    report: str | None = option(
+    report: str | None = make_option(
         "Write everything to one HTML page to read, print and sign.", "output", "FILE"
     )
-    output_format: str = option("Format of the result.", default="table", short=("-f",))
-    exit_zero: bool = option(
+    output_format: str = make_option(
+        "Format of the result.", default="table", short=("-f",)
+    )
+    exit_zero: bool = make_option(
         "Exit with 0 instead of 1 when the answer is an objection.",
         "flag",
         default=False,
     )
-    output_file: str | None = option(
+    output_file: str | None = make_option(
         "Write the result to FILE, completely or not at all.",
         "output",
         "FILE",
         short=("-o",),
     )
-    overwrite: bool = option("Replace existing files.", "flag", default=False)
-    quiet: bool = option(
+    overwrite: bool = make_option("Replace existing files.", "flag", default=False)
+    quiet: bool = make_option(
         "Print no notes and warnings to stderr.", "flag", default=False, short=("-q",)
     )
-    limit: int = option(
+    limit: int = make_option(
         "Number of rows in the table; json and csv have all.",
         range(1, UNLIMITED),
         default=3,
@@ -116,7 +125,7 @@ class Output:
     @property
     def columns(self) -> int:
         """Width of the terminal that shows the result [columns]; 0 if no terminal does."""
-        return 0 if self.file else columns_of(sys.stdout) or 0
+        return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
         """Return an output that protects these inputs; raise D2RPickError if a file must not be written."""
@@ -126,12 +135,12 @@ class Output:
         if self.plot is not None:
             from d2rpick.report import figures
 
-            figures.picture_format(self.plot)
+            figures.choose_picture_format(self.plot)
         _check_report(self.report)
         claimed: dict[str, str] = {}
         for name in ("output_file", "plot", "report"):
             file = getattr(self, name)
-            option_name = f"--{dashed(name)}"
+            option_name = f"--{make_option_name(name)}"
             if file is not None:
                 output.claim(file)
                 other_option = claimed.setdefault(os.path.realpath(file), option_name)
@@ -139,7 +148,11 @@ class Output:
                     raise D2RPickError(
                         f"{file}: {option_name} and {other_option} are the same file; give two"
                     )
-        if self.file is not None and not self.quiet and (form := _meant(self.file)):
+        if (
+            self.file is not None
+            and not self.quiet
+            and (form := _find_implied_format(self.file))
+        ):
             tell(
                 f"note: {self.file} gets the table; -f {form} writes what its name promises"
             )
@@ -151,15 +164,15 @@ class Output:
             by_itself or self.output_format == "card" or self.report is not None
         ):
             raise ArgumentError(
-                f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
+                f"--{make_option_name(cards.given[0])} is about the card; ask for one with -f card or --report"
             )
 
-    def shown(self, **further: Any) -> Shown:
+    def shown(self, **further: Any) -> DisplayOptions:
         """Return what a form shows besides the answer."""
-        from d2rpick.report.formats import Shown
+        from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
-        display = Shown(
+        display = DisplayOptions(
             meta["d2rpick.command"],
             self.limit,
             verbose=meta.get("d2rpick.verbose", False),
@@ -170,7 +183,7 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested form."""
         now = self.shown(**display_options)
-        text = in_words(
+        text = replace_arguments_for_people(
             answer.text(self.output_format, now), self.output_format, now.width
         )
         self.result(f"{text}\n\n{below}" if below else text)
@@ -182,7 +195,7 @@ class Output:
 
             self.write(self.plot, figures.render(answer.plot(), self.plot))
         if self.report:
-            self.write(self.report, text_bytes(with_options(page())))
+            self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
         """Exit with 1 if the answer is an objection, unless ``--exit-zero`` is given."""
@@ -224,7 +237,7 @@ class Output:
 
     def result(self, text: str) -> None:
         """Write the result; on a terminal, the lines with the answer are bold."""
-        content = text_bytes(text and f"{text}\n")
+        content = encode_text(text and f"{text}\n")
         if self.file is not None:
             self.write(self.file, content)
             return
@@ -286,7 +299,7 @@ def _check_report(name: str | None) -> None:
         )
 
 
-def _meant(name: str) -> str | None:
+def _find_implied_format(name: str) -> str | None:
     """Return the format that the file name of a result implies, if the command has it and no format was given."""
     ctx = click.get_current_context()
     is_given = (
@@ -308,7 +321,7 @@ def _meant(name: str) -> str | None:
     return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
 
-def columns_of(stream: TextIO) -> int | None:
+def measure_columns(stream: TextIO) -> int | None:
     """Return the width of the terminal behind a stream, limited to a readable width; None without a terminal."""
     columns_set = os.environ.get("COLUMNS", "")
     try:
@@ -328,17 +341,17 @@ def tell(message: str) -> None:
 
     The message is one line; on a terminal it is wrapped, but never in a log, where ``COLUMNS`` may be set as well.
     """
-    text = make_printable(with_options(message))
-    if on_terminal() and (width := columns_of(sys.stderr)):
+    text = make_printable(replace_arguments(message))
+    if is_on_terminal() and (width := measure_columns(sys.stderr)):
         from d2rpick.report.tables import (
-            wrapped,
+            wrap_lines,
         )  # imported here since --help does not need it
 
-        text = wrapped(text, width)
+        text = wrap_lines(text, width)
     click.echo(text, err=True)
 
 
-def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
+def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
     """Return any error as one line with the options of the command line; ``--debug`` prints its traceback first.
 
     An unforeseen error names no input, so that ``inputs`` are added.
@@ -348,55 +361,57 @@ def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     if isinstance(error, FORESEEN):
-        return with_options(format_in_one_line(error))
+        return replace_arguments(format_in_one_line(error))
     return f"{list_names(inputs)}{': ' * bool(inputs)}{format_in_one_line(error)}; --debug shows where"
 
 
-def text_bytes(text: str) -> bytes:
+def encode_text(text: str) -> bytes:
     """Encode a text; undecodable bytes of file names are lone surrogates, which no encoding can write."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
-def with_options(message: str) -> str:
+def replace_arguments(message: str) -> str:
     """Replace the arguments in a message by the options that set them.
 
     Examples
     --------
-    >>> with_options("give it as `after` where it is known")
+    >>> replace_arguments("give it as `after` where it is known")
     'give it as --after where it is known'
     """
     has_names = "`" in message
     if has_names:
         return re.sub(
-            r"`(\w+)`", lambda match: option_of(match[1]) or match[0], message
+            r"`(\w+)`", lambda match: find_option(match[1]) or match[0], message
         )
     return message
 
 
-def option_of(argument: str) -> str:
+def find_option(argument: str) -> str:
     """Return the option that sets an argument, empty if there is none."""
     name = _OTHERS.get(argument, argument)
-    return f"--{dashed(name)}" if name in ARGUMENTS else ""
+    return f"--{make_option_name(name)}" if name in ARGUMENTS else ""
 
 
-def in_words(text: str, form: str, width: int = 0) -> str:
+def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
     """Replace arguments by options in a result for people, wrapped to ``width`` columns; others keep the arguments.
 
     Examples
     --------
-    >>> in_words("choose with `energy`", "table"), in_words("choose with `energy`", "json")
-    ('choose with --energy', 'choose with `energy`')
+    >>> replace_arguments_for_people("choose with `energy`", "table")
+    'choose with --energy'
+    >>> replace_arguments_for_people("choose with `energy`", "json")
+    'choose with `energy`'
     """
     if form in _FOR_PROGRAMS:
         return text
-    text = with_options(text)
+    text = replace_arguments(text)
     if form != "table" or not width:
         return text
     from d2rpick.report.tables import (
-        wrapped,
+        wrap_lines,
     )  # imported here since --help does not need it
 
-    return wrapped(text, width)
+    return wrap_lines(text, width)
 
 
 def check_switched(purpose: str, request: Request, cards: Cards) -> None:
@@ -408,7 +423,7 @@ def check_switched(purpose: str, request: Request, cards: Cards) -> None:
 
 
 @contextmanager
-def opened(
+def open_with_output(
     request: Request, output: Output, *inputs: str | None
 ) -> Iterator[tuple[Run, Output]]:
     """Open the requested run, and yield it with an output that protects it and further ``inputs``.
@@ -418,7 +433,7 @@ def opened(
     from d2rpick.api.asked import open_run
 
     request.selection()  # refuses contradictory options before a file is opened
-    with reading(request.history, quiet=output.quiet):
+    with show_reading(request.history, quiet=output.quiet):
         run = open_run(request)
         weights = request.weights if isinstance(request.weights, str) else None
         yield run, output.beside(*run.sources, request.deck, weights, *inputs)

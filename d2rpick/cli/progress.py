@@ -19,7 +19,7 @@ _PERIOD: Final = 1.0  # time before the first line, and between two lines [s]
 
 
 @contextmanager
-def reading(
+def show_reading(
     names: Sequence[str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
     """Show on a terminal for how many seconds ``names`` have been read, unless ``quiet``.
@@ -30,7 +30,7 @@ def reading(
     input_name = "standard input" if names[0] == "-" else make_printable(names[0])
     rest_text = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
-    with telling(
+    with show_progress(
         lambda seconds: f"reading {input_name}{rest_text} ... {seconds:.0f} s",
         quiet=quiet,
         period=period,
@@ -57,28 +57,28 @@ class Count:
         """Return the progress after ``seconds``, and the remaining time at this pace."""
         computed = self.done - max(self.taken, 0)
         if computed:
-            remaining = (
-                f", {_clock(seconds / computed * (self.total - self.done))} left"
-            )
+            remaining = f", {_format_duration(seconds / computed * (self.total - self.done))} left"
         else:
             remaining = ""
         return f"{self.done} of {self.total} runs{remaining}"
 
 
 @contextmanager
-def counting(total: int, *, quiet: bool, period: float = _PERIOD) -> Iterator[Count]:
+def show_counting(
+    total: int, *, quiet: bool, period: float = _PERIOD
+) -> Iterator[Count]:
     """Show on a terminal how many runs are finished and the remaining time; the caller counts."""
     count = Count(total)
-    with telling(count.told, quiet=quiet, period=period):
+    with show_progress(count.told, quiet=quiet, period=period):
         yield count
 
 
-def _clock(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     """Return a duration as hours, minutes and seconds.
 
     Examples
     --------
-    >>> _clock(7), _clock(3725)
+    >>> _format_duration(7), _format_duration(3725)
     ('0:07', '1:02:05')
     """
     minutes, seconds_left = divmod(round(seconds), 60)
@@ -90,17 +90,17 @@ def _clock(seconds: float) -> str:
     )
 
 
-def on_terminal() -> bool:
+def is_on_terminal() -> bool:
     """Return True if stderr is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
-def telling(
+def show_progress(
     say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
     """Show on a terminal the text that ``say`` returns for the elapsed seconds, unless ``quiet``."""
-    if quiet or not on_terminal():
+    if quiet or not is_on_terminal():
         yield
         return
     from threading import Event, Thread  # imported here since --help does not need it

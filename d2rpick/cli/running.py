@@ -10,9 +10,9 @@ import click
 from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option, Request
 from d2rpick.base.errors import make_printable
 from d2rpick.cli import options
-from d2rpick.cli.output import Output, in_words, tell, text_bytes
-from d2rpick.cli.progress import telling
-from d2rpick.cli.values import click_type
+from d2rpick.cli.output import Output, encode_text, replace_arguments_for_people, tell
+from d2rpick.cli.progress import show_progress
+from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 CMD = ("program", "CMD")
 
 
-@options.command
-@click.argument("deck", type=click_type("file"))
+@options.make_command
+@click.argument("deck", type=choose_click_type("file"))
 @click.option(
-    "-o", "folder", metavar="RUNDIR", required=True, type=click_type("output"),
+    "-o", "folder", metavar="RUNDIR", required=True, type=choose_click_type("output"),
     help="Folder of the run; made if missing.",
 )  # fmt: skip
-@options.option(
+@options.make_click_option(
     "part",
     Option(
         "Parts to switch.  [default: those of the bodies that the deck puts off]",
@@ -37,11 +37,11 @@ CMD = ("program", "CMD")
         many=True,
     ),
 )
-@options.option("wait", Option(
+@options.make_click_option("wait", Option(
     "Time without force that counts as flight.  [default: half of the longest inner period known so far]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
-@options.option(
+@options.make_click_option(
     "margin",
     Option(
         "From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]",
@@ -49,14 +49,14 @@ CMD = ("program", "CMD")
         "T",
     ),
 )
-@options.option(
+@options.make_click_option(
     "starter",
     Option(
         "Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]",
         *CMD,
     ),
 )
-@options.option(
+@options.make_click_option(
     "engine",
     Option(
         "Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]",
@@ -73,7 +73,7 @@ CMD = ("program", "CMD")
 @click.option(
     "--dry-run", is_flag=True, help="Print what would be started, and start nothing."
 )
-@options.takes(
+@options.add_options(
     "report",
     "output_format",
     "overwrite",
@@ -114,14 +114,14 @@ def drive(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with (
         driving.driver(resume=resume) as driver,
-        telling(driver.progress, quiet=output.quiet),
+        show_progress(driver.progress, quiet=output.quiet),
     ):
         driver.prepare()
         driver.run()
         answer = driving.answer(
             driver, click.get_current_context().meta["d2rpick.command"]
         )
-    output.beside_answer(answer, lambda: answer.page(options.repeat()))
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
     return output.answer(answer)
 
 
@@ -144,9 +144,9 @@ def _plan(driving: Driving) -> list[str]:
     ]
 
 
-@options.command
-@click.argument("run", metavar="RUN", type=click_type("file"))
-@options.option("wait", Option(
+@options.make_command
+@click.argument("run", metavar="RUN", type=choose_click_type("file"))
+@options.make_click_option("wait", Option(
     "Time without a force that counts as flight.  [default: half of the longest inner period that is known]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
@@ -158,10 +158,10 @@ def _plan(driving: Driving) -> list[str]:
     help="Tell what there is now, and end.",
 )
 @click.option(
-    "--for", "lasting", type=click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
+    "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
     help="End after so many seconds.  [default: when the run has ended]",
 )  # fmt: skip
-@options.takes(
+@options.add_options(
     *("part", "deck", "output_format", "exit_zero", "quiet"),
     deck="Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.",
     forms=("table", "ndjson"),
@@ -201,22 +201,24 @@ def follow(
             seen_text = "-" if event.seen is None else f"{event.seen:.6g}"
             text = f"{seen_text:>10}  {event.event:<10}  {event.message}"
         click.echo(
-            text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"),
+            encode_text(
+                f"{replace_arguments_for_people(text, output.output_format, output.columns)}\n"
+            ),
             nl=False,
         )
     output.finish(objection=failed or (seconds is not None and since is None))
 
 
-@options.command
-@click.argument("deck", type=click_type("file"))
-@options.option(
+@options.make_command
+@click.argument("deck", type=choose_click_type("file"))
+@options.make_click_option(
     "part",
     Option(
         "Parts to switch, by number (3,7) or range (10-19).  [default: Radioss, those of bodies that are put off]",
         *("names", "IDS"), many=True,
     ),
 )  # fmt: skip
-@options.option(
+@options.make_click_option(
     "wait",
     Option(
         "Time without force that counts as flight.  [default: by the deck]",
@@ -224,15 +226,17 @@ def follow(
         "T",
     ),
 )
-@options.option("after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T"))
-@options.option(
+@options.make_click_option(
+    "after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T")
+)
+@options.make_click_option(
     "output_dir",
     Option(
         "Folder for the copy, made where there is none.", "output", "DIR", short=("-o",)
     ),
     required=True,
 )
-@options.takes("overwrite", "quiet")
+@options.add_options("overwrite", "quiet")
 def first(
     deck: str,
     part: tuple[str, ...],

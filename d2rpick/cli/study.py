@@ -14,14 +14,14 @@ from d2rpick.api.request import (
     UNLIMITED,
     Option,
     Request,
-    time_or_window,
+    choose_time_or_window,
 )
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
 from d2rpick.cli.output import Output, tell
-from d2rpick.cli.progress import counting
-from d2rpick.cli.values import click_type
+from d2rpick.cli.progress import show_counting
+from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -31,33 +31,33 @@ if TYPE_CHECKING:
     from d2rpick.base.workers import Farm
 
 
-@options.command
-@click.argument("run", metavar="RUN...", nargs=-1, type=click_type("file"))
-@options.time(
+@options.make_command
+@click.argument("run", metavar="RUN...", nargs=-1, type=choose_click_type("file"))
+@options.make_time_option(
     "--td", "Switch back to deformable at this time.", instead_of=("td_window",)
 )
-@options.time(
+@options.make_time_option(
     "--td-window",
     "Let each run choose its time to switch back within this window.",
     instead_of=("td",),
     pair=True,
 )
 @click.option(
-    "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=click_type("file"),
+    "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=choose_click_type("file"),
     help="File with more names of runs, one per line; - is stdin.",
 )  # fmt: skip
-@options.file(
+@options.make_file_option(
     "--resume",
     "Keep finished runs in FILE, and skip those that are in it and unchanged.",
     kind="output",
 )
-@options.option("jobs", Option(
+@options.make_click_option("jobs", Option(
     "Number of processes.  [default: one per core]", range(1, UNLIMITED), "N", instead_of=("scheduler",)
 ))  # fmt: skip
-@options.option("scheduler", Option(
+@options.make_click_option("scheduler", Option(
     "Use a running Dask cluster, which must see the same files.", "program", "ADDRESS", instead_of=("jobs",)
 ))  # fmt: skip
-@options.takes(
+@options.add_options(
     *(*READING, *LIMITS, "plot", "report", *RESULT),
     plot="Draw the energies of all runs to FILE (png, svg, pdf).",
     report="Write all of it to one HTML page to read, print and sign.",
@@ -89,49 +89,51 @@ def study(
     """
     from d2rpick.api.studies import (
         Ledger,
-        fingerprint,
-        line,
-        question_of,
-        rows_of,
-        summary,
+        compare_rows,
+        compute_fingerprint,
+        compute_rows,
+        make_question,
+        write_row,
     )
 
     if scheduler and jobs:
         raise click.UsageError(
             "--scheduler and --jobs exclude each other: the cluster has its own processes"
         )
-    td_or_window = time_or_window(td, td_window)
-    sources = _sources(run, listed)
+    td_or_window = choose_time_or_window(td, td_window)
+    sources = _list_sources(run, listed)
     output = output.beside(*sources)
     written = {"output-file": output.file, "plot": output.plot, "report": output.report}
     _check_ledger(resume, written)
-    question = question_of(
+    question = make_question(
         request, td_or_window, curve=bool(output.plot or output.report)
     )
     ledger = Ledger(resume, question) if resume is not None else None
-    mark = fingerprint(question)
+    mark = compute_fingerprint(question)
     rows = []
     by_line = output.output_format == "ndjson"
     streaming = by_line and output.file is None
     quiet = output.quiet or (streaming and sys.stdout.isatty())
-    calls = len(sources) - _known(ledger, sources, quiet=output.quiet)
+    calls = len(sources) - _count_known(ledger, sources, quiet=output.quiet)
     with (
-        _farm(jobs, scheduler, calls, quiet=output.quiet) as farm,
-        counting(len(sources), quiet=quiet) as count,
+        _choose_farm(jobs, scheduler, calls, quiet=output.quiet) as farm,
+        show_counting(len(sources), quiet=quiet) as count,
     ):
-        for row in rows_of(
+        for row in compute_rows(
             question, sources, farm, ledger, absolute=bool(scheduler), told=count.tell
         ):
             rows.append(row)
             if streaming:
-                output.result(line(row, mark))
-    answer = summary(request, question, sources, rows)
+                output.result(write_row(row, mark))
+    answer = compare_rows(request, question, sources, rows)
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
-    output.beside_answer(answer, lambda: answer.page(options.repeat()))
+    output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
     output.answer(
         answer,
-        lines=[line(row, mark) for row in rows] if by_line and not streaming else [],
+        lines=[write_row(row, mark) for row in rows]
+        if by_line and not streaming
+        else [],
     )
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
@@ -140,11 +142,11 @@ def study(
     output.finish(objection=answer.objection)
 
 
-def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
+def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     """Return the names of all runs, given and listed, with patterns replaced by their matches."""
     from d2rpick.api.studies import find_runs
 
-    sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
+    sources = find_runs([*names, *(_read_list(listed) if listed is not None else ())])
     if not sources:
         if listed is None:
             where = ""
@@ -160,7 +162,7 @@ def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     return sources
 
 
-def _listed(name: str) -> Iterator[str]:
+def _read_list(name: str) -> Iterator[str]:
     """Yield the names in a list, one a line; blank lines and comments are skipped."""
     from pathlib import Path
 
@@ -199,7 +201,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
         )
 
 
-def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
+def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
     """Return how many runs are known from an earlier study, and print it."""
     if ledger is None:
         return 0
@@ -209,7 +211,9 @@ def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int
     return known_count
 
 
-def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -> Farm:
+def _choose_farm(
+    jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool
+) -> Farm:
     """Choose where to compute so many calls; a single call needs no other process."""
     from d2rpick.base import workers
 
@@ -219,15 +223,15 @@ def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -
             tell(f"note: {scheduler}: no workers yet, waiting for some")
         return cluster
     return workers.choose_farm(
-        min(jobs or workers.count_cores(), calls), "d2rpick.choice.study"
+        min(jobs or workers.count_cores(), calls), "d2rpick.choice.runs.study"
     )
 
 
-@options.command
+@options.make_command
 @click.argument(
-    "folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file")
+    "folders", metavar="RUN...", nargs=-1, required=True, type=choose_click_type("file")
 )
-@options.takes(*RESULT, forms=FORMATS["calibration"])
+@options.add_options(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to what runs of a site took, for --weights.
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
-from d2rpick.api.cards import SETTINGS, Cards, solvers
-from d2rpick.api.request import JUDGING, UNLIMITED, Number, options_of, typed
+from d2rpick.api.cards import SETTINGS, Cards, list_solvers
+from d2rpick.api.request import JUDGING, UNLIMITED, Number, list_options, write_option
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown
 from d2rpick.cli import COMMANDS
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 else:
     FloatType = click.ParamType  # generic since click 8.4
 
-CARDS: Final = tuple(options_of(Cards))
+CARDS: Final = tuple(list_options(Cards))
 # Options that apply only together with one of others: settings are for all commands, even those that lack these.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
@@ -49,9 +49,12 @@ class NumberType(FloatType):
         try:
             number = float(value)
         except ValueError:
-            from d2rpick.api.arguments import with_point, without_unit
+            from d2rpick.api.arguments import (
+                suggest_decimal_point,
+                suggest_without_unit,
+            )
 
-            hint = with_point(value) or without_unit(value)
+            hint = suggest_decimal_point(value) or suggest_without_unit(value)
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
@@ -114,7 +117,7 @@ class PartNames(Names):
         incomplete: str,
     ) -> list[CompletionItem]:
         """Offer the parts of the files on the command line, and the words for several parts."""
-        run = _typed_run(ctx)
+        run = _open_typed_run(ctx)
         parts = run.parts if run else ()
         words = [
             ("flying", "parts that fly together"),
@@ -125,7 +128,7 @@ class PartNames(Names):
             *((p.title, str(p.id)) for p in parts),
             *words,
         ]
-        return _completed(offered, incomplete)
+        return _complete_names(offered, incomplete)
 
 
 class RuleIds(click.types.StringParamType):
@@ -138,10 +141,10 @@ class RuleIds(click.types.StringParamType):
         incomplete: str,
     ) -> list[CompletionItem]:
         """Offer the rules with this prefix and their summaries."""
-        from d2rpick.report.findings import as_list
+        from d2rpick.report.findings import list_rules
 
-        rows = (line.split(maxsplit=2) for line in as_list().split("\n"))
-        return _completed(
+        rows = (line.split(maxsplit=2) for line in list_rules().split("\n"))
+        return _complete_names(
             [(id_, summary) for id_, _, summary in rows], incomplete.upper()
         )
 
@@ -156,14 +159,14 @@ class ChannelNames(Names):
         incomplete: str,
     ) -> list[CompletionItem]:
         """Offer the channels of the files on the command line, with underscores for blanks, which are equivalent."""
-        run = _typed_run(ctx)
-        return _completed(
+        run = _open_typed_run(ctx)
+        return _complete_names(
             [(name.replace(" ", "_"), "") for name in (run.channels if run else ())],
             incomplete,
         )
 
 
-def _typed_run(ctx: click.Context) -> Run | None:
+def _open_typed_run(ctx: click.Context) -> Run | None:
     """Open the files on the command line; return None if they are no run."""
     from pathlib import Path
 
@@ -179,7 +182,7 @@ def _typed_run(ctx: click.Context) -> Run | None:
         return None
 
 
-def _completed(
+def _complete_names(
     offered: Iterable[tuple[str, str]], incomplete: str
 ) -> list[CompletionItem]:
     """Return the names with this prefix, without those that a shell would split."""
@@ -208,9 +211,9 @@ class SolverName(click.types.StringParamType):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str:
         """Return the name, or fail with the allowed names."""
-        if value not in solvers():
+        if value not in list_solvers():
             self.fail(
-                f"{value!r} was found, one of {', '.join(solvers())} was expected",
+                f"{value!r} was found, one of {', '.join(list_solvers())} was expected",
                 param,
                 ctx,
             )
@@ -218,7 +221,7 @@ class SolverName(click.types.StringParamType):
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the names for the help."""
-        return f"[{'|'.join(solvers())}]"
+        return f"[{'|'.join(list_solvers())}]"
 
     def shell_complete(
         self,
@@ -227,7 +230,7 @@ class SolverName(click.types.StringParamType):
         incomplete: str,
     ) -> list[CompletionItem]:
         """Offer the names with this prefix."""
-        return _completed([(name, "") for name in solvers()], incomplete)
+        return _complete_names([(name, "") for name in list_solvers()], incomplete)
 
 
 _NAMED: Final = {
@@ -243,7 +246,7 @@ _NAMED: Final = {
 }
 
 
-def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
+def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
     """Return the type by which click reads a kind of value."""
     if isinstance(kind, str):
         return _NAMED[kind]
@@ -254,7 +257,7 @@ def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
     return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)
 
 
-def settings_of(
+def read_settings(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
     """Return the values of options by name from the ``table`` of settings that was read from ``source``.
@@ -268,13 +271,13 @@ def settings_of(
         For a key that is no option, or a value that its option does not allow.
     """
     values = {
-        option: _value(ctx, option, value, position)
-        for option, value, position in _given(ctx.command, table, source)
+        option: _read_value(ctx, option, value, position)
+        for option, value, position in _list_given_settings(ctx.command, table, source)
     }
     given_values = {
         name: value
         for name, value in without.params.items()
-        if _source(without, name) is not ParameterSource.DEFAULT
+        if _get_source(without, name) is not ParameterSource.DEFAULT
     }
     all_values = {
         **{option.name: value for option, value in values.items()},
@@ -283,11 +286,11 @@ def settings_of(
     return {
         option.name or "": value
         for option, value in values.items()
-        if _counts(ctx, option, given_values, all_values)
+        if is_used(ctx, option, given_values, all_values)
     }
 
 
-def _given(
+def _list_given_settings(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
     """Yield the options of a command in the settings, with value and position; unknown keys are refused."""
@@ -307,7 +310,7 @@ def _given(
     refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown(tables, (*COMMANDS, "severity"), source)
     options = {
-        spelled(entry): entry
+        spell_option(entry): entry
         for entry in command.params
         if isinstance(entry, click.Option)
     }
@@ -318,15 +321,17 @@ def _given(
             yield options[name], value, f"{source}: {name}"
 
 
-def _value(ctx: click.Context, option: click.Option, value: Any, position: str) -> Any:
+def _read_value(
+    ctx: click.Context, option: click.Option, value: Any, position: str
+) -> Any:
     """Read the value of an option; relative file names start from the folder of the settings."""
     _refuse_dangerous(option, position)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
     if (option.nargs > 1 and not isinstance(value, list)) or not all(
-        _fits(option, single) for single in values
+        is_of_kind(option, single) for single in values
     ):
-        expected = "a list" if option.nargs > 1 else _expected_kind(option)
+        expected = "a list" if option.nargs > 1 else _name_expected_kind(option)
         raise ConfigurationError(
             f"{position} is {format_toml_value(value)}, {expected} was expected"
         )
@@ -359,7 +364,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
     )
 
 
-def _fits(option: click.Option, value: object) -> bool:
+def is_of_kind(option: click.Option, value: object) -> bool:
     """Return True if a single value from a TOML file has the kind of the option."""
     if option.is_flag or isinstance(value, bool):
         return option.is_flag and isinstance(value, bool)
@@ -372,7 +377,7 @@ def _fits(option: click.Option, value: object) -> bool:
     )
 
 
-def _expected_kind(option: click.Option) -> str:
+def _name_expected_kind(option: click.Option) -> str:
     """Return the name of the kind of value that an option takes."""
     if option.is_flag:
         return "true or false"
@@ -383,7 +388,7 @@ def _expected_kind(option: click.Option) -> str:
     return "a number or a text"
 
 
-def _counts(
+def is_used(
     ctx: click.Context,
     option: click.Option,
     given_values: Mapping[str, Any],
@@ -401,16 +406,16 @@ def _counts(
     return not needed_options or any(all_values.get(name) for name in needed_options)
 
 
-def _source(ctx: click.Context, name: str | None) -> ParameterSource | None:
+def _get_source(ctx: click.Context, name: str | None) -> ParameterSource | None:
     return ctx.get_parameter_source(name or "")
 
 
-def words_of(ctx: click.Context) -> Sequence[str]:
+def list_words(ctx: click.Context) -> Sequence[str]:
     """Return the options from the settings as they are typed."""
     of_settings = (
         parameter
         for parameter in ctx.command.params
-        if _source(ctx, parameter.name) is ParameterSource.DEFAULT_MAP
+        if _get_source(ctx, parameter.name) is ParameterSource.DEFAULT_MAP
     )
     options = [
         parameter for parameter in of_settings if isinstance(parameter, click.Option)
@@ -418,14 +423,14 @@ def words_of(ctx: click.Context) -> Sequence[str]:
     return [
         text
         for parameter in options
-        for text in typed(
-            spelled(parameter),
+        for text in write_option(
+            spell_option(parameter),
             ctx.params[parameter.name or ""],
             many=parameter.multiple,
         )
     ]
 
 
-def spelled(option: click.Option) -> str:
+def spell_option(option: click.Option) -> str:
     """Return the long name of an option, as in the settings."""
     return max(option.opts, key=len)[2:]

@@ -1,7 +1,7 @@
 """Map the formulation numbers of elements to names and to the class that defines their cost.
 
-Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.cost`). A formulation
-that was not measured has the class of a similar one, with ``measured`` False.
+Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.parts.cost`).
+A formulation that was not measured has the class of a similar one, with ``measured`` False.
 """
 
 from __future__ import annotations

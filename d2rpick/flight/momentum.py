@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, Momenta, Samples
     from d2rpick.histories.names import Part, Selection
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 
 # A momentum that changes by less than this share of itself is constant: single precision has seven digits.
@@ -340,7 +340,7 @@ def _refine_attached_parts(
     return tuple(sorted(members - set(chosen)))
 
 
-def replace_words_by_part_ids(run: Run, selection: Selection) -> Selection:
+def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection:
     """Replace the words ``flying`` and ``all`` in a selection of parts by the part ids that they stand for.
 
     A part with such a title takes precedence over the word.
@@ -367,7 +367,7 @@ def replace_words_by_part_ids(run: Run, selection: Selection) -> Selection:
     return selection._replace(parts=tuple(dict.fromkeys(numbers)))
 
 
-def list_deformable_parts(run: Run) -> tuple[Part, ...]:
+def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
     """Return the parts that ever have internal energy; raise FormatError if there are none."""
     parts = run.parts
     energies = run.part_energies(
@@ -383,7 +383,7 @@ def list_deformable_parts(run: Run) -> tuple[Part, ...]:
     return with_energy
 
 
-def find_flying_parts(run: Run) -> tuple[Part, ...]:
+def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
     """Return the deformable parts that fly as one body; raise FormatError if momenta do not show them.
 
     Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
@@ -403,7 +403,7 @@ def find_flying_parts(run: Run) -> tuple[Part, ...]:
     )
 
 
-def find_parts_flying_together(run: Run) -> tuple[Part, ...]:
+def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
     """Return the deformable parts that momenta show to fly together, in one or more bodies; raise FormatError without.
 
     All parts are tried together, then each part that is in no set yet, with the parts attached to it.
@@ -453,7 +453,7 @@ def _is_sliding(momenta: Momenta, part: int, td: float) -> bool:
     return straight is not None and find_flight_of(momenta, (part,), td) is None
 
 
-def _get_parts_and_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
+def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | None]:
     """Return the deformable parts and their momenta, None if the run has no momenta of parts."""
     deformable = list_deformable_parts(run)
     return deformable, next(
@@ -476,7 +476,7 @@ def _list_flights_of_bodies(
 
 
 def _select_heaviest_parts(
-    run: Run,
+    run: OpenedRun,
     deformable: Sequence[Part],
     momenta: Momenta | None,
     found: Sequence[FreeFlight],

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 # Patterns are compiled at their first use by the functions of `re`, for start-up.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
@@ -238,7 +238,9 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
     )
 
 
-def find_printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str]]:
+def find_printed_steps(
+    run: OpenedRun, *neighbours: str
+) -> dict[int, tuple[float, str]]:
     """Return the smallest time step of each part, with the name of its source.
 
     Parameters
@@ -261,7 +263,7 @@ def find_printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str
     return steps
 
 
-def _read_steps_of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
+def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
     """Yield the part that controls each cycle, with the step printed below it."""
     for file in run.files:
         part: bytes | None = None

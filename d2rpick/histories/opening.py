@@ -16,7 +16,7 @@ from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
-from d2rpick.histories.run import Run
+from d2rpick.histories.run import OpenedRun
 from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 
 __all__ = [
+    "OpenedRun",
     "Reader",
-    "Run",
     "Selection",
     "Source",
     "load_reader",
@@ -71,7 +71,7 @@ def load_reader(kind: str) -> Reader:
 
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
-) -> Run:
+) -> OpenedRun:
     """Open the files of one run: files of one format are its legs, files of different formats are companions.
 
     Parameters
@@ -96,7 +96,7 @@ def open_sources(
     sources: Sequence[Source],
     selection: Selection = _DEFAULT,
     input_format: str = "auto",
-) -> Run:
+) -> OpenedRun:
     """Open the files of one run from their bytes; arguments and errors as in `open_run`."""
     with_forces = []
     if input_format == "auto":
@@ -138,7 +138,7 @@ def open_sources(
     # the first file of a family stands for all its files
     names = tuple(source.name for source in files if source.name not in later_files)
     reopen = partial(_reopen, files, selection, input_format)
-    return Run(
+    return OpenedRun(
         names, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen
     )
 
@@ -148,7 +148,7 @@ def _reopen(
     selection: Selection,
     input_format: str,
     surroundings: Surroundings,
-) -> Run:
+) -> OpenedRun:
     """Open a run again with other surroundings."""
     return open_sources(sources, selection, input_format).within(surroundings)
 

@@ -44,7 +44,7 @@ _CENTRES = ("x_center", "y_center", "z_center")
 NO_STATES: Final = "no states; did the run reach its first output?"
 
 
-class Run:
+class OpenedRun:
     """The databases of one run, one for each format, the most comprehensive one first.
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
@@ -60,7 +60,7 @@ class Run:
         surroundings: Surroundings = UNKNOWN,
         notes: tuple[str, ...] = (),
         forces: tuple[ContactForce, ...] = (),
-        reopen: Callable[[Surroundings], Run] | None = None,
+        reopen: Callable[[Surroundings], OpenedRun] | None = None,
     ) -> None:
         self.sources, self.databases, self.files = sources, databases, files
         self.surroundings = surroundings
@@ -73,9 +73,9 @@ class Run:
             )
         return self._reopen, (self.surroundings,)
 
-    def within(self, surroundings: Surroundings) -> Run:
+    def within(self, surroundings: Surroundings) -> OpenedRun:
         """Return the same run with other surroundings."""
-        return Run(
+        return OpenedRun(
             self.sources,
             self.databases,
             self.files,
@@ -473,7 +473,10 @@ class _Written(Given):
     """The evidence in the files of a run for some parts, read at the first request."""
 
     def __init__(
-        self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
+        self,
+        run: OpenedRun,
+        chosen: Sequence[Part] | None,
+        flying: Sequence[Part] | None,
     ) -> None:
         self._run, self._chosen, self._flying = run, chosen, flying
 

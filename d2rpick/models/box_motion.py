@@ -200,7 +200,7 @@ class Contact:
         return Face(np.asarray(1j * normal), np.asarray(-friction, dtype=np.complex128))
 
 
-class RigidBody:
+class RigidPoints:
     """Points that move as one body, with the momenta that they had when they were switched.
 
     ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
@@ -259,7 +259,7 @@ class Accounts:
     angular_impulse: float = 0.0
 
 
-class Motion:
+class BoxMotion:
     """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step before it.
 
     A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError if that is impossible. ``body`` is
@@ -286,7 +286,7 @@ class Motion:
         self.velocities: Plane = np.full(s.places.size, complex(parameters.speed))
         self.box, self.step = Bars(s.box, s.places.size), Bars(s.step, s.places.size)
         self.contact = Contact(s, parameters)
-        self.body: RigidBody | None = None
+        self.body: RigidPoints | None = None
         self.accounts = Accounts()
         self.count = 0
 
@@ -299,7 +299,7 @@ class Motion:
         """Return the number of the first time step at or after ``time`` [s]."""
         return int(np.ceil(time / self.dt - _SAME))
 
-    def copy(self) -> Motion:
+    def copy(self) -> BoxMotion:
         """Return an independent copy that can be continued."""
         return copy.deepcopy(self)
 
@@ -310,7 +310,7 @@ class Motion:
         of_box = slice(self.structure.of_box)
         masses = self.structure.masses[of_box]
         deformable = self.velocities[of_box]
-        self.body = RigidBody(masses, self.places[of_box], deformable)
+        self.body = RigidPoints(masses, self.places[of_box], deformable)
         rigid = self.body.velocities
         self.accounts.lost += (
             float(masses @ (np.abs(deformable) ** 2 - np.abs(rigid) ** 2)) / 2

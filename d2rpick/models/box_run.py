@@ -13,7 +13,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.base.workers import choose_farm, count_cores
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
-from d2rpick.models.box_motion import Motion
+from d2rpick.models.box_motion import BoxMotion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -111,7 +111,7 @@ class Record(NamedTuple):
 class Recorder:
     """Collects states of a ``motion`` up to its time step ``last``."""
 
-    def __init__(self, motion: Motion, last: int) -> None:
+    def __init__(self, motion: BoxMotion, last: int) -> None:
         self._motion, self._began, self._updates = (
             motion,
             perf_counter(),
@@ -220,7 +220,7 @@ class Recorder:
         )
 
 
-def _count_updates(motion: Motion) -> int:
+def _count_updates(motion: BoxMotion) -> int:
     """Return how many bar forces were computed so far."""
     return motion.box.evaluations + motion.step.evaluations
 
@@ -258,7 +258,7 @@ def simulate(
     """
     # an overflow shows in the number of time steps below
     with np.errstate(over="ignore"):
-        motion = Motion(parameters, interval)
+        motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
         raise RangeError(
             f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars"
@@ -271,7 +271,7 @@ def simulate(
     return continue_motion(motion, t_end, *windows)
 
 
-def continue_motion(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
+def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> Record:
     """Continue ``motion`` to ``t_end`` [s], switching at the first time step at or after the times of ``windows``.
 
     Raises RangeError if its numbers become infinite.
@@ -295,7 +295,7 @@ def continue_motion(motion: Motion, t_end: float, *windows: RigidWindow) -> Reco
             motion.move()
 
 
-def run_to(motion: Motion, time: float) -> None:
+def run_to(motion: BoxMotion, time: float) -> None:
     """Continue a motion, without switching, to the first time step at or after ``time`` [s]."""
     for _ in range(motion.step_at(time) - motion.count):
         motion.advance()
@@ -384,7 +384,7 @@ def scan(
         for answer in farm.answers(
             _compute_switched_run,
             _make_branches(
-                Motion(parameters, _find_interval(reference)), ordered, td, end
+                BoxMotion(parameters, _find_interval(reference)), ordered, td, end
             ),
         ):
             if answer.error:
@@ -398,15 +398,15 @@ def scan(
 
 
 def _make_branches(
-    motion: Motion, times: Iterable[float], td: float, end: float
-) -> Iterator[tuple[Motion, float, RigidWindow]]:
+    motion: BoxMotion, times: Iterable[float], td: float, end: float
+) -> Iterator[tuple[BoxMotion, float, RigidWindow]]:
     """Yield, for each tr, a copy of the reference run advanced to it, the end of the run, and its window."""
     for tr in times:
         run_to(motion, tr)
         yield motion.copy(), end, RigidWindow(tr, td)
 
 
-def _compute_switched_run(branch: tuple[Motion, float, RigidWindow]) -> Record:
+def _compute_switched_run(branch: tuple[BoxMotion, float, RigidWindow]) -> Record:
     """Compute the switched run of a branch."""
     return continue_motion(*branch)
 

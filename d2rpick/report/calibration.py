@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.cost import MEASURED, weights_as_toml
+from d2rpick.choice.parts.cost import MEASURED, format_weights_as_toml
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
 
 if TYPE_CHECKING:
-    from d2rpick.choice.calibration import Calibration
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.parts.calibration import FittedWeights
+    from d2rpick.report.formats import DisplayOptions
 
 _LEG: Final = row(
     Field("name", "text"),
@@ -35,40 +35,40 @@ COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
-def as_table(calibration: Calibration, display: Shown) -> str:
+def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
     """Return a table of the assumed and measured weights of each formulation, and of the restart segments used."""
     weights = calibration.weights
     lines = [
-        tables.as_text(HEAD, _rows(calibration), display.width), "",
+        tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",
         f"elements of a step  {weights.element_share:.3f}",
         f"node of a body      {weights.rigid_node:.3g} us",
         f"misfit              {calibration.misfit:.1%} of the time of a leg", "",
-        tables.as_text(LEG_HEAD, _legs(calibration), display.width),
+        tables.as_text(LEG_HEAD, _list_leg_rows(calibration), display.width),
     ]  # fmt: skip
     return "\n".join(lines)
 
 
-def as_markdown(calibration: Calibration, _: Shown) -> str:
+def as_markdown(calibration: FittedWeights, _: DisplayOptions) -> str:
     """Return the weights and the restart segments as Markdown tables."""
     return "\n\n".join(
         [
-            tables.as_markdown(HEAD, _rows(calibration)),
-            tables.as_markdown(LEG_HEAD, _legs(calibration)),
+            tables.as_markdown(HEAD, _list_weight_rows(calibration)),
+            tables.as_markdown(LEG_HEAD, _list_leg_rows(calibration)),
         ]
     )
 
 
-def as_csv(calibration: Calibration, _: Shown) -> str:
+def as_csv(calibration: FittedWeights, _: DisplayOptions) -> str:
     """Return CSV with one row per formulation."""
-    return tables.as_csv(COLUMNS, plain_rows(calibration)).rstrip("\n")
+    return tables.as_csv(COLUMNS, list_plain_rows(calibration)).rstrip("\n")
 
 
-def as_toml(calibration: Calibration, _: Shown) -> str:
+def as_toml(calibration: FittedWeights, _: DisplayOptions) -> str:
     """Return the file that ``--weights`` reads."""
-    return weights_as_toml(calibration.weights)
+    return format_weights_as_toml(calibration.weights)
 
 
-def plain_rows(calibration: Calibration) -> list[list[tables.Cell]]:
+def list_plain_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
     """Return one row of cells per formulation at full precision, in the order of ``COLUMNS``."""
     return [
         [name, weight, MEASURED[name], name in calibration.told]
@@ -76,7 +76,7 @@ def plain_rows(calibration: Calibration) -> list[list[tables.Cell]]:
     ]
 
 
-def _rows(calibration: Calibration) -> list[list[tables.Cell]]:
+def _list_weight_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
     return [
         [
             name,
@@ -88,7 +88,7 @@ def _rows(calibration: Calibration) -> list[list[tables.Cell]]:
     ]
 
 
-def _legs(calibration: Calibration) -> list[list[tables.Cell]]:
+def _list_leg_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
     return [
         [make_printable(leg.name), f"{leg.total:.4g} us", None if leg.elements is None else f"{leg.elements:.4g} us",
          f"{leg.rigid_nodes:.0f}"]

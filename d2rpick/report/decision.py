@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.grades import GOOD
+from d2rpick.choice.pair.grades import GOOD
 
 if TYPE_CHECKING:
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.quality import Grade
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Grade
 
     Lines = list[tuple[str, str]]
 
 
-def headed(decision: Decision, tr: float, td: float) -> Lines:
+def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
     """Return what to do with a pair, why, and what would be better, as pairs of a name and a sentence."""
     lines = [
         (decision.verdict, f"tr = {tr:.6g}, td = {td:.6g}"),
@@ -22,10 +22,10 @@ def headed(decision: Decision, tr: float, td: float) -> Lines:
     ]
     if decision.cure:
         lines.append(("to improve", decision.cure))
-    return [*lines, ("expect", outlook(decision))]
+    return [*lines, ("expect", describe_expectation(decision))]
 
 
-def outlook(decision: Decision) -> str:
+def describe_expectation(decision: Decision) -> str:
     """Return the expected error after td, and the worst case if the expectation is wrong."""
     worst = decision.worst_case
     if worst == "the same":
@@ -33,7 +33,7 @@ def outlook(decision: Decision) -> str:
     return f"{decision.expected}. At worst: {worst}"
 
 
-def statements(decision: Decision) -> Lines:
+def list_statements(decision: Decision) -> Lines:
     """Return a sentence on the motion and one on the vibration, without what the verdict already says."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
@@ -45,12 +45,15 @@ def statements(decision: Decision) -> Lines:
     else:
         share = ""
     return [
-        ("motion", f"{motion.grade}{_further(motion, decision)}"),
-        ("vibration", f"{vibration.grade}{raised}{_further(alone, decision)}{share}"),
+        ("motion", f"{motion.grade}{explain_grade(motion, decision)}"),
+        (
+            "vibration",
+            f"{vibration.grade}{raised}{explain_grade(alone, decision)}{share}",
+        ),
     ]
 
 
-def _further(grade: Grade, decision: Decision) -> str:
+def explain_grade(grade: Grade, decision: Decision) -> str:
     """Return why a grade is not better and what would improve it, unless the verdict already says so."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
@@ -59,26 +62,26 @@ def _further(grade: Grade, decision: Decision) -> str:
     return f": {'; '.join(cause.reason for cause in causes)}. To improve: {cures}"
 
 
-def in_short(decision: Decision) -> str:
+def format_in_short(decision: Decision) -> str:
     """Return the verdict and the reason why it is not better."""
     if decision.grade == GOOD:
         return decision.verdict
     return f"{decision.verdict}: {decision.reason}"
 
 
-def in_full(decision: Decision) -> str:
+def format_in_full(decision: Decision) -> str:
     """Return the verdict, the reason why it is not better, and what would improve it."""
     if decision.grade == GOOD:
         return f"{decision.verdict}: {decision.reason}"
     return f"{decision.verdict}: {decision.reason}. To improve: {decision.cure}"
 
 
-def rigid_for(best: Candidate) -> str:
+def format_rigid_time(best: Candidate) -> str:
     """Return how long the parts are rigid."""
     return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
 
 
-def accuracy(best: Candidate) -> str:
+def format_accuracy(best: Candidate) -> str:
     """Return the accuracy and the timing tolerance of tr as text, empty if neither is known."""
     interval = (
         "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
@@ -90,12 +93,12 @@ def accuracy(best: Candidate) -> str:
     return "; ".join(filter(None, (interval, room)))
 
 
-def saving(best: Candidate) -> str | None:
+def format_saving(best: Candidate) -> str | None:
     """Return how much CPU time the pair saves, None if the cost of the parts is unknown."""
     share = best.run_time_share
-    return None if share is None else saved(share)
+    return None if share is None else format_saved_share(share)
 
 
-def saved(run_time_share: float) -> str:
+def format_saved_share(run_time_share: float) -> str:
     """Return how much CPU time is saved if ``run_time_share`` of it remains."""
     return f"about {1 - run_time_share:.0%} of the processor time"

@@ -8,7 +8,7 @@ from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, many, row
 
 if TYPE_CHECKING:
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
     from d2rpick.running.drive import Driven
 
 _WINDOW: Final = row(
@@ -34,18 +34,20 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 
 
-def as_table(answer: Driven, display: Shown) -> str:
+def as_table(answer: Driven, display: DisplayOptions) -> str:
     """Return the rigid windows, the CPU time of the restart segments, and what was saved."""
     parts = [
-        tables.as_text(*windows(answer), display.width)
+        tables.as_text(*list_window_rows(answer), display.width)
         if answer.windows
         else "no window",
-        tables.as_text(*legs(answer), display.width),
+        tables.as_text(*list_leg_rows(answer), display.width),
     ]
-    return "\n\n".join([*parts, "\n".join(tables.in_line(outlook(answer), 9))])
+    return "\n\n".join(
+        [*parts, "\n".join(tables.format_in_line(list_savings(answer), 9))]
+    )
 
 
-def windows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and rows of the flights; ``deformable`` is the deformable time of a flight."""
     columns = {
         "flight": lambda window: window.free,
@@ -65,10 +67,10 @@ def windows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
             f"left out: {window.reason}" if window.reason else "switched"
         ),
     }
-    return tables.filled(columns, answer.windows)
+    return tables.fill_table(columns, answer.windows)
 
 
-def legs(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and the rows of the restart segments, one row per kind."""
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(leg.kind for leg in answer.legs):
@@ -89,7 +91,7 @@ def legs(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     return ["kind", "legs", "time", "cycles", "CPU s"], rows
 
 
-def outlook(answer: Driven) -> list[tuple[str, str]]:
+def list_savings(answer: Driven) -> list[tuple[str, str]]:
     """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
     words = zip(
         answer.saved,

@@ -13,21 +13,33 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.choice.decision import span_of
+from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
-from d2rpick.report.decision import saved
-from d2rpick.report.page import Explorer, Markup, join, resource, tag
-from d2rpick.report.suggestion import acceptable
-from d2rpick.report.tables import filled, measure, shell_line, short, shown
-from d2rpick.report.view import View, locked_in, response, scale_in, view_of
+from d2rpick.report.decision import format_saved_share
+from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
+from d2rpick.report.suggestion import describe_acceptable_windows
+from d2rpick.report.tables import (
+    fill_table,
+    format_if_known,
+    format_measure,
+    format_short,
+    quote_shell_line,
+)
+from d2rpick.report.view import (
+    View,
+    compute_locked_in_deformation,
+    compute_response,
+    make_scale_of_flight,
+    make_view_of_situation,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import Offer, TradeOff
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
 
 
@@ -60,20 +72,20 @@ _COLUMNS: Final = 480
 _READ: Final = 3
 
 
-def styles() -> tuple[Markup, ...]:
+def read_styles() -> tuple[Markup, ...]:
     """Return the style sheets of the interactive part."""
-    return resource("uplot/uPlot.min.css"), resource("explorer.css")
+    return read_resource("uplot/uPlot.min.css"), read_resource("explorer.css")
 
 
-def scripts() -> tuple[Markup, ...]:
+def read_scripts() -> tuple[Markup, ...]:
     """Return the scripts in loading order; that of uPlot includes its licence."""
-    licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
-    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
+    licence = join([Markup("/*!\n"), read_resource("uplot/LICENSE"), Markup("*/\n")])
+    return Markup(licence + read_resource("uplot/uPlot.iife.min.js")), read_resource(
         "explorer.js"
     )
 
 
-def explorer(explored: Explorer | None) -> Markup:
+def build_explorer(explored: Explorer | None) -> Markup:
     """Return the interactive section and its data, or nothing if there is nothing to explore.
 
     The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
@@ -81,59 +93,66 @@ def explorer(explored: Explorer | None) -> Markup:
     """
     if explored is None:
         return Markup()
-    flights = [_flight(trade_off) for trade_off in explored.trade_offs]
+    flights = [_describe_flight(trade_off) for trade_off in explored.trade_offs]
     known_values = {
         name for flight in flights for name in flight["texts"]
     }  # values that no pair has are left out
     listed = (
-        tag("div", tag("dt", name), tag("dd", data_value=key))
+        make_element(
+            "div", make_element("dt", name), make_element("dd", data_value=key)
+        )
         for key, name in _VALUES.items()
         if key in known_values
     )
-    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
+    section, motion, values = _strip_whitespace(read_resource("explorer.html")).split(
+        _NEXT
+    )
     values = Template(values).substitute(listed=join(listed))
     if any(flight["motion"] for flight in flights):
         below = (motion, values)
     else:
         below = (values, "")
     options = (
-        tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
+        make_element("option", f"flight {i + 1}", value=str(i))
+        for i in range(len(flights))
     )
     unit = explored.trade_offs[0].situation.history.time_unit
     section = Template(section).substitute(
-        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight"))
+        chooser=make_element(
+            "label", "flight", make_element("select", *options, id="explorer-flight")
+        )
         if len(flights) > 1
         else "",
         unit=join([f" [{unit}]"] if unit else []),
-        windows=tag("li", tag("i", class_="windows"), "acceptable tr")
+        windows=make_element("li", make_element("i", class_="windows"), "acceptable tr")
         if "windows" in known_values
         else "",
         below_energy=below[0],
         below_trade=below[1],
     )
-    command_start, command_end = (shell_line(words) for words in explored.command)
+    command_start, command_end = (quote_shell_line(words) for words in explored.command)
     data = {
         "flight": 0,
         "flights": flights,
         "command": [f"{command_start} ", f" {command_end}"],
     }
-    return join([Markup(section), _data("explorer-data", data)])
+    return join([Markup(section), _build_data_element("explorer-data", data)])
 
 
-def _closed_up(text: str) -> str:
+def _strip_whitespace(text: str) -> str:
     """Remove whitespace between elements, and reduce whitespace within a text to one blank."""
     return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
 
 
-def _data(name: str, content: Any) -> Markup:
+def _build_data_element(name: str, content: Any) -> Markup:
     """Return a data element for a script: JSON in which nothing can be mistaken for markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return tag("script", Markup(text), type="application/json", id=name)
+    return make_element("script", Markup(text), type="application/json", id=name)
 
 
-def _flight(trade_off: TradeOff) -> dict[str, Any]:
+def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
     """Return the curves, marks and texts of one flight."""
     situation = trade_off.situation
     history = situation.history
@@ -144,9 +163,9 @@ def _flight(trade_off: TradeOff) -> dict[str, Any]:
         or trade_off.start
         or trade_off.offers[-1]
     )
-    view = view_of(situation, trade_off.offers[-1].td)
+    view = make_view_of_situation(situation, trade_off.offers[-1].td)
     levels = [offer.energy_td for offer in trade_off.offers]
-    scale = scale_in(situation, view, levels)
+    scale = make_scale_of_flight(situation, view, levels)
     whole = draw_outline(history.time, history.energy, _OVERVIEW)
     inner = history.between(view.start, view.end)
     time, energy = draw_outline(*inner, stretches=_STRETCHES)
@@ -160,8 +179,8 @@ def _flight(trade_off: TradeOff) -> dict[str, Any]:
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",
-        "error": _error_name(trade_off.offers),
-        "saved": _saved_name(trade_off.offers),
+        "error": _name_error(trade_off.offers),
+        "saved": _name_saving(trade_off.offers),
         "view": [view.start, view.end],
         "flight": [
             view.start if flight.start is None else flight.start,
@@ -170,19 +189,21 @@ def _flight(trade_off: TradeOff) -> dict[str, Any]:
         "heights": [scale.low, scale.high],
         "log": scale.logarithmic,
         "energy": [
-            _brief(time),
-            _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy),
+            _round_curve(time),
+            _round_curve(
+                np.maximum(energy, scale.low) if scale.logarithmic else energy
+            ),
         ],
-        "whole": [_brief(column) for column in whole],
-        "motion": _motion(situation),
+        "whole": [_round_curve(column) for column in whole],
+        "motion": _list_motion_curves(situation),
         "start": trade_off.offers.index(first),
-        **_table(trade_off, first, view),
+        **_build_offer_table(trade_off, first, view),
     }
 
 
-def _motion(situation: Situation) -> dict[str, Any] | None:
+def _list_motion_curves(situation: Situation) -> dict[str, Any] | None:
     """Return the curves from which the script composes the deformation, None if no oscillator is known."""
-    motion = response(situation)
+    motion = compute_response(situation)
     if motion is None:
         return None
     columns = {
@@ -191,17 +212,17 @@ def _motion(situation: Situation) -> dict[str, Any] | None:
         "release": motion.release,
     }
     return {
-        **{name: _brief(column) for name, column in columns.items()},
+        **{name: _round_curve(column) for name, column in columns.items()},
         "preload": motion.preload,
     }
 
 
-def _brief(values: Samples) -> list[float]:
+def _round_curve(values: Samples) -> list[float]:
     """Round the values of a curve to six digits."""
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
-def _table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
+def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
     """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
@@ -209,21 +230,26 @@ def _table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
     situation, unit = trade_off.situation, trade_off.situation.history.time_unit
     columns: dict[str, Callable[[Offer], Any]] = {
         "td": lambda offer: offer.td,
-        "tr": lambda offer: _short(offer.tr),
-        "level": lambda offer: _short(offer.energy_td),
-        "locked": lambda offer: _short(offer.best.energy if offer.best else None),
-        "deformation": lambda offer: _short(
-            locked_in(situation, offer.tr) if offer.basis == "oscillator" else None
+        "tr": lambda offer: _round_number(offer.tr),
+        "level": lambda offer: _round_number(offer.energy_td),
+        "locked": lambda offer: _round_number(
+            offer.best.energy if offer.best else None
         ),
-        "saved": lambda offer: _short(_saved(offer)),
-        "error": lambda offer: _short(offer.error),
-        "windows": lambda offer: _marked_columns(offer.answer.windows or (), view),
+        "deformation": lambda offer: _round_number(
+            compute_locked_in_deformation(situation, offer.tr)
+            if offer.basis == "oscillator"
+            else None
+        ),
+        "saved": lambda offer: _round_number(_compute_saved_percentage(offer)),
+        "error": lambda offer: _round_number(offer.error),
+        "windows": lambda offer: _mark_columns(offer.answer.windows or (), view),
         "peak": lambda offer: int(offer.peak),
         "unbeaten": lambda offer: int(offer.unbeaten),
     }
-    names, numbers = filled(columns, trade_off.offers)
+    names, numbers = fill_table(columns, trade_off.offers)
     texts = [
-        _texts(offer, first, f" {unit}" if unit else "") for offer in trade_off.offers
+        _list_texts(offer, first, f" {unit}" if unit else "")
+        for offer in trade_off.offers
     ]
     text_names = list(
         dict.fromkeys(name for row in texts for name, text in row.items() if text)
@@ -235,7 +261,7 @@ def _table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
     return {"numbers": names, "texts": text_names, "rows": rows}
 
 
-def _saved(offer: Offer) -> float | None:
+def _compute_saved_percentage(offer: Offer) -> float | None:
     """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
     share = offer.saving
     if offer.best and share is None:
@@ -243,7 +269,7 @@ def _saved(offer: Offer) -> float | None:
     return None if share is None else 100 * share
 
 
-def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
+def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
     """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without a window.
 
     The mask stays short however many windows noise makes, and it is finer than the screen.
@@ -262,19 +288,19 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
     return np.packbits(marked).tobytes().hex() if marked.any() else ""
 
 
-def _short(value: float | None) -> float | None:
+def _round_number(value: float | None) -> float | None:
     """Round a number that is only drawn."""
     return None if value is None else float(f"{value:.6g}")
 
 
-def _error_name(offers: Sequence[Offer]) -> str:
+def _name_error(offers: Sequence[Offer]) -> str:
     """Return the name of the error by which the offers are compared."""
     if all(offer.basis == "energy" for offer in offers):
         return "shortfall of the level at td"
     return "residual"
 
 
-def _saved_name(offers: Sequence[Offer]) -> str:
+def _name_saving(offers: Sequence[Offer]) -> str:
     """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
@@ -282,65 +308,69 @@ def _saved_name(offers: Sequence[Offer]) -> str:
     return "rigid, % of the simulated time"
 
 
-def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
+def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
     """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
     best = offer.best
     decision = offer.decision
     return {
-        "td": short(offer.td),
-        "tr": short(best.tr) if best else "none",
+        "td": format_short(offer.td),
+        "tr": format_short(best.tr) if best else "none",
         "exact_td": repr(offer.td),
         "exact_tr": repr(best.tr) if best else "none",
-        "level": short(offer.energy_td),
-        "kinetic": shown(offer.kinetic_share, ".3f"),
+        "level": format_short(offer.energy_td),
+        "kinetic": format_if_known(offer.kinetic_share, ".3f"),
         "verdict": decision and decision.verdict,
         "why": decision and decision.reason,
         "cure": decision and decision.cure,
         "reason": offer.answer.why_none,
-        **(_of_best(offer, best, unit) if best else {}),
-        "compared": _compared(offer, start, unit),
-        "said": _said(offer),
+        **(_list_texts_of_best(offer, best, unit) if best else {}),
+        "compared": _compare_offers(offer, start, unit),
+        "said": _format_for_screen_reader(offer),
     }
 
 
-def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
+def _list_texts_of_best(
+    offer: Offer, best: Candidate, unit: str
+) -> dict[str, str | None]:
     """Return the texts about the recommended tr."""
     kept_share = offer.answer.kept
     windows = offer.answer.windows
     return {
-        "residual": shown(best.residual, ".3f"),
+        "residual": format_if_known(best.residual, ".3f"),
         "after": None
         if kept_share is None
-        else f"{span_of(kept_share)} of the reference's",
-        "level_error": shown(
+        else f"{format_bounds(kept_share)} of the reference's",
+        "level_error": format_if_known(
             best.level_error if best.residual is None else None, ".3f"
         ),
-        "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
-        "run_time": None if best.run_time_share is None else saved(best.run_time_share),
+        "rigid": f"for {format_short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
+        "run_time": None
+        if best.run_time_share is None
+        else format_saved_share(best.run_time_share),
         "tolerance": None
         if best.timing_tolerance is None
         else f"±{best.timing_tolerance:.1e}{unit}",
-        "windows": acceptable(windows, best.tr) if windows else None,
+        "windows": describe_acceptable_windows(windows, best.tr) if windows else None,
     }
 
 
-def _said(offer: Offer) -> str:
+def _format_for_screen_reader(offer: Offer) -> str:
     """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
         return "nothing acceptable"
     if best.residual is not None:
-        return f"residual {measure(best.residual)}"
+        return f"residual {format_measure(best.residual)}"
     return offer.decision.verdict if offer.decision else ""
 
 
-def _compared(offer: Offer, start: Offer, unit: str) -> str:
+def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
     """Describe what an offer costs and gains compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td
     comparisons = [
-        f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"
+        f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {format_short(start.td)}{unit}"
     ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
@@ -359,6 +389,6 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         and (offer.basis == "energy") == (start.basis == "energy")
     ):
         comparisons.append(
-            f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}"
+            f"{_name_error([offer])} {format_measure(offer.error)} instead of {format_measure(start.error)}"
         )
     return ", ".join(comparisons)

@@ -35,7 +35,7 @@ class Kind(NamedTuple):
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
         """Return the fields with these ``keys``, or all fields, reading from the object that ``part`` returns."""
-        return [_in_part(self.field(key), part) for key in (keys or self.keys)]
+        return [_read_from_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:
         """Return a field by its key."""
@@ -63,7 +63,7 @@ class Field(NamedTuple):
 
     def of(self, thing: Any) -> Any:
         """Return the field's value of an object as JSON holds it."""
-        return kind_of(self.kind).plain(self.taken(thing))
+        return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
         """Return the field's value as the object holds it."""
@@ -74,7 +74,7 @@ class Field(NamedTuple):
         return getattr(thing, self.key)
 
 
-def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
+def _read_from_part(field: Field, part: Callable[[Any], Any]) -> Field:
     return field._replace(
         get=lambda thing: None if (inner := part(thing)) is None else field.taken(inner)
     )
@@ -115,7 +115,7 @@ def row(
     )
 
 
-def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
+def get_kind(kind: Kind | Name, **limits: Any) -> Kind:
     """Return a kind by its name, with limits in the words of JSON schema, such as ``minimum=0``."""
     named_kind = _KINDS[kind] if isinstance(kind, str) else kind
     if limits:
@@ -125,7 +125,7 @@ def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
 
 def maybe(kind: Kind | Name) -> Kind:
     """Return a kind that also allows None, for values that may be unknown."""
-    kind = kind_of(kind)
+    kind = get_kind(kind)
     schema = kind.schema
     if None in schema.get("enum", ()) or "null" in schema.get("type", ()):
         return kind
@@ -142,7 +142,7 @@ def maybe(kind: Kind | Name) -> Kind:
 
 def many(kind: Kind | Name) -> Kind:
     """Return the kind of an array of such values."""
-    item_kind = kind_of(kind)
+    item_kind = get_kind(kind)
     return Kind(
         {"type": "array", "items": item_kind},
         lambda values: [item_kind.plain(value) for value in values],
@@ -151,7 +151,7 @@ def many(kind: Kind | Name) -> Kind:
 
 def each(kind: Name) -> Kind:
     """Return the kind of an object with any keys whose values all have the given kind."""
-    return Kind({"type": "object", "additionalProperties": kind_of(kind)}, dict)
+    return Kind({"type": "object", "additionalProperties": get_kind(kind)}, dict)
 
 
 def one_of(*names: str) -> Kind:
@@ -221,16 +221,16 @@ class Document(NamedTuple):
         return tables.as_json(self.of(answer, command), indent)
 
 
-def csv_of(
+def write_csv(
     keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; "
 ) -> str:
     """Write rows as CSV with these columns; lists are joined in their cell."""
     return tables.as_csv(
-        keys, ([_cell(values[key], between) for key in keys] for values in rows)
+        keys, ([_make_cell(values[key], between) for key in keys] for values in rows)
     ).rstrip("\n")
 
 
-def _cell(value: Any, between: str) -> tables.Cell:
+def _make_cell(value: Any, between: str) -> tables.Cell:
     if isinstance(value, Mapping):
         value = [f"{count} {kind}" for kind, count in value.items()]
     return between.join(map(str, value)) if isinstance(value, (list, tuple)) else value

@@ -72,7 +72,7 @@ def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
 
-def shade(
+def mark_span(
     axes: Axes,
     span: Sequence[float],
     label: str,
@@ -95,7 +95,7 @@ def note(
     axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 
 
-def picture_format(name: str) -> str:
+def choose_picture_format(name: str) -> str:
     """Return the format for the suffix of ``name``; raise FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
@@ -108,15 +108,15 @@ def picture_format(name: str) -> str:
 def render(figure: figures.Figure, name: str) -> bytes:
     """Return the bytes of the file ``name`` in the format of its suffix; a figure always gives the same bytes."""
     content = io.BytesIO()
-    form = picture_format(name)
+    form = choose_picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
-    with mpl.rc_context({"svg.hashsalt": "d2rpick"}), any_letters():
+    with mpl.rc_context({"svg.hashsalt": "d2rpick"}), ignore_missing_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
     return content.getvalue()
 
 
 @contextmanager
-def any_letters() -> Iterator[None]:
+def ignore_missing_letters() -> Iterator[None]:
     """Draw letters that the font lacks as boxes, without a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
@@ -209,7 +209,7 @@ def mark_times(
             )
 
 
-def finish(axes: Axes, *, legend: bool = True) -> None:
+def format_axes(axes: Axes, *, legend: bool = True) -> None:
     """Draw the grid, limit the time axis to the data, and put the legend next to the axes.
 
     The power of ten of the numbers stands above them, clear of the labels of the switch times.
@@ -221,7 +221,7 @@ def finish(axes: Axes, *, legend: bool = True) -> None:
         axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
+def _collect_legend_entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     """Return the legend entries of several panels, each name once."""
     panel_entries = (
         zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
@@ -229,14 +229,14 @@ def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     return {name: handle for pairs in panel_entries for handle, name in pairs}
 
 
-def legend_below(
+def add_legend_below(
     figure: figures.Figure,
     panels: Sequence[Axes],
     columns: int = 4,
     size: str | None = "small",
 ) -> None:
     """Put one legend for all panels below them."""
-    if entries := _entries(panels):
+    if entries := _collect_legend_entries(panels):
         figure.legend(
             entries.values(),
             entries,
@@ -247,12 +247,12 @@ def legend_below(
         )
 
 
-def with_unit(name: str, unit: str) -> str:
+def add_unit(name: str, unit: str) -> str:
     """Return the label of an axis, with the unit if a file names one."""
-    return f"{name} [{plain(unit)}]" if unit else name
+    return f"{name} [{make_plain_text(unit)}]" if unit else name
 
 
-def plain(name: str) -> str:
+def make_plain_text(name: str) -> str:
     """Return a name from a file as plain text for matplotlib.
 
     A name may otherwise be read as a formula, or be hidden if it begins with an underscore.  Long names are cut off;
@@ -263,13 +263,13 @@ def plain(name: str) -> str:
     return f"{' ' if text.startswith('_') else ''}{text}".replace("$", r"\$")
 
 
-def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
+def place_panels(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
     """Put panels of one ``height`` [inch] below each other, and one legend for all of them below the last.
 
     Margins are measured once, from the numbers on the vertical axes; a layout engine would draw the figure three times.
     """
     FigureCanvasSVG(figure)
-    entries = _entries(panels)
+    entries = _collect_legend_entries(panels)
     foot = _BELOW + _LINE * ceil(len(entries) / _COLUMNS)
     full = _TOP + len(panels) * height + (len(panels) - 1) * _BETWEEN + foot
     figure.set_size_inches(PAGE_WIDTH, full)
@@ -311,7 +311,7 @@ def _place(
         )
 
 
-def svg_element(figure: figures.Figure, prefix: str) -> str:
+def render_svg_element(figure: figures.Figure, prefix: str) -> str:
     """Return a figure as an SVG element for a page, whose ids all begin with ``prefix``; text stays text.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
@@ -320,7 +320,7 @@ def svg_element(figure: figures.Figure, prefix: str) -> str:
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with (
         mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}),
-        any_letters(),
+        ignore_missing_letters(),
     ):
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(content, metadata=nothing)  # `Figure.savefig` draws it twice

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
+from d2rpick.choice.runs.study import (
+    StudyOfRuns,
+    StudyRow,
+    find_outliers,
+    format_number_of_runs,
+)
 from d2rpick.histories.samples import draw_outline
 from d2rpick.report import figures
 from d2rpick.report.figures import (
@@ -18,21 +23,21 @@ from d2rpick.report.figures import (
     STRETCHES,
     SWITCHED,
     Figure,
-    plain,
-    shade,
-    with_unit,
+    add_unit,
+    make_plain_text,
+    mark_span,
 )
 from d2rpick.report.figures_modal import draw_halfway, draw_residuals
-from d2rpick.report.situation import energy_name
-from d2rpick.report.study import short_names
+from d2rpick.report.situation import name_energy
+from d2rpick.report.study import shorten_names
 from d2rpick.report.view import (
-    Motion,
+    ReplayedMotion,
     View,
-    merged,
-    replayed_motion,
-    scale_in,
-    scale_of,
-    view_of,
+    make_scale,
+    make_scale_of_flight,
+    make_view_of_situation,
+    merge_windows,
+    replay_motion,
 )
 
 if TYPE_CHECKING:
@@ -40,13 +45,13 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.answers import Suggestion, Verdict
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.plan import Plan
-    from d2rpick.choice.sets_of_parts import Parts
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.answers import PairSuggestion, PairVerdict
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.sets_of_parts import Parts
+    from d2rpick.choice.switched.switched_run import Times
+    from d2rpick.choice.td.plan import RunPlan
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History, Samples
 
 
@@ -109,7 +114,7 @@ _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
 _LOWEST: Final = 50.0
 
 
-def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
+def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
     """Draw the energy in the flight with the target energy, the candidates or admissible windows, and the motion below.
 
     On a page a better pair is drawn in the same figure, since two figures would be nearly the same.
@@ -124,7 +129,7 @@ def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
     )
 
 
-def draw_verdict(answer: Verdict, *, page: bool = False) -> Figure:
+def draw_verdict(answer: PairVerdict, *, page: bool = False) -> Figure:
     """Draw the energy in the flight with the target energy and the judged pair; below it the motion after that pair.
 
     With a finished switched run, its energy is drawn over that of the reference instead of the motion of a model.
@@ -144,11 +149,11 @@ def _draw(
     page: bool = False,
 ) -> Figure:
     modelled = tr is not None and computed is None
-    motion = replayed_motion(situation, tr) if modelled and tr is not None else None
+    motion = replay_motion(situation, tr) if modelled and tr is not None else None
     modal = situation.basis == "modal" and modelled
     below = modal or motion is not None
     figure, panels = figures.begin(2 if below else 1, _HEIGHTS[below], page=page)
-    view = view_of(
+    view = make_view_of_situation(
         situation, *(() if tr is None else (tr,)), *(better[:2] if better else ())
     )
     _draw_energy(panels[0], situation, view, candidates, bands)
@@ -167,14 +172,14 @@ def _draw(
         _draw_motion(panels[1], motion)
     if better:
         _draw_better(panels, situation.at(better.td), better.tr)
-    panels[-1].set_xlabel(with_unit("time", situation.history.time_unit))
+    panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
     for panel in panels:
-        figures.finish(panel, legend=not page)
+        figures.format_axes(panel, legend=not page)
     # the level belongs to the flight, even if td lies beyond it
-    scale = scale_in(situation, view, [situation.energy_td])
+    scale = make_scale_of_flight(situation, view, [situation.energy_td])
     figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
-        figures.arrange(figure, panels, _PANELS[below])
+        figures.place_panels(figure, panels, _PANELS[below])
     figures.mark_times(panels, tr, situation.td, page=page)
     return figure
 
@@ -197,12 +202,19 @@ def _draw_energy(
         else:
             last_seen = situation.td
         end = last_seen if flight.end is None else flight.end
-        shade(axes, (flight.start, end), f"flight ({flight.source})")
-    axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
+        mark_span(axes, (flight.start, end), f"flight ({flight.source})")
+    axes.plot(
+        *drawn,
+        color=REFERENCE,
+        linewidth=1,
+        label=make_plain_text(name_energy(history)),
+    )
     axes.axhline(
         level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}"
     )
-    for number, band in enumerate(merged(bands, (view.end - view.start) / STRETCHES)):
+    for number, band in enumerate(
+        merge_windows(bands, (view.end - view.start) / STRETCHES)
+    ):
         label = "_" if number else "acceptable tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
     for acceptable, fill, name in (
@@ -235,14 +247,14 @@ def _draw_better(
     lines += [
         panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
     ]
-    motion = replayed_motion(better_situation, tr)
+    motion = replay_motion(better_situation, tr)
     if motion and len(panels) > 1:
         lines += panels[1].plot(motion.time, motion.switched)
     for line in lines:
         line.set(color=BETTER, linestyle="-.", linewidth=0.8, label="better pair")
 
 
-def _draw_motion(axes: Axes, motion: Motion) -> None:
+def _draw_motion(axes: Axes, motion: ReplayedMotion) -> None:
     for values, colour, name in (
         (motion.reference, REFERENCE, "without switching"),
         (motion.switched, SWITCHED, "switched"),
@@ -251,7 +263,7 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
     axes.set_ylabel("deformation [√energy]")
 
 
-def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
+def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     """Draw the energy over time, with the flights behind it and the rigid windows below it."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
@@ -264,7 +276,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
         label="internal energy",
     )
     for row in plan.flights:
-        shade(axes, (row.start, row.end), "flight")
+        mark_span(axes, (row.start, row.end), "flight")
         if row.window:
             axes.axvspan(
                 *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
@@ -272,7 +284,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
             )  # fmt: skip
             figures.note(
                 axes,
-                _window_label(row.number, row.window, span),
+                _label_window(row.number, row.window, span),
                 (sum(row.window) / 2, _STRIP),
                 (0, 2),
                 ha="center",
@@ -281,12 +293,12 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
     # below the energies only the windows are drawn
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
-    _zoom_into_flights(axes, plan)
-    _finish(figure, axes, with_unit("time", history.time_unit), page=page)
+    _show_flights(axes, plan)
+    _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=page)
     return figure
 
 
-def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
+def _show_flights(axes: Axes, plan: RunPlan) -> None:
     """Limit the time axis to the flights and a little before and after them."""
     if not plan.flights:
         return
@@ -297,7 +309,7 @@ def _zoom_into_flights(axes: Axes, plan: Plan) -> None:
     axes.set_xlim(max(first, start - beyond), min(last, end + beyond))
 
 
-def _window_label(number: int, window: Times, span: float) -> str:
+def _label_window(number: int, window: Times, span: float) -> str:
     """Return the number of a window, with its times if there is room for them."""
     tr, td = window
     if td - tr < _ROOM_FOR_TIMES * span:
@@ -321,10 +333,10 @@ def draw_run(
         label="energy",
     )
     for flight in flights:
-        shade(axes, flight, "flight")
+        mark_span(axes, flight, "flight")
     for window in windows:
         axes.axvspan(*window, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
-    _finish(figure, axes, with_unit("time", history.time_unit), page=True)
+    _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=True)
     return figure
 
 
@@ -336,21 +348,21 @@ def draw_parts(answer: Parts) -> Figure:
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     for at in energies.max(axis=0).argsort()[::-1][:_MOST_PARTS]:
         curve = draw_outline(time, energies[:, at], stretches=STRETCHES)
-        axes.plot(*curve, linewidth=1, label=plain(run.parts[at].name))
+        axes.plot(*curve, linewidth=1, label=make_plain_text(run.parts[at].name))
     for flight in answer.facts.flights:
-        shade(axes, flight, "flight")
-    _finish(figure, axes, "time", page=True)
+        mark_span(axes, flight, "flight")
+    _finish_run_axes(figure, axes, "time", page=True)
     return figure
 
 
-def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
+def _finish_run_axes(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
     """Label the axes of a whole run, and put the legend below."""
     axes.set(xlabel=time, ylabel="internal energy")
-    figures.finish(axes, legend=False)
+    figures.format_axes(axes, legend=False)
     if page:
-        figures.arrange(figure, [axes], _PLAN_PANEL)
+        figures.place_panels(figure, [axes], _PLAN_PANEL)
     else:
-        figures.legend_below(figure, [axes])
+        figures.add_legend_below(figure, [axes])
 
 
 def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
@@ -366,16 +378,16 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     by_energy = bool(trade_off.offers) and all(
         offer.basis == "energy" for offer in trade_off.offers
     )
-    _curve(error, trade_off, [offer.error for offer in trade_off.offers])
+    _draw_offers(error, trade_off, [offer.error for offer in trade_off.offers])
     error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
     saved = [offer.saving for offer in trade_off.offers]
     cost = any(offer is not None for offer in saved)
-    _curve(
+    _draw_offers(
         rigid,
         trade_off,
         saved if cost else [offer.rigid_time for offer in trade_off.offers],
     )
-    td = with_unit("td", history.time_unit)
+    td = add_unit("td", history.time_unit)
     rigid.set(
         ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None)
     )
@@ -388,16 +400,16 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
                 axes.axvline(
                     offer.td, color=colour, linewidth=1, linestyle="--", label=name
                 )
-        figures.finish(axes, legend=False)
+        figures.format_axes(axes, legend=False)
         axes.margins(x=_AT_EDGE)
     if page:
-        figures.arrange(figure, panels, _TRADE_PANEL)
+        figures.place_panels(figure, panels, _TRADE_PANEL)
     else:
-        figures.legend_below(figure, panels, size=None)
+        figures.add_legend_below(figure, panels, size=None)
     return figure
 
 
-def _curve(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
+def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
     """Draw one measure of all offers, with gaps where it is unknown, and mark the Pareto-optimal offers."""
     td = np.array([offer.td for offer in trade_off.offers])
     drawn = np.array([np.nan if value is None else value for value in values])
@@ -415,7 +427,7 @@ class _Named(NamedTuple):
     pattern: str
 
 
-def draw_study(answer: Study, *, page: bool = False) -> Figure:
+def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
     """Draw the energies of all runs around td, the tr of each run, the common tr, and td."""
     # the names next to the axes make the margins unknown, on a page too
     figure = Figure(
@@ -425,7 +437,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     axes = figure.subplots()
     drawn = {id(row): row.curve for row in answer.runs if row.curve is not None}
     runs = [row for row in answer.runs if id(row) in drawn]
-    named_runs = _named(runs, drawn)
+    named_runs = _choose_named_runs(runs, drawn)
     _draw_others(axes, [*drawn.values()], named_runs)
     for named_run in named_runs:
         axes.plot(
@@ -436,35 +448,37 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
             label="_",
         )
     if answer.common.window:
-        shade(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
+        mark_span(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
     _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
     axes.set(
-        xlabel=with_unit("time", units.pop() if len(units) == 1 else ""),
+        xlabel=add_unit("time", units.pop() if len(units) == 1 else ""),
         ylabel="internal energy",
     )
-    figures.finish(axes, legend=False)
+    figures.format_axes(axes, legend=False)
     _show_runs(axes, answer, runs, [*drawn.values()])
-    _name(axes, named_runs, page=page)
-    figures.legend_below(figure, [axes], columns=1 if page else 4)
+    _write_names(axes, named_runs, page=page)
+    figures.add_legend_below(figure, [axes], columns=1 if page else 4)
     figures.mark_times([axes], answer.common.tr, answer.td, page=page)
     return figure
 
 
-def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Named]:
+def _choose_named_runs(
+    runs: Sequence[StudyRow], curves: Mapping[int, Samples]
+) -> list[_Named]:
     """Return the runs with their own colour and name: all if there are few, else those that stand out."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:
-        chosen = list(outliers(runs))[:_MOST_OUTLIERS]
+        chosen = list(find_outliers(runs))[:_MOST_OUTLIERS]
     names = dict(
-        zip(map(id, runs), short_names([row.source for row in runs]), strict=True)
+        zip(map(id, runs), shorten_names([row.source for row in runs]), strict=True)
     )
     palette = _RUN_COLOURS if len(runs) <= _NAMED else _RUN_COLOURS[1:]
     return [
         _Named(
             curves[id(row)],
-            plain(names[id(row)]),
+            make_plain_text(names[id(row)]),
             palette[i % len(palette)],
             _PATTERNS[i // len(palette) % 2],
         )
@@ -485,7 +499,9 @@ def _draw_others(
         linewidths=0.6 if is_thin else 1,
         rasterized=is_thin,
         alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(other_curves)))),
-        label=f"internal energy of {runs_of(len(curves))}" if other_curves else "_",
+        label=f"internal energy of {format_number_of_runs(len(curves))}"
+        if other_curves
+        else "_",
     )
     axes.add_collection(lines)
     axes.autoscale_view()
@@ -503,7 +519,10 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
 
 
 def _show_runs(
-    axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]
+    axes: Axes,
+    answer: StudyOfRuns,
+    drawn: Sequence[StudyRow],
+    curves: Sequence[Samples],
 ) -> None:
     """Limit the axes to the time from shortly before the first tr to shortly after td; higher energies are cut off."""
     if not curves:
@@ -525,31 +544,33 @@ def _show_runs(
     )
     levels = np.array([row.energy_td for row in drawn if row.energy_td is not None])
     inner, visible_energies = (
-        np.concatenate([levels, *_energies(curves, *window)])
+        np.concatenate([levels, *_select_energies(curves, *window)])
         for window in ((early, td), span)
     )
     # keep the lowest level visible next to the median one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
-    scale = scale_of(float(inner.min()), float(inner.max()), level)
+    scale = make_scale(float(inner.min()), float(inner.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
-        scale = scale_of(0.0, max(float(curve[1].max()) for curve in curves), 0.0)
+        scale = make_scale(0.0, max(float(curve[1].max()) for curve in curves), 0.0)
     figures.show_span(
         axes, span, scale, [("highest run", float(visible_energies.max()))]
     )
 
 
-def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:
+def _select_energies(
+    curves: Sequence[Samples], start: float, end: float
+) -> Iterator[Samples]:
     """Return the energies of each curve from ``start`` to ``end``."""
     for time, energy in curves:
         yield energy[(start <= time) & (time <= end)]
 
 
-def _name(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
+def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
     """Write the names of runs next to the axes, in the order of their curves, each joined to its curve by a line."""
     end = axes.get_xlim()[1]
     free = 0.0
     runs_by_height = (
-        (_height(axes, float(np.interp(end, *named_run.curve))), named_run)
+        (_compute_height(axes, float(np.interp(end, *named_run.curve))), named_run)
         for named_run in named_runs
     )
     for height, named_run in sorted(runs_by_height, key=lambda pair: pair[0]):
@@ -575,7 +596,7 @@ def _name(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
         )
 
 
-def _height(axes: Axes, value: float) -> float:
+def _compute_height(axes: Axes, value: float) -> float:
     """Return the height of a value in the axes, 0 at the bottom and 1 at the top."""
     bottom, top = axes.get_ylim()
     value = min(max(value, bottom), top)

@@ -14,7 +14,7 @@ from d2rpick.vibration.model import NOTHING_KEPT
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
 
 
 def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from d2rpick.models.box_motion import CURB_THICKNESS, Sled
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, format_axes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.answers import Suggestion
+    from d2rpick.choice.answers import PairSuggestion
     from d2rpick.models.box_model import Parameters
     from d2rpick.models.box_run import Outcome, Record, RigidWindow
     from d2rpick.vibration.oscillator import Replay, Trajectory
@@ -52,7 +52,7 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
                 label="rigid",
                 linewidth=0,
             )
-        finish(axes)
+        format_axes(axes)
     return figure
 
 
@@ -101,7 +101,7 @@ def draw_rollover(
     for row in rows:
         grid[row].set_ylabel(units[row])
         _draw_times(grid[row], reference, windows)
-        finish(grid[row], legend=row in {"roll", "height"})
+        format_axes(grid[row], legend=row in {"roll", "height"})
     grid[rows[-1]].set_xlabel("time [s]")
     return figure
 
@@ -169,7 +169,7 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
 
 
 def draw_scan(
-    reference: Record, outcomes: Sequence[Outcome], answer: Suggestion
+    reference: Record, outcomes: Sequence[Outcome], answer: PairSuggestion
 ) -> Figure:
     """Draw the energy of the box with its level at td, and below it the errors of roll and mean energy against tr."""
     figure = Figure(figsize=(9, 8), layout="constrained")
@@ -226,7 +226,7 @@ def draw_scan(
                 linewidth=1,
                 label="recommended tr",
             )
-        finish(axes)
+        format_axes(axes)
     return figure
 
 

@@ -12,7 +12,15 @@ from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
+from d2rpick.report.fields import (
+    Document,
+    Field,
+    get_kind,
+    many,
+    one_of,
+    row,
+    write_csv,
+)
 from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules
 from d2rpick.rules.base import Finding, Severity, Unreadable, group_values
 from d2rpick.rules.rule import MAIN_DECK, Example, Rule
@@ -20,7 +28,7 @@ from d2rpick.rules.rule import MAIN_DECK, Example, Rule
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
 
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -36,10 +44,10 @@ _SARIF: Final = {
 }
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
 
-_LINE: Final = kind_of("integer", minimum=1)
+_LINE: Final = get_kind("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
-    Field("rule", kind_of("text", pattern="^D2R[0-9]{3}$")),
+    Field("rule", get_kind("text", pattern="^D2R[0-9]{3}$")),
     Field(
         "severity",
         one_of(*map(str, Severity)),
@@ -77,21 +85,24 @@ class Checks:
     fail_on: Severity = Severity.ERROR
 
 
-def as_table(checks: Checks, _: Shown) -> str:
+def as_table(checks: Checks, _: DisplayOptions) -> str:
     """Return the findings and windows of each deck, one per line, and their number, with the number of failed decks."""
     lines: list[str] = []
     for result in checks.results:
-        lines.append(_shown(result.deck, checks.root))
+        lines.append(_format_path(result.deck, checks.root))
         if not result.cards and not result.windows:
             lines.append("  no switching cards")
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
-        lines += [f"  {line}" for line in _window_lines(result.windows, checks.root)]
-        lines += [f"  {_line(finding)}" for finding in _findings(checks, result)]
-    return "\n".join([*map(make_printable, lines), "", _last_line(checks)])
+        lines += [f"  {line}" for line in _format_windows(result.windows, checks.root)]
+        lines += [
+            f"  {_format_finding(finding)}"
+            for finding in _list_findings(checks, result)
+        ]
+    return "\n".join([*map(make_printable, lines), "", _summarize_findings(checks)])
 
 
-def as_ndjson(checks: Checks, display: Shown) -> str:
+def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
     """Return a line of JSON per deck, each by the schema of the whole result."""
     deck_checks = (replace(checks, results=[result]) for result in checks.results)
     return "\n".join(
@@ -100,59 +111,61 @@ def as_ndjson(checks: Checks, display: Shown) -> str:
     )
 
 
-def as_csv(checks: Checks, _: Shown) -> str:
+def as_csv(checks: Checks, _: DisplayOptions) -> str:
     """Return CSV with one row per finding and a column for each key of ``findings`` in the JSON output."""
-    return csv_of(FINDING.keys, map(FINDING.plain, _findings(checks)))
+    return write_csv(FINDING.keys, map(FINDING.plain, _list_findings(checks)))
 
 
-def as_markdown(checks: Checks, _: Shown) -> str:
+def as_markdown(checks: Checks, _: DisplayOptions) -> str:
     """Return the findings as a Markdown table, and their number."""
-    rows = [list(FINDING.plain(finding).values()) for finding in _findings(checks)]
+    rows = [list(FINDING.plain(finding).values()) for finding in _list_findings(checks)]
     return "\n\n".join(
         [
             *([tables.as_markdown(FINDING.keys, rows)] if rows else []),
-            _last_line(checks),
+            _summarize_findings(checks),
         ]
     )
 
 
-def as_github(checks: Checks, _: Shown) -> str:
+def as_github(checks: Checks, _: DisplayOptions) -> str:
     """Return workflow commands that make GitHub Actions show the findings next to the lines of a deck."""
     annotations = [
-        f"::{_GITHUB[f.severity]} file={_escaped(f.file, ',:')},line={f.line},col={f.column},"
-        f"title={f.rule}::{_escaped(f.message)}"
-        for f in _findings(checks)
+        f"::{_GITHUB[f.severity]} file={_escape_for_github(f.file, ',:')},line={f.line},col={f.column},"
+        f"title={f.rule}::{_escape_for_github(f.message)}"
+        for f in _list_findings(checks)
     ]
     failed = (
-        (_shown(failed_deck.deck, checks.root), failed_deck.reason)
+        (_format_path(failed_deck.deck, checks.root), failed_deck.reason)
         for failed_deck in checks.failed
     )
     return "\n".join(
         [
             *annotations,
             *(
-                f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}"
+                f"::error file={_escape_for_github(deck, ',:')}::{_escape_for_github(reason)}"
                 for deck, reason in failed
             ),
         ]
     )
 
 
-def as_junit(checks: Checks, _: Shown) -> str:
+def as_junit(checks: Checks, _: DisplayOptions) -> str:
     """Return a suite per deck and a case per finding; findings lighter than ``fail_on`` pass but show their message."""
     from xml.etree import ElementTree as ET  # start-up
 
     suites = ET.Element("testsuites", name="d2rpick check")
 
     def begin(deck: str, **counts: int) -> tuple[ET.Element, str]:
-        name = _xml(_shown(deck, checks.root))
+        name = _escape_for_xml(_format_path(deck, checks.root))
         about = {"name": name, **{key: str(count) for key, count in counts.items()}}
         return ET.SubElement(suites, "testsuite", about), name
 
     for failed in checks.failed:
         suite, name = begin(failed.deck, tests=1, failures=0, errors=1)
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        ET.SubElement(case, "error", type=failed.code, message=_xml(failed.reason))
+        ET.SubElement(
+            case, "error", type=failed.code, message=_escape_for_xml(failed.reason)
+        )
     for result in checks.results:
         failing = [
             finding.severity.rank <= checks.fail_on.rank for finding in result.findings
@@ -162,28 +175,28 @@ def as_junit(checks: Checks, _: Shown) -> str:
         )
         if not failing:
             ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        for finding, fails in zip(_findings(checks, result), failing, strict=True):
+        for finding, fails in zip(_list_findings(checks, result), failing, strict=True):
             case = ET.SubElement(
                 suite,
                 "testcase",
-                name=_xml(f"{finding.rule} {_place(finding)}"),
+                name=_escape_for_xml(f"{finding.rule} {_format_location(finding)}"),
                 classname=name,
             )
             about = (
-                {"type": finding.rule, "message": _xml(finding.message)}
+                {"type": finding.rule, "message": _escape_for_xml(finding.message)}
                 if fails
                 else {}
             )
             ET.SubElement(
                 case, "failure" if fails else "system-out", about
-            ).text = _xml(_line(finding))
+            ).text = _escape_for_xml(_format_finding(finding))
     ET.indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(
         suites, encoding="unicode"
     )
 
 
-def as_sarif(checks: Checks, _: Shown) -> str:
+def as_sarif(checks: Checks, _: DisplayOptions) -> str:
     """Return SARIF 2.1.0 with all rules; their ids are stable."""
     ids = list(RULES)
     rules = [
@@ -202,17 +215,19 @@ def as_sarif(checks: Checks, _: Shown) -> str:
             "ruleIndex": ids.index(f.rule),
             "level": _SARIF[f.severity],
             "message": {"text": f.message},
-            "locations": _places(
+            "locations": _make_sarif_locations(
                 f.file, region={"startLine": f.line, "startColumn": f.column}
             ),
         }
-        for f in _findings(checks)
+        for f in _list_findings(checks)
     ]
     messages = [
         {
             "level": "error",
             "message": {"text": failed_deck.reason},
-            "locations": _places(_shown(failed_deck.deck, checks.root)),
+            "locations": _make_sarif_locations(
+                _format_path(failed_deck.deck, checks.root)
+            ),
         }
         for failed_deck in checks.failed
     ]
@@ -230,15 +245,15 @@ def as_sarif(checks: Checks, _: Shown) -> str:
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
-def _place(finding: Finding) -> str:
+def _format_location(finding: Finding) -> str:
     return f"{finding.file}:{finding.line}:{finding.column}"
 
 
-def _line(finding: Finding) -> str:
-    return f"{_place(finding)}: {finding.severity} {finding.rule} {finding.message}"
+def _format_finding(finding: Finding) -> str:
+    return f"{_format_location(finding)}: {finding.severity} {finding.rule} {finding.message}"
 
 
-def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
+def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
     """Return a line per window; windows with the same cards and times share one line."""
     alike = (
         ((window.cards, window.unit.kind, window.tr, window.td), window)
@@ -248,10 +263,10 @@ def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
         first = group[0]
         until = "the end" if first.td is None else f"{first.td:g}"
         names = name_units((window.unit.id for window in group), first.unit.kind)
-        yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(first.place.file, root)}:{first.place.line})"
+        yield f"{names}: rigid from {first.tr:g} to {until} ({_format_path(first.place.file, root)}:{first.place.line})"
 
 
-def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
+def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
     for result in checks.results:
         for window in result.windows:
             location = window.place
@@ -262,24 +277,24 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
                 "node": unit.id if unit.is_body else None,
                 "tr": window.tr,
                 "td": window.td,
-                "file": _shown(location.file, checks.root),
+                "file": _format_path(location.file, checks.root),
                 "line": location.line,
-                "deck": _shown(result.deck, checks.root),
+                "deck": _format_path(result.deck, checks.root),
             }
 
 
-def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
+def _list_findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
     """Return the findings in all decks, or in some ``results``, with displayed paths."""
     for finding in (
         finding for result in results or checks.results for finding in result.findings
     ):
         yield finding._replace(
-            file=_shown(finding.file, checks.root),
-            deck=_shown(finding.deck, checks.root),
+            file=_format_path(finding.file, checks.root),
+            deck=_format_path(finding.deck, checks.root),
         )
 
 
-def _warnings(checks: Checks) -> list[Caution]:
+def _list_warnings(checks: Checks) -> list[Caution]:
     """Return all warnings, including one for each deck that could not be read."""
     return [
         *checks.cautions,
@@ -294,31 +309,49 @@ DOCUMENT: Final = Document(
     "d2rpick/check/1",
     "Answer of d2rpick check; times in the unit of the deck, lines and columns from 1.",
     row(
-        keys.WARNINGS._replace(get=_warnings),
-        Field("decks", "texts", get=lambda checks: [_shown(result.deck, checks.root) for result in checks.results]),
-        Field("history", "texts?",
-              get=lambda checks: checks.history and [_shown(name, checks.root) for name in checks.history]),
-        Field("windows", many(_WINDOW), get=_windows),
-        Field("findings", many(FINDING), get=_findings),
-        Field("summary", row(*(Field(key, kind_of("integer", minimum=0)) for key in _COUNTS)),
-              get=lambda checks: {**_counts(checks.results), "decks": len(checks.results)}),
+        keys.WARNINGS._replace(get=_list_warnings),
+        Field(
+            "decks",
+            "texts",
+            get=lambda checks: [
+                _format_path(result.deck, checks.root) for result in checks.results
+            ],
+        ),
+        Field(
+            "history",
+            "texts?",
+            get=lambda checks: (
+                checks.history
+                and [_format_path(name, checks.root) for name in checks.history]
+            ),
+        ),
+        Field("windows", many(_WINDOW), get=_list_window_objects),
+        Field("findings", many(FINDING), get=_list_findings),
+        Field(
+            "summary",
+            row(*(Field(key, get_kind("integer", minimum=0)) for key in _COUNTS)),
+            get=lambda checks: {
+                **_count_severities(checks.results),
+                "decks": len(checks.results),
+            },
+        ),
     ),
-)  # fmt: skip
+)
 
 
-def _counts(results: Sequence[Checked]) -> dict[str, int]:
+def _count_severities(results: Sequence[Checked]) -> dict[str, int]:
     counted = Counter(
         finding.severity for result in results for finding in result.findings
     )
     return {f"{severity}s": counted[severity] for severity in Severity}
 
 
-def _last_line(checks: Checks) -> str:
+def _summarize_findings(checks: Checks) -> str:
     """Return the number of findings and decks, and what was not judged."""
     results = checks.results
     counted = [
         f"{count} {name if count != 1 else name[:-1]}"
-        for name, count in _counts(results).items()
+        for name, count in _count_severities(results).items()
     ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
@@ -326,7 +359,7 @@ def _last_line(checks: Checks) -> str:
     return f"{', '.join(counted)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
 
 
-def _shown(path: str, root: str) -> str:
+def _format_path(path: str, root: str) -> str:
     """Return a path for display: relative to ``root`` if it lies below it, with ``/``, undecodable bytes replaced."""
     if path == STDIN:
         return path
@@ -339,7 +372,7 @@ def _shown(path: str, root: str) -> str:
     return os.fsencode(displayed).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _places(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
+def _make_sarif_locations(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
     """Return a location in a file as SARIF defines it."""
     from urllib.parse import quote
 
@@ -347,25 +380,25 @@ def _places(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
     return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **keywords}}]
 
 
-def _escaped(text: str, separators: str = "") -> str:
+def _escape_for_github(text: str, separators: str = "") -> str:
     for letter in "%\r\n" + separators:
         text = text.replace(letter, f"%{ord(letter):02X}")
     return make_printable(text)
 
 
-def _xml(text: str) -> str:
+def _escape_for_xml(text: str) -> str:
     """Return the text in characters that XML 1.0 can write and a terminal shows."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
-def as_list() -> str:
+def list_rules() -> str:
     """Return id, severity and summary of every rule."""
     return "\n".join(
         f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values()
     )
 
 
-def explained_rules(names: Iterable[str], width: int) -> str:
+def explain_rules(names: Iterable[str], width: int) -> str:
     """Explain the rules with these ids or prefixes, and the warnings with these codes.
 
     Raises
@@ -373,39 +406,41 @@ def explained_rules(names: Iterable[str], width: int) -> str:
     ConfigurationError
         If there is no such rule or warning.
     """
-    return "\n\n\n".join(text for name in names for text in _explained(name, width))
+    return "\n\n\n".join(
+        text for name in names for text in _explain_matching_rules(name, width)
+    )
 
 
-def _explained(name: str, width: int) -> Iterator[str]:
+def _explain_matching_rules(name: str, width: int) -> Iterator[str]:
     """Explain the rules whose id begins with ``name``, or the warning with this code."""
     from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
 
     if name in EXPLANATIONS:
-        yield tables.wrapped(explain_warning(name), width)
+        yield tables.wrap_lines(explain_warning(name), width)
         return
     for rule in find_rules(name):
-        yield as_text(rule, width)
+        yield explain_rule(rule, width)
 
 
-def as_text(rule: Rule, width: int) -> str:
+def explain_rule(rule: Rule, width: int) -> str:
     """Explain one rule: what it finds, why that matters, and decks that pass and fail, as wide as their cards."""
     from textwrap import wrap  # not above: findings do without it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     explained = wrap(rule.explanation, width, break_on_hyphens=False)
-    lines = [tables.wrapped(title, width), "", *explained]
+    lines = [tables.wrap_lines(title, width), "", *explained]
     lines += ["", *wrap(f"Fix: {rule.fix}", width, break_on_hyphens=False)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
-            lines += ["", *_example(title, example, width)]
+            lines += ["", *_format_example(title, example, width)]
     return "\n".join(lines)
 
 
-def _example(title: str, example: Example, width: int) -> Iterator[str]:
+def _format_example(title: str, example: Example, width: int) -> Iterator[str]:
     """Return the lines of an example deck, of its included files, and of the files that it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
-        yield tables.continued(
+        yield tables.wrap_command(
             f"  d2rpick {example.computed_by} {example.history} -o energy.csv", width
         )
         yield (

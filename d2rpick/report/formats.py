@@ -34,7 +34,7 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 }
 
 
-class Shown(NamedTuple):
+class DisplayOptions(NamedTuple):
     """What to show besides the answer: the command, the number of rows, lines already written.
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
@@ -49,7 +49,7 @@ class Shown(NamedTuple):
     width: int = WIDEST
 
 
-def write(result: str, form: str, answer: Any, display: Shown) -> str:
+def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
     """Write an answer in one of the forms of its result: by ``as_FORM`` of its module, JSON by its ``DOCUMENT``.
 
     Examples
@@ -57,10 +57,14 @@ def write(result: str, form: str, answer: Any, display: Shown) -> str:
     >>> list(FORMATS["suggestion"])
     ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
-    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, display)
+    return write_by_module(
+        import_module(f"d2rpick.report.{result}"), form, answer, display
+    )
 
 
-def written_by(report: Any, form: str, answer: Any, display: Shown) -> str:
+def write_by_module(
+    report: Any, form: str, answer: Any, display: DisplayOptions
+) -> str:
     """Write an answer in a form that the module ``report`` provides."""
     if write_form := getattr(report, f"as_{form}", None):
         return str(write_form(answer, display))

@@ -22,7 +22,7 @@ TABLES: Final = ("csv", "hdf5")  # formats that hold columns with any names
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 
-def format_of(name: str | None, formats: Sequence[str]) -> str:
+def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     """Return the format for a file name: csv without a name; raise FormatError if the name does not determine one.
 
     The suffix decides.  A name without a known suffix must be or contain the name of a solver's database.
@@ -30,7 +30,7 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
     Examples
     --------
     >>> every = ("csv", "hdf5", "glstat", "matsum")
-    >>> [format_of(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
+    >>> [choose_history_format(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
     ['csv', 'glstat', 'hdf5', 'csv']
     """
     from pathlib import PurePath  # not above: start-up
@@ -52,7 +52,7 @@ def write_table(form: str, columns: Table) -> bytes:
     return cast("bytes", load_reader(form).write(columns))  # type: ignore[attr-defined]
 
 
-def _oscillator_table(motion: Trajectory) -> Table:
+def _make_oscillator_table(motion: Trajectory) -> Table:
     """Return the columns time z y vz vy internal_energy kinetic_energy."""
     state = motion.state
     return {
@@ -61,7 +61,7 @@ def _oscillator_table(motion: Trajectory) -> Table:
     }  # fmt: skip
 
 
-def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
+def _make_oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
     """Return a glstat with the energies of the oscillator; its time step is the output interval."""
     step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
     internal = motion.internal_energy
@@ -73,7 +73,7 @@ def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
     return glstat.write("floating oscillator", columns)
 
 
-def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
+def _make_oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
     """Return a matsum of the parts frame, suspended mass and spring with their energies and momenta."""
     frame = oscillator.frame_mass
     suspended = oscillator.mass
@@ -95,7 +95,7 @@ def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
     return matsum.write("floating oscillator", motion.time, parts)
 
 
-def _box_table(record: Record) -> Table:
+def _make_box_table(record: Record) -> Table:
     """Return the columns of the box, the momentum of box and step together, and the energy balance of the model.
 
     Internal and kinetic energy are those of the box, so that switch times of the box can be chosen from them.  Separate
@@ -117,7 +117,7 @@ def _box_table(record: Record) -> Table:
     }  # fmt: skip
 
 
-def _box_glstat(record: Record) -> bytes:
+def _make_box_glstat(record: Record) -> bytes:
     """Return a glstat of box and step: energies, work exchanged with sled, curb and ground, and the mean velocity.
 
     The rigid walls of the model are floor, curb and ground, see `Record`.  Friction on them is part of the contact
@@ -140,7 +140,7 @@ def _box_glstat(record: Record) -> bytes:
     )  # fmt: skip
 
 
-def _box_matsum(record: Record) -> bytes:
+def _make_box_matsum(record: Record) -> bytes:
     """Return a matsum of box and step; while the box is rigid, its values are those of the rigid-body motion."""
     from d2rpick.models.box_run import (
         PARTS,
@@ -157,7 +157,7 @@ def _box_matsum(record: Record) -> bytes:
     )
 
 
-def _writers(
+def _list_writers(
     table: Callable[..., Table],
     glstat: Callable[..., bytes],
     matsum: Callable[..., bytes],
@@ -170,7 +170,7 @@ def _writers(
     return {**tables, "glstat": glstat, "matsum": matsum}
 
 
-OSCILLATOR_WRITERS: Final = _writers(
-    _oscillator_table, _oscillator_glstat, _oscillator_matsum
+OSCILLATOR_WRITERS: Final = _list_writers(
+    _make_oscillator_table, _make_oscillator_glstat, _make_oscillator_matsum
 )
-BOX_WRITERS: Final = _writers(_box_table, _box_glstat, _box_matsum)
+BOX_WRITERS: Final = _list_writers(_make_box_table, _make_box_glstat, _make_box_matsum)

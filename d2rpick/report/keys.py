@@ -7,23 +7,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.report.fields import Field, kind_of, many, maybe, one_of, row
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.report.fields import Field, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.plan import Plan
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import Weights
+    from d2rpick.choice.td.plan import RunPlan
 
-SHARE: Final = kind_of("number", minimum=0, maximum=1)
+SHARE: Final = get_kind("number", minimum=0, maximum=1)
 BASIS: Final = one_of(*MODELS)
 KIND: Final = one_of("crossing", "start", "extremum", "match")
 
 WARNING: Final = row(
-    Field("code", kind_of("text", pattern="^[a-z0-9-]+$")),
+    Field("code", get_kind("text", pattern="^[a-z0-9-]+$")),
     Field("message", "text"),
     name="warning",
 )
@@ -46,13 +46,13 @@ WEIGHTS: Final = (
     Field("sha256", "text?", "of that file", lambda weights: weights.file.sha256() if weights.file else None),
 )  # fmt: skip
 HISTORY: Final = row(
-    Field("source", kind_of("texts", minItems=1)),
-    Field("sha256", many(kind_of("text", pattern="^[0-9a-f]{64}$")), "of each source, in its order",
+    Field("source", get_kind("texts", minItems=1)),
+    Field("sha256", many(get_kind("text", pattern="^[0-9a-f]{64}$")), "of each source, in its order",
           lambda history: [file.sha256() for file in history.files]),
     Field("format", "text"),
     Field("channel", "text", "what was taken for the internal energy"),
     Field("parts", maybe(many(PART)), "whose energies were added, null for the whole model or columns"),
-    Field("states", kind_of("integer", minimum=3), get=lambda history: int(history.time.size)),
+    Field("states", get_kind("integer", minimum=3), get=lambda history: int(history.time.size)),
     Field("time_start", "number", get=lambda history: float(history.time[0])),
     Field("time_end", "number", get=lambda history: float(history.time[-1])),
     Field("complete", "flag", "false when the input ends within a state"),
@@ -110,7 +110,7 @@ _POSITION: Final = (
 )  # fmt: skip
 # Values of a candidate besides its parts; in CSV the notes come last. Add a new measure at the end.
 CANDIDATE: Final = row(
-    Field("rank", kind_of("integer", minimum=1)),
+    Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
     Field("kind", KIND),
     Field("energy", "number"),
@@ -121,8 +121,8 @@ CANDIDATE: Final = row(
     Field("lock_in_error", "size?"),
     Field("residual", "size?"),
     Field("part_mismatch", "size?"),
-    Field("rigid_time", kind_of("number", exclusiveMinimum=0)),
-    Field("rigid_fraction", kind_of("number", exclusiveMinimum=0, maximum=1)),
+    Field("rigid_time", get_kind("number", exclusiveMinimum=0)),
+    Field("rigid_fraction", get_kind("number", exclusiveMinimum=0, maximum=1)),
     Field("timing_tolerance", "size?"),
     Field("tr_low", "number?"),
     Field("tr_high", "number?"),
@@ -198,7 +198,7 @@ DECIDED: Final = row(
     Field("cure", "text", "what would make it better, in words; empty for a good pair"),
     Field("expected_after_td", "text", "what is expected after td, in words", lambda decision: decision.expected),
     Field("worst_case", "text", "the worst that the record allows after td, in words"),
-    Field("worst_residual", kind_of("number", minimum=0),
+    Field("worst_residual", get_kind("number", minimum=0),
           "the largest residual that the record allows; 2 if nothing is known of it"),
 )  # fmt: skip
 # the same values for a result whose decision may be None
@@ -238,7 +238,7 @@ QUALITY: Final = (
 )  # fmt: skip
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),
-    Field("resting_energy", kind_of("number", minimum=0), "lowest energy in the flight: what does not vibrate"),
+    Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: what does not vibrate"),
     Field("kinetic_share", SHARE),
     Field("ratio", "size?", "mean energy after td over the reference's, for the recommended tr"),
     Field("ratio_low", "size?", "the same if nothing is at rest"),
@@ -276,48 +276,50 @@ class Read(Protocol):
         """Return the SHA-256 digest of the content."""
 
 
-def _once(files: Iterable[Read]) -> dict[str, Read]:
+def _list_files_once(files: Iterable[Read]) -> dict[str, Read]:
     """Return the files by name; a file that is included twice occurs once."""
     return {file.name: file for file in files}
 
 
 FILES: Final = (
-    Field("source", "texts", get=lambda answer: _once(answer.files)),
+    Field("source", "texts", get=lambda answer: _list_files_once(answer.files)),
     Field(
         "sha256",
         "texts",
-        get=lambda answer: [file.sha256() for file in _once(answer.files).values()],
+        get=lambda answer: [
+            file.sha256() for file in _list_files_once(answer.files).values()
+        ],
     ),
 )
 
 
-def _asked(answer: Any) -> Plan | Situation:
+def _get_history_holder(answer: Any) -> RunPlan | Situation:
     """Return the plan or situation of an answer, which holds the history and the settings."""
-    holder: Plan | Situation = (
+    holder: RunPlan | Situation = (
         answer if hasattr(answer, "settings") else answer.situation
     )
     return holder
 
 
-def _weights(answer: Any) -> Weights | None:
-    used = _asked(answer).settings.by_deck
+def _get_weights(answer: Any) -> Weights | None:
+    used = _get_history_holder(answer).settings.by_deck
     return used.weights if used else None
 
 
 # fields with which the JSON of every answer about a history begins
 FRAME: Final = (
     WARNINGS,
-    Field("history", HISTORY, get=lambda answer: _asked(answer).history),
+    Field("history", HISTORY, get=lambda answer: _get_history_holder(answer).history),
     Field("deck", maybe(row(*FILES, closed=True)),
           "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
           "nothing of it is used",
-          lambda answer: _asked(answer).settings.by_deck),
+          lambda answer: _get_history_holder(answer).settings.by_deck),
     Field("weights", maybe(row(*WEIGHTS, closed=True)),
-          "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
+          "the cost of elements that the run time rests on; null where it does not rest on any", _get_weights),
 )  # fmt: skip
 
 
-def _oscillator(situation: Situation) -> dict[str, Any] | None:
+def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
     """Return the oscillator that was fitted, or None if none was searched for."""
     fit = situation.evidence.fit
     if fit is None:
@@ -332,7 +334,7 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
     }
 
 
-def _modes(situation: Situation) -> list[dict[str, float]] | None:
+def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
     """Return the modes on which the choice rests, or None if it does not rest on modes."""
     modal = situation.vibration.modal
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
@@ -347,9 +349,9 @@ MECHANICS: Final = row(
           lambda now: now.vibration.estimated is not None),
     Field("basis", BASIS),
     Field("flight", FLIGHT, "window of free flight"),
-    Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
+    Field("oscillator", maybe(OSCILLATOR), get=_get_oscillator),
     Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
+          "those that basis modal was identified from, by their rates; null on any other basis", _get_modes),
     Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
           "parts whose deformation has no sign; null where energies of single parts are not known",
           lambda now: now.evidence.parts and now.evidence.parts.unsigned),

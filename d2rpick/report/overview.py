@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
-from d2rpick.report.situation import head, measures_of, spoken
+from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
+from d2rpick.report.situation import (
+    list_health_columns,
+    list_health_measures,
+    name_evidence,
+)
 
 if TYPE_CHECKING:
     from d2rpick.choice.overview import ForceOverview, Overview
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
 _EVIDENCE: Final = one_of(
     "momentum",
@@ -49,17 +53,17 @@ _PART: Final = row(
 )
 _SAMPLING: Final = row(
     *(
-        Field(key, kind_of("number", exclusiveMinimum=0))
+        Field(key, get_kind("number", exclusiveMinimum=0))
         for key in ("min", "median", "max")
     )
 )
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
-    Field("source", kind_of("texts", minItems=1)),
+    Field("source", get_kind("texts", minItems=1)),
     Field("format", "text", "formats of companions joined by ' + '"),
     Field("version", "text", "of the solver, empty where no file names it"),
     Field("title", "text"),
-    Field("states", maybe(kind_of("integer", minimum=0)),
+    Field("states", maybe(get_kind("integer", minimum=0)),
           "null where several columns may be the time; then, and at 0, the times are null"),
     Field("time_start", "number?"), Field("time_end", "number?"),
     Field("time_unit", "text", "empty where no file names it"),
@@ -92,26 +96,32 @@ _PLAIN = (
 )
 
 
-def as_table(overview: Overview, display: Shown) -> str:
+def as_table(overview: Overview, display: DisplayOptions) -> str:
     """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
-    lines = tables.in_line(verdict(overview))
-    if overview.health and (health := _health(overview)):
-        lines += ["", tables.as_text(head(overview.health), health, display.width)]
+    lines = tables.format_in_line(list_verdict_lines(overview))
+    if overview.health and (health := _list_health_rows(overview)):
+        lines += [
+            "",
+            tables.as_text(list_health_columns(overview.health), health, display.width),
+        ]
     known_facts = [
-        (name, value) for name, value in facts(overview) if value is not None
+        (name, value) for name, value in list_facts(overview) if value is not None
     ]
-    lines += ["", *tables.in_line(known_facts)]
+    lines += ["", *tables.format_in_line(known_facts)]
     if overview.parts:
-        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), display.width)]
+        lines += [
+            "",
+            tables.as_text(_PARTS_HEAD, _list_part_rows(overview), display.width),
+        ]
     return "\n".join(
         [*lines, *(f"note: {make_printable(note)}" for note in overview.notes)]
     )
 
 
-def verdict(overview: Overview) -> list[tuple[str, str]]:
+def list_verdict_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
     lines = [("this run", overview.verdict), ("why", overview.reason)]
-    lines += [("flight", _flight(*flight)) for flight in overview.flights]
+    lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         cure = None if overview.unjudged else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
@@ -120,24 +130,24 @@ def verdict(overview: Overview) -> list[tuple[str, str]]:
         which = ["--part", "flying"]
     else:
         which = ["--part", "all"] if overview.parts else []
-    command = ["d2rpick", "plan", *which, *tables.positional(overview.source)]
-    return [*lines, ("next", tables.shell_line(command))]
+    command = ["d2rpick", "plan", *which, *tables.make_positional(overview.source)]
+    return [*lines, ("next", tables.quote_shell_line(command))]
 
 
-def as_markdown(overview: Overview, _: Shown) -> str:
+def as_markdown(overview: Overview, _: DisplayOptions) -> str:
     """Return the facts and the parts as Markdown tables, with the notes below."""
-    verdict_lines = tables.listed(verdict(overview))
+    verdict_lines = tables.format_as_list(list_verdict_lines(overview))
     known_facts = [
-        (name, value) for name, value in facts(overview) if value is not None
+        (name, value) for name, value in list_facts(overview) if value is not None
     ]
     fact_table = tables.as_markdown(("what", "value"), known_facts)
     if overview.parts:
-        parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))]
+        parts = [tables.as_markdown(_PARTS_HEAD, _list_part_rows(overview))]
     else:
         parts = []
-    listed = _health(overview)
+    listed = _list_health_rows(overview)
     if overview.health and listed:
-        health = [tables.as_markdown(head(overview.health), listed)]
+        health = [tables.as_markdown(list_health_columns(overview.health), listed)]
     else:
         health = []
     return "\n\n".join(
@@ -146,12 +156,12 @@ def as_markdown(overview: Overview, _: Shown) -> str:
             fact_table,
             *parts,
             *health,
-            *(f"* {tables.in_markdown(note)}" for note in overview.notes),
+            *(f"* {tables.escape_markdown(note)}" for note in overview.notes),
         ]
     )
 
 
-def as_csv(overview: Overview, _: Shown) -> str:
+def as_csv(overview: Overview, _: DisplayOptions) -> str:
     """Return one row of CSV with a column for each key of the JSON output; lists are joined by semicolons."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {
@@ -166,20 +176,21 @@ def as_csv(overview: Overview, _: Shown) -> str:
             f"{overview_part.part.id} {overview_part.part.title}".rstrip()
             for overview_part in overview.parts
         ),
-        "flights": "; ".join(_flight(*flight) for flight in overview.flights),
+        "flights": "; ".join(_format_flight(*flight) for flight in overview.flights),
         "should_write": overview.should_write,
         "health": "; ".join(
-            f"{measure_name} {value}" for measure_name, value, *_ in _health(overview)
+            f"{measure_name} {value}"
+            for measure_name, value, *_ in _list_health_rows(overview)
         ),
         "notes": "; ".join(overview.notes),
         "verdict": overview.verdict,
         "verdict_reason": overview.reason,
-        "contact_forces": "; ".join(map(_force, overview.contact_forces)),
+        "contact_forces": "; ".join(map(_format_force, overview.contact_forces)),
     }
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
 
-def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
+def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
     """Return each fact as a pair of its name and value."""
     sampling = overview.sampling
     rows: list[tuple[str, tables.Cell]] = [
@@ -197,13 +208,15 @@ def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("complete", overview.complete),
         ("channels", ", ".join(overview.channels) or None),
     ]
-    rows += [("contact force", _force(force)) for force in overview.contact_forces]
+    rows += [
+        ("contact force", _format_force(force)) for force in overview.contact_forces
+    ]
     if overview.should_write:
         rows.append(("should write", overview.should_write))
     return rows
 
 
-def _health(overview: Overview) -> list[list[tables.Cell]]:
+def _list_health_rows(overview: Overview) -> list[list[tables.Cell]]:
     """Return the health measures that the files contain, with the limits of good practice."""
     if overview.health is None:
         return []
@@ -215,30 +228,30 @@ def _health(overview: Overview) -> list[list[tables.Cell]]:
             health_measure.limit,
             verdicts[health_measure.good],
         ]
-        for health_measure in measures_of(overview.health)
+        for health_measure in list_health_measures(overview.health)
         if health_measure.value
     ]
 
 
-def _parts(overview: Overview) -> list[list[tables.Cell]]:
+def _list_part_rows(overview: Overview) -> list[list[tables.Cell]]:
     return [
         [overview_part.part.id, overview_part.part.title, overview_part.energy_max]
         for overview_part in overview.parts
     ]
 
 
-def _force(force: ForceOverview) -> str:
+def _format_force(force: ForceOverview) -> str:
     """Return the name of a contact and the times in which it acts."""
     times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
     when = f"acts from {list_names(times, most=_MOST_TIMES)}" if times else "never acts"
     return f"{force.name} {when}"
 
 
-def _flight(source: str, flight: FreeFlight) -> str:
+def _format_flight(source: str, flight: FreeFlight) -> str:
     names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
     flying = ", ".join(names) or "the whole model"
     if flight.end_seen:
         end = f"to {flight.end:.6g}"
     else:
         end = f"to the end of the record, {flight.end:.6g}"
-    return f"{flying} from {flight.start:.6g} {end} ({spoken(source)})"
+    return f"{flying} from {flight.start:.6g} {end} ({name_evidence(source)})"

@@ -12,25 +12,25 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
-from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.report.decision import headed
-from d2rpick.report.situation import heading, measures_of
-from d2rpick.report.tables import Cell, shell_line, short
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.report.decision import list_verdict_lines
+from d2rpick.report.situation import list_health_measures, list_situation_heading
+from d2rpick.report.tables import Cell, format_short, quote_shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.base.errors import Caution
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.cost import Weights
-    from d2rpick.choice.decision import Decision
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History
-    from d2rpick.histories.opening import Run
+    from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
 # tables with more columns do not fit on a narrow screen
@@ -58,18 +58,18 @@ class Markup(str):
     __slots__ = ()
 
 
-def tag(name: str, /, *children: str, **attributes: str) -> Markup:
+def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
     """Return an element; attributes like Python keywords end in an underscore, and ``_`` stands for ``-`` in names.
 
     Examples
     --------
-    >>> tag("p", "a < b, ", tag("b", "bold"), class_="note")
+    >>> make_element("p", "a < b, ", make_element("b", "bold"), class_="note")
     '<p class="note">a &lt; b, <b>bold</b></p>'
-    >>> tag("meta", charset="utf-8")
+    >>> make_element("meta", charset="utf-8")
     '<meta charset="utf-8">'
     """
     written_attributes = "".join(
-        f' {key.rstrip("_").replace("_", "-")}="{_escape(text)}"'
+        f' {key.rstrip("_").replace("_", "-")}="{_replace_markup(text)}"'
         for key, text in attributes.items()
     )
     return Markup(
@@ -83,13 +83,13 @@ def join(children: Iterable[str], between: str = "") -> Markup:
     """Join elements and texts into one."""
     return Markup(
         between.join(
-            child if isinstance(child, Markup) else _escape(child, quote=False)
+            child if isinstance(child, Markup) else _replace_markup(child, quote=False)
             for child in children
         )
     )
 
 
-def document(
+def build_document(
     title: str,
     *content: str,
     signed: Sequence[str],
@@ -100,37 +100,41 @@ def document(
 
     ``styles`` and ``scripts`` are needed besides the style of every page; the policy of the page blocks all others.
     """
-    sheets = (resource("style.css"), *styles)
-    head = tag(
+    sheets = (read_resource("style.css"), *styles)
+    head = make_element(
         "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag(
+        make_element("meta", charset="utf-8"),
+        make_element(
+            "meta", name="viewport", content="width=device-width, initial-scale=1"
+        ),
+        make_element(
             "meta",
             http_equiv="Content-Security-Policy",
-            content=_policy(sheets, scripts),
+            content=_make_policy(sheets, scripts),
         ),
-        tag("title", title),
-        *(tag("style", sheet) for sheet in sheets),
+        make_element("title", title),
+        *(make_element("style", sheet) for sheet in sheets),
     )
     # at the top, next to the times: after a long card it could be printed on a sheet of its own
-    sign = tag("p", *(tag("span", line) for line in signed), class_="sign")
-    header = tag(
+    sign = make_element(
+        "p", *(make_element("span", line) for line in signed), class_="sign"
+    )
+    header = make_element(
         "header",
-        tag("h1", title),
-        tag("p", f"d2rpick {__version__}", class_="soft"),
+        make_element("h1", title),
+        make_element("p", f"d2rpick {__version__}", class_="soft"),
         sign,
     )
-    body = tag(
+    body = make_element(
         "body",
         header,
-        tag("main", *content),
-        *(tag("script", script) for script in scripts),
+        make_element("main", *content),
+        *(make_element("script", script) for script in scripts),
     )
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    return f"<!DOCTYPE html>\n{make_element('html', head, body, lang='en')}\n"
 
 
-def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
+def _make_policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     """Return the content security policy: nothing is fetched, and only the page's own scripts and styles are used.
 
     This holds whatever the input files contain.  Drawings have their styles as attributes.  Older browsers know only
@@ -138,7 +142,7 @@ def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     """
     allowed = {"style-src-elem": styles, "script-src": scripts}
     rules = [
-        f"{name} {' '.join(map(_digest, texts)) or _NOTHING}"
+        f"{name} {' '.join(map(_compute_digest, texts)) or _NOTHING}"
         for name, texts in allowed.items()
     ]
     base = f"default-src {_NOTHING}; base-uri {_NOTHING}; form-action {_NOTHING}"
@@ -147,55 +151,61 @@ def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     )
 
 
-def _digest(text: str) -> str:
+def _compute_digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def section(title: str, *content: str) -> Markup:
+def build_section(title: str, *content: str) -> Markup:
     """Return a section with a title."""
-    return tag("section", tag("h2", title), *content)
+    return make_element("section", make_element("h2", title), *content)
 
 
-def drawing(caption: str, svg: str) -> Markup:
+def build_drawing(caption: str, svg: str) -> Markup:
     """Return an SVG element with its caption."""
-    drawn = tag("div", Markup(svg), role="img", aria_label=caption)
-    return tag("figure", drawn, tag("figcaption", caption), class_="drawn")
+    drawn = make_element("div", Markup(svg), role="img", aria_label=caption)
+    return make_element(
+        "figure", drawn, make_element("figcaption", caption), class_="drawn"
+    )
 
 
-def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
+def build_remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
     """Return a list of reasons and warnings, nothing if there are none."""
-    lines = [tag("li", reason) for reason in reasons]
+    lines = [make_element("li", reason) for reason in reasons]
     lines += [
-        tag("li", tag("b", caution.code), f": {caution.message}")
+        make_element("li", make_element("b", caution.code), f": {caution.message}")
         for caution in cautions
     ]
-    return tag("ul", *lines, class_="warnings") if lines else Markup()
+    return make_element("ul", *lines, class_="warnings") if lines else Markup()
 
 
-def resource(name: str) -> Markup:
+def read_resource(name: str) -> Markup:
     """Read a text file of the package."""
     return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))
 
 
-def table(
+def build_scrolling_table(
     title: str,
     head: Sequence[str],
     rows: Iterable[Sequence[Cell]],
     marked: int | None = None,
 ) -> Markup:
     """Return a table in a box that scrolls sideways if needed; keyboard users reach it by its ``title``."""
-    box = tag(
+    box = make_element(
         "div",
-        grid(head, rows, marked),
+        build_grid(head, rows, marked),
         class_="scroll",
         role="region",
         aria_label=title,
         tabindex="0",
     )
-    return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
+    return (
+        join([make_element("p", _HINT, class_="hint"), box])
+        if len(head) > _FIT
+        else box
+    )
 
 
-def grid(
+def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
     """Return a bare table in which the row ``marked`` is highlighted.
@@ -210,37 +220,44 @@ def grid(
     ]
     classes = [{"class_": "number"} if is_right else {} for is_right in is_number]
     top = (
-        tag("th", name, scope="col", **cell_class)
+        make_element("th", name, scope="col", **cell_class)
         for name, cell_class in zip(head, classes, strict=True)
     )
     lines = [
-        tag(
+        make_element(
             "tr",
             *(
-                _cell(cell, cell_class)
+                _build_cell(cell, cell_class)
                 for cell, cell_class in zip(row, classes, strict=True)
             ),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
     ]
-    return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
+    return make_element(
+        "table",
+        make_element("thead", make_element("tr", *top)),
+        make_element("tbody", *lines),
+    )
 
 
-def _cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
-    text = cell if isinstance(cell, Markup) else short(cell)
-    return tag(
+def _build_cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
+    text = cell if isinstance(cell, Markup) else format_short(cell)
+    return make_element(
         "td", text, **(attributes or ({"class_": "words"} if " " in text else {}))
     )
 
 
-def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
+def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
     """Return a list of names and descriptions, nothing if there are none."""
-    listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
-    return tag("dl", *listed) if listed else Markup()
+    listed = [
+        make_element("div", make_element("dt", name), make_element("dd", text))
+        for name, text in rows
+    ]
+    return make_element("dl", *listed) if listed else Markup()
 
 
-def _escape(text: str, *, quote: bool = True) -> str:
+def _replace_markup(text: str, *, quote: bool = True) -> str:
     return escape(text, quote=quote).translate(_CONTROLS)
 
 
@@ -262,30 +279,32 @@ class PageContext(NamedTuple):
     ``explorer`` makes the page interactive.
     """
 
-    run: Run
+    run: OpenedRun
     command: Sequence[str]
     judging: Sequence[str]
     card: SolverInput | None = None
-    switched: Run | None = None
+    switched: OpenedRun | None = None
     explorer: Explorer | None = None
 
 
-def front(cards: Sequence[Markup], *below: Markup) -> Markup:
+def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:
     """Return the first section: cards of the chosen or judged pairs next to each other, and remarks below."""
-    return tag("section", tag("div", *cards, class_="choice"), *below)
+    return make_element("section", make_element("div", *cards, class_="choice"), *below)
 
 
-def refused(reason: str) -> Markup:
+def build_refusal(reason: str) -> Markup:
     """Return the card of an answer that recommends nothing."""
-    return tag(
+    return make_element(
         "div",
-        tag("h2", tag("span", "nothing to use", class_="badge refused")),
-        tag("p", reason),
+        make_element(
+            "h2", make_element("span", "nothing to use", class_="badge refused")
+        ),
+        make_element("p", reason),
         class_="card refused",
     )
 
 
-def title_of(run: Run) -> str:
+def get_title(run: OpenedRun) -> str:
     """Return the title that the solver wrote, or else the name of the file."""
     return (
         next((database.title for database in run.databases if database.title), "")
@@ -293,7 +312,7 @@ def title_of(run: Run) -> str:
     )
 
 
-def pair(
+def build_pair_card(
     title: str,
     times: tuple[float, float],
     description: Markup,
@@ -303,25 +322,25 @@ def pair(
     """Return the card of (tr, td): the times large, a description of the pair, and the times with all digits."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     large_times = (
-        tag("span", tag("i", name), f"{short(time)}{unit}")
+        make_element("span", make_element("i", name), f"{format_short(time)}{unit}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
     full = (
-        tag("span", f"{name} = {time!r}")
+        make_element("span", f"{name} = {time!r}")
         for name, time in zip(("tr", "td"), times, strict=True)
     )
-    exact = tag("p", "in full: ", join(full, ", "), class_="soft exact")
-    return tag(
+    exact = make_element("p", "in full: ", join(full, ", "), class_="soft exact")
+    return make_element(
         "div",
-        tag("h2", title),
-        tag("div", *large_times, class_="times"),
+        make_element("h2", title),
+        make_element("div", *large_times, class_="times"),
         description,
         exact,
         class_=class_,
     )
 
 
-def decided(
+def build_verdict_card(
     title: str,
     decision: Decision,
     times: tuple[float, float],
@@ -330,19 +349,23 @@ def decided(
 ) -> Markup:
     """Return the card of a verdict: ``title``, the verdict as a badge, the times large, and the reason."""
     kind = CLASSES[decision.verdict]
-    badge = tag("span", decision.verdict, class_=f"badge {kind}")
-    _, *why = headed(decision, *times)
-    return pair(
-        join([title, badge]), times, pairs([*why, *facts]), history, f"card {kind}"
+    badge = make_element("span", decision.verdict, class_=f"badge {kind}")
+    _, *why = list_verdict_lines(decision, *times)
+    return build_pair_card(
+        join([title, badge]),
+        times,
+        build_pairs([*why, *facts]),
+        history,
+        f"card {kind}",
     )
 
 
-def digests(files: Iterable[Read]) -> list[tuple[str, str]]:
+def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
     """Return each file with the SHA-256 digest of its content."""
     return [("SHA-256", f"{file.name}: {file.sha256()}") for file in files]
 
 
-def deck_digests(
+def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
     """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
@@ -355,19 +378,19 @@ def deck_digests(
     else:
         hidden = []
     return [
-        *digests(files[:_MOST_FILES]),
+        *list_digests(files[:_MOST_FILES]),
         *hidden,
-        *digests([weights.file] if weights and weights.file else []),
+        *list_digests([weights.file] if weights and weights.file else []),
     ]
 
 
-def digests_of(settings: Settings) -> list[tuple[str, str]]:
+def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
     """Return the digests of the deck that an answer uses, nothing without a deck."""
     used = settings.by_deck
-    return deck_digests(used.files, used.weights) if used else []
+    return list_deck_digests(used.files, used.weights) if used else []
 
 
-def parts(candidate: Candidate | None) -> Markup:
+def build_part_table(candidate: Candidate | None) -> Markup:
     """Return a table of each part's contribution to the mismatch of a pair, nothing if the parts are unknown."""
     if candidate is None or not candidate.parts:
         return Markup()
@@ -382,65 +405,77 @@ def parts(candidate: Candidate | None) -> Markup:
         for part in candidate.parts
     ]
     title = "Parts at this pair"
-    return section(
-        title, table(title, ("part", "sign", "share of the mismatch", "remark"), listed)
+    return build_section(
+        title,
+        build_scrolling_table(
+            title, ("part", "sign", "share of the mismatch", "remark"), listed
+        ),
     )
 
 
-def evidence(
+def build_evidence(
     situation: Situation, health: Health | None, record: PageContext
 ) -> Iterator[Markup]:
     """Return the sections on the input, its health, the method, and how to repeat the answer."""
-    yield section("What was read", _read(situation, record.run))
-    yield section("Health of the reference run", *_health(health))
-    yield from method(record.command, "-" in record.run.sources)
+    yield build_section("What was read", _build_input(situation, record.run))
+    yield build_section("Health of the reference run", *_build_health(health))
+    yield from build_method(record.command, "-" in record.run.sources)
 
 
-def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
+def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
     """Return the sections on the method of an answer, and how to repeat it."""
-    folded = tag(
+    folded = make_element(
         "details",
-        tag("summary", tag("h2", "Method and limits")),
-        resource("method.html"),
+        make_element("summary", make_element("h2", "Method and limits")),
+        read_resource("method.html"),
     )
-    yield tag("section", folded)
-    yield repeated(command, stdin)
+    yield make_element("section", folded)
+    yield build_command(command, stdin)
 
 
-def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
+def build_command(command: Sequence[str], stdin: bool = False) -> Markup:
     """Return the arguments that repeat an answer as a command line to paste."""
-    stdin_note = [tag("p", "with the same history on standard input:")] if stdin else []
-    return section(
-        "To repeat this", *stdin_note, tag("pre", shell_line(command), class_="wrap")
+    stdin_note = (
+        [make_element("p", "with the same history on standard input:")] if stdin else []
+    )
+    return build_section(
+        "To repeat this",
+        *stdin_note,
+        make_element("pre", quote_shell_line(command), class_="wrap"),
     )
 
 
-def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
+def build_solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
     title = "Solver input"
     card = record.card
     assert card is not None
     if card.refusal:
-        return section(
-            title, tag("p", f"No card can be printed for these times: {card.refusal}")
+        return build_section(
+            title,
+            make_element(
+                "p", f"No card can be printed for these times: {card.refusal}"
+            ),
         )
     if card.text:
-        return section(title, tag("pre", card.text, tabindex="0"))
+        return build_section(title, make_element("pre", card.text, tabindex="0"))
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += ["--solver", card.solver] if card.solver else []
-    line = tag(
+    line = make_element(
         "pre",
-        shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
+        quote_shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
         class_="wrap",
     )
-    return section(title, tag("p", "Printed, and judged again as printed, by"), line)
+    return build_section(
+        title, make_element("p", "Printed, and judged again as printed, by"), line
+    )
 
 
-def _read(situation: Situation, run: Run) -> Markup:
+def _build_input(situation: Situation, run: OpenedRun) -> Markup:
     listed = [
-        *heading(situation, verbose=True),
-        *digests(run.files),
-        *digests_of(situation.settings),
+        *list_situation_heading(situation, verbose=True),
+        *list_digests(run.files),
+        *list_digests_of_settings(situation.settings),
     ]
     listed += [
         (f"{database.format} by", database.version)
@@ -452,18 +487,18 @@ def _read(situation: Situation, run: Run) -> Markup:
     else:
         whole = "only complete states were used"
     listed += [("complete", whole)]
-    return pairs(listed + [("note", note) for note in situation.history.notes])
+    return build_pairs(listed + [("note", note) for note in situation.history.notes])
 
 
-def _health(health: Health | None) -> Iterator[Markup]:
+def _build_health(health: Health | None) -> Iterator[Markup]:
     if health is None or not any(
-        health_measure.value for health_measure in measures_of(health)
+        health_measure.value for health_measure in list_health_measures(health)
     ):
-        yield tag("p", "The files do not hold the energies this needs.")
+        yield make_element("p", "The files do not hold the energies this needs.")
         return
     verdicts = {
-        True: tag("span", "kept", class_="good"),
-        False: tag("span", "exceeded", class_="bad"),
+        True: make_element("span", "kept", class_="good"),
+        False: make_element("span", "exceeded", class_="bad"),
         None: "-",
     }
     listed = [
@@ -473,19 +508,19 @@ def _health(health: Health | None) -> Iterator[Markup]:
             health_measure.limit,
             verdicts[health_measure.good],
         )
-        for health_measure in measures_of(health)
+        for health_measure in list_health_measures(health)
     ]
-    yield table(
+    yield build_scrolling_table(
         "Health of the reference run",
         ("measure", "this run", "practice", "verdict"),
         listed,
     )
     window = health.window
     where = " The window is {:.6g} to {:.6g}.".format(*window) if window else ""
-    yield tag(
+    yield make_element(
         "p",
         f"Up to td; shares are of the peak of the internal energy.{where}",
         class_="soft",
     )
     if health.reason:
-        yield tag("p", health.reason)
+        yield make_element("p", health.reason)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import give_if_written
-from d2rpick.choice.grades import POOR, VERDICTS
-from d2rpick.choice.study import Study, runs_of
+from d2rpick.choice.pair.grades import POOR, VERDICTS
+from d2rpick.choice.runs.study import StudyOfRuns, format_number_of_runs
 from d2rpick.report import (
     drive,
     overview,
@@ -18,33 +18,38 @@ from d2rpick.report import (
     trade_off,
     verdict,
 )
-from d2rpick.report.decision import rigid_for, statements
-from d2rpick.report.explorer import explorer, scripts, styles
+from d2rpick.report.decision import format_rigid_time, list_statements
+from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
 from d2rpick.report.page import (
     Explorer,
     Markup,
-    document,
-    grid,
-    pairs,
-    remarks,
-    section,
-    table,
-    tag,
+    build_document,
+    build_grid,
+    build_pairs,
+    build_remarks,
+    build_scrolling_table,
+    build_section,
+    make_element,
 )
-from d2rpick.report.situation import what_was_read
-from d2rpick.report.tables import Cell, known, short, unstarred
+from d2rpick.report.situation import describe_input
+from d2rpick.report.tables import (
+    Cell,
+    format_short,
+    remove_star_column,
+    select_known_columns,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
-    from d2rpick.choice.answers import Suggestion, Verdict
-    from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.plan import Plan, Planned
-    from d2rpick.choice.sets_of_parts import Parts, PartSet
-    from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.histories.run import Run
+    from d2rpick.choice.answers import PairSuggestion, PairVerdict
+    from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.switched.comparison import Comparison
+    from d2rpick.choice.td.plan import PlannedFlight, RunPlan
+    from d2rpick.choice.td.trade_off import TradeOff
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.histories.source import Source
     from d2rpick.running.drive import Driven
 
@@ -57,33 +62,35 @@ _FEW_ROWS: Final = 12
 _WIDEST: Final = "max-width: 40em"  # a picture without a width fills the screen
 
 
-def _of_run(record: page.PageContext, *sections: Markup) -> str:
+def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
     """Write a page about one run, with its script if something can be explored."""
-    needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
-    return document(
-        f"Switch times: {page.title_of(record.run)}",
+    needed = (
+        {"styles": read_styles(), "scripts": read_scripts()} if record.explorer else {}
+    )
+    return build_document(
+        f"Switch times: {page.get_title(record.run)}",
         *sections,
         signed=page.SIGNED,
         **needed,
     )
 
 
-def _figures(
+def _build_figure(
     prefix: str, caption: str, kind: str, *arguments: Any, **how: Any
 ) -> Markup:
     """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
     drawn = getattr(figures_choice, f"draw_{kind}")(*arguments, **how)
-    return page.drawing(caption, figures.svg_element(drawn, prefix))
+    return page.build_drawing(caption, figures.render_svg_element(drawn, prefix))
 
 
-def _draw_suggestion(answer: Suggestion) -> Markup:
+def _draw_suggestion(answer: PairSuggestion) -> Markup:
     if answer.clearly_better:
         choice_text = "the choice, and a better pair"
     else:
         choice_text = "and the choice"
-    return _figures(
+    return _build_figure(
         "choice-",
         f"Internal energy with its level at td, {choice_text}",
         "suggestion",
@@ -92,39 +99,47 @@ def _draw_suggestion(answer: Suggestion) -> Markup:
     )
 
 
-def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
+def _build_starred_table(
+    title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
+) -> Markup:
     """Return a table without its first column; a star there marks the recommended row, which is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
-    return table(title, *unstarred(head, rows), marked)
+    return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
 
-def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
+def suggestion_page(answer: PairSuggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
     first_sections = (
-        _choice(answer),
-        explorer(record.explorer),
+        _build_choice(answer),
+        build_explorer(record.explorer),
         _draw_suggestion(answer),
     )
-    return _of_run(record, *first_sections, *_below_figures(answer, record))
+    return _write_run_page(
+        record, *first_sections, *_build_lower_sections(answer, record)
+    )
 
 
-def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
-    yield section("Candidates", *_candidates(answer))
-    yield page.parts(answer.chosen)
-    yield from page.evidence(answer.situation, answer.health, record)
+def _build_lower_sections(
+    answer: PairSuggestion, record: page.PageContext
+) -> Iterator[Markup]:
+    yield build_section("Candidates", *_build_candidates(answer))
+    yield page.build_part_table(answer.chosen)
+    yield from page.build_evidence(answer.situation, answer.health, record)
     if answer.recommended:
-        yield page.solver_input((answer.recommended.tr, answer.recommended.td), record)
+        yield page.build_solver_input(
+            (answer.recommended.tr, answer.recommended.td), record
+        )
 
 
-def _choice(answer: Suggestion) -> Markup:
+def _build_choice(answer: PairSuggestion) -> Markup:
     """Return the section above the figures: the pairs in large type, and remarks."""
-    cards = [_recommended(answer)]
+    cards = [_build_recommendation(answer)]
     better = answer.clearly_better
     if better:
-        better_text = tag("p", suggestion.better_about(answer, better))
+        better_text = make_element("p", suggestion.describe_improvement(answer, better))
         times = (better.tr, better.td)
         cards.append(
-            page.pair(
+            page.build_pair_card(
                 "Better pair: another td",
                 times,
                 better_text,
@@ -132,79 +147,94 @@ def _choice(answer: Suggestion) -> Markup:
                 "card",
             )
         )
-    return page.front(
-        cards, remarks(answer.cautions), pairs(suggestion.outlook(answer))
+    return page.build_front(
+        cards,
+        build_remarks(answer.cautions),
+        build_pairs(suggestion.list_alternatives(answer)),
     )
 
 
-def _recommended(answer: Suggestion) -> Markup:
+def _build_recommendation(answer: PairSuggestion) -> Markup:
     best = answer.chosen
     decision = answer.decision
     if best is None or decision is None:
-        return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
+        return page.build_refusal(
+            f"No tr can be recommended for this td: {answer.why_none}"
+        )
     times = best.tr, answer.td
-    return page.decided(
-        "", decision, times, answer.situation.history, suggestion.facts(answer)
+    return page.build_verdict_card(
+        "", decision, times, answer.situation.history, suggestion.list_evidence(answer)
     )
 
 
-def _candidates(answer: Suggestion) -> Iterator[Markup]:
+def _build_candidates(answer: PairSuggestion) -> Iterator[Markup]:
     if not answer.candidates:
-        yield tag("p", "None.")
+        yield make_element("p", "None.")
         return
-    yield _starred("Candidates", *known(*suggestion.table(answer, _MOST_ROWS)))
+    yield _build_starred_table(
+        "Candidates",
+        *select_known_columns(*suggestion.build_candidate_table(answer, _MOST_ROWS)),
+    )
     if (hidden_count := len(answer.candidates) - _MOST_ROWS) > 0:
-        yield tag(
+        yield make_element(
             "p", f"{hidden_count} more in the csv and json results.", class_="soft"
         )
 
 
-def verdict_page(answer: Verdict, record: page.PageContext) -> str:
+def verdict_page(answer: PairVerdict, record: page.PageContext) -> str:
     """Write the page of ``verify``."""
-    return _of_run(record, *_of_verdict(answer, record))
+    return _write_run_page(record, *_build_verdict(answer, record))
 
 
-def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
+def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Markup]:
     situation = answer.situation
     candidate = answer.candidate
     times = candidate.tr, situation.td
-    card = page.decided(
-        "", answer.decision, times, situation.history, verdict.facts(answer)
+    card = page.build_verdict_card(
+        "",
+        answer.decision,
+        times,
+        situation.history,
+        verdict.list_pair_evidence(answer),
     )
     further_reasons = [
         reason for reason in answer.reasons if reason not in answer.decision.reason
     ]
-    yield page.front([card], remarks(answer.cautions, further_reasons))
-    yield explorer(record.explorer)
+    yield page.build_front([card], build_remarks(answer.cautions, further_reasons))
+    yield build_explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
-    yield _figures("pair-", caption, "verdict", answer, page=True)
-    measures = verdict.measured(answer)
-    yield section("Measures", pairs((name, short(value)) for name, value in measures))
-    yield page.parts(candidate)
+    yield _build_figure("pair-", caption, "verdict", answer, page=True)
+    measures = verdict.list_known_measures(answer)
+    yield build_section(
+        "Measures", build_pairs((name, format_short(value)) for name, value in measures)
+    )
+    yield page.build_part_table(candidate)
     if answer.switched:
-        yield _switched(
+        yield _build_comparison(
             answer.switched, record.switched.files if record.switched else ()
         )
-    yield from page.evidence(situation, answer.health, record)
+    yield from page.build_evidence(situation, answer.health, record)
     if record.card:
-        yield page.solver_input(times, record)
+        yield page.build_solver_input(times, record)
 
 
-def _switched(comparison: Comparison, files: Iterable[Source]) -> Markup:
+def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:
     """Return the comparison of the finished switched run with the reference."""
     title = "The switched run"
     listed = [
         ("compared", f"from td to {comparison.end:.6g}"),
-        *verdict.deviations(comparison),
-        *page.digests(files),
+        *verdict.list_deviations(comparison),
+        *page.list_digests(files),
     ]
     listed += [("note", note) for note in comparison.notes]
-    return section(
+    return build_section(
         title,
-        table(
-            title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(comparison)
+        build_scrolling_table(
+            title,
+            ("quantity", *verdict.COMPARED[1:]),
+            verdict.compare_values(comparison),
         ),
-        pairs(listed),
+        build_pairs(listed),
     )
 
 
@@ -216,31 +246,37 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         if caution not in answer.suggestion.cautions
     ]
     caption = "Error and rigid time of the best pair for each td"
-    best = trade_off.some_of(answer, _MOST_ROWS)
-    hidden = tag(
+    best = trade_off.select_offers(answer, _MOST_ROWS)
+    hidden = make_element(
         "p",
         f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
-    return _of_run(
+    return _write_run_page(
         record,
-        _choice(answer.suggestion),
-        tag("section", tag("p", trade_off.answer(answer)), remarks(further)),
-        explorer(record.explorer),
+        _build_choice(answer.suggestion),
+        make_element(
+            "section",
+            make_element("p", trade_off.give_answer(answer)),
+            build_remarks(further),
+        ),
+        build_explorer(record.explorer),
         _draw_suggestion(answer.suggestion),
-        _figures("explore-", caption, "trade_off", answer, page=True),
-        section(
+        _build_figure("explore-", caption, "trade_off", answer, page=True),
+        build_section(
             "Pairs that nothing beats",
-            _starred("Pairs", *known(*trade_off.table(best))),
+            _build_starred_table(
+                "Pairs", *select_known_columns(*trade_off.build_offer_table(best))
+            ),
             hidden,
         ),
-        *_below_figures(answer.suggestion, record),
+        *_build_lower_sections(answer.suggestion, record),
     )
 
 
 def plan_page(
-    answer: Plan,
-    run: Run,
+    answer: RunPlan,
+    run: OpenedRun,
     command: Sequence[str],
     card: str | None,
     explored: Explorer | None = None,
@@ -259,103 +295,123 @@ def plan_page(
     explored : Explorer, optional
         The flights of the plan.
     """
-    cards = [_window(row, answer) for row in answer.supported]
-    cards = cards or [page.refused("No window of this run can be recommended.")]
+    cards = [_build_window_card(row, answer) for row in answer.supported]
+    cards = cards or [page.build_refusal("No window of this run can be recommended.")]
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    files = [*page.digests(run.files), *page.digests_of(answer.settings)]
+    files = [
+        *page.list_digests(run.files),
+        *page.list_digests_of_settings(answer.settings),
+    ]
     notes = [("note", note) for note in answer.history.notes]
-    return _of_run(
+    return _write_run_page(
         page.PageContext(run, command, (), explorer=explored),
-        page.front(
+        page.build_front(
             cards,
-            remarks(answer.cautions),
-            pairs(
+            build_remarks(answer.cautions),
+            build_pairs(
                 [
-                    ("plan", plan.sentence(answer)),
-                    *plan.next_steps(answer),
-                    *plan.outlook(answer),
+                    ("plan", plan.give_plan_sentence(answer)),
+                    *plan.list_next_steps(answer),
+                    *plan.list_plan_remarks(answer),
                 ]
             ),
         ),
-        explorer(explored),
-        _figures("plan-", caption, "plan", answer, page=True),
-        section(
+        build_explorer(explored),
+        _build_figure("plan-", caption, "plan", answer, page=True),
+        build_section(
             "Flights",
-            table("Flights", *unstarred(*plan.table(answer))),
-            pairs([*plan.verdicts(answer), *plan.reasons(answer)]),
+            build_scrolling_table(
+                "Flights", *remove_star_column(*plan.build_flight_table(answer))
+            ),
+            build_pairs([*plan.list_verdicts(answer), *plan.list_reasons(answer)]),
         ),
-        section("For the solver's input", tag("pre", card, tabindex="0"))
+        build_section("For the solver's input", make_element("pre", card, tabindex="0"))
         if card
         else Markup(),
-        section(
+        build_section(
             "What was read",
-            pairs([("history", what_was_read(answer.history)), *files, *notes]),
+            build_pairs([("history", describe_input(answer.history)), *files, *notes]),
         ),
-        *page.method(command),
+        *page.build_method(command),
     )
 
 
-def _window(row: Planned, answer: Plan) -> Markup:
+def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
     assert row.window is not None
     assert row.candidate is not None
     assert row.decision is not None
-    facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
+    facts = [
+        ("rigid for", format_rigid_time(row.candidate)),
+        *list_statements(row.decision),
+    ]
     title = f"Flight {row.number}: "
-    return page.decided(title, row.decision, row.window, answer.history, facts)
+    return page.build_verdict_card(
+        title, row.decision, row.window, answer.history, facts
+    )
 
 
-def study_page(answer: Study, command: Sequence[str]) -> str:
+def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
     caption = (
         "Internal energies of all runs, with the tr of each, the common one and td"
     )
-    head, rows = study.table(answer)
-    return document(
-        f"Switch times of {runs_of(len(answer.runs))}",
-        page.front(
-            [_common(answer)],
-            remarks(answer.cautions),
-            pairs([*study.outcome(answer), *study.reasons(answer)]),
+    head, rows = study.build_run_table(answer)
+    return build_document(
+        f"Switch times of {format_number_of_runs(len(answer.runs))}",
+        page.build_front(
+            [_build_common_card(answer)],
+            build_remarks(answer.cautions),
+            build_pairs([*study.list_outcome(answer), *study.list_run_reasons(answer)]),
         ),
-        _figures("runs-", caption, "study", answer, page=True),
-        section(
+        _build_figure("runs-", caption, "study", answer, page=True),
+        build_section(
             "Runs",
-            table("Runs", *known([name.replace("+-", "±") for name in head], rows)),
+            build_scrolling_table(
+                "Runs",
+                *select_known_columns([name.replace("+-", "±") for name in head], rows),
+            ),
         ),
-        section("Files", tag("pre", _files(answer), class_="wrap")),
-        *page.method(command),
+        build_section(
+            "Files", make_element("pre", _list_input_files(answer), class_="wrap")
+        ),
+        *page.build_method(command),
         signed=page.CHECKED,
     )
 
 
-def _common(answer: Study) -> Markup:
+def _build_common_card(answer: StudyOfRuns) -> Markup:
     tr = answer.common.tr
-    title = tag("h2", "One tr for all runs")
+    title = make_element("h2", "One tr for all runs")
     if tr is None:
-        return tag(
-            "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
+        return make_element(
+            "div",
+            title,
+            make_element("p", "None: ", answer.common.reason or ""),
+            class_="card",
         )
-    times = [tag("span", tag("i", "tr"), f"{tr:.6g}")]
+    times = [make_element("span", make_element("i", "tr"), f"{tr:.6g}")]
     if answer.td is not None:
-        times.append(tag("span", tag("i", "td"), f"{answer.td:.6g}"))
+        times.append(make_element("span", make_element("i", "td"), f"{answer.td:.6g}"))
     exact = f"in full: tr = {tr!r}" + (
         "" if answer.td is None else f", td = {answer.td!r}"
     )
     verdict = VERDICTS[answer.grade or POOR]
-    (_, outcome), *_ = study.outcome(answer)
+    (_, outcome), *_ = study.list_outcome(answer)
     kind = page.CLASSES[verdict]
     lines = (
-        tag("div", *times, class_="times"),
-        tag("p", outcome),
-        tag("p", exact, class_="soft"),
+        make_element("div", *times, class_="times"),
+        make_element("p", outcome),
+        make_element("p", exact, class_="soft"),
     )
-    badge = tag(
-        "h2", "One tr for all runs: ", tag("span", verdict, class_=f"badge {kind}")
+    badge = make_element(
+        "h2",
+        "One tr for all runs: ",
+        make_element("span", verdict, class_=f"badge {kind}"),
     )
-    return tag("div", badge, *lines, class_=f"card {kind}")
+    return make_element("div", badge, *lines, class_=f"card {kind}")
 
 
-def _files(answer: Study) -> str:
+def _list_input_files(answer: StudyOfRuns) -> str:
     """Return the input files with size and time, in the order of the runs."""
     from datetime import UTC, datetime
 
@@ -369,54 +425,66 @@ def _files(answer: Study) -> str:
 def parts_page(answer: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
     if answer.sets:
-        sets = [section("Sets", _starred("Sets", *parts.set_table(answer, parts.SETS)))]
+        sets = [
+            build_section(
+                "Sets",
+                _build_starred_table(
+                    "Sets", *parts.build_set_table(answer, parts.SETS)
+                ),
+            )
+        ]
     else:
         sets = []
     tables = {
-        name: unstarred(*parts.table(answer, columns))
+        name: remove_star_column(*parts.build_part_table(answer, columns))
         for name, columns in parts.TABLES.items()
     }
     weights = [("weights", answer.weights.source)] if answer.weights else []
     if answer.inventory:
-        deck = page.deck_digests(answer.inventory.files, answer.weights)
+        deck = page.list_deck_digests(answer.inventory.files, answer.weights)
     else:
         deck = []
-    return document(
-        f"Parts to switch: {page.title_of(answer.files)}",
-        page.front([_set(answer.recommended)], remarks(answer.cautions)),
+    return build_document(
+        f"Parts to switch: {page.get_title(answer.files)}",
+        page.build_front(
+            [_build_set_card(answer.recommended)], build_remarks(answer.cautions)
+        ),
         *sets,
-        *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What to know", pairs(parts.outlook(answer))),
-        section(
+        *(
+            build_section(name, build_scrolling_table(name, *cells))
+            for name, cells in tables.items()
+        ),
+        build_section("What to know", build_pairs(parts.list_remarks(answer))),
+        build_section(
             "What was read",
-            pairs(
+            build_pairs(
                 [
-                    *parts.heading(answer),
+                    *parts.list_heading(answer),
                     *weights,
-                    *page.digests(answer.files.files),
+                    *page.list_digests(answer.files.files),
                     *deck,
                 ]
             ),
         ),
-        page.repeated(command),
+        page.build_command(command),
         signed=page.SIGNED,
     )
 
 
-def _set(best: PartSet | None) -> Markup:
+def _build_set_card(best: PartSet | None) -> Markup:
     if best is None:
-        return page.refused("No set of parts can be recommended.")
-    saved = tag(
+        return page.build_refusal("No set of parts can be recommended.")
+    saved = make_element(
         "span",
-        tag("i", "saves about"),
+        make_element("i", "saves about"),
         f"{best.saving:.0%}",
-        tag("i", " of the processor time"),
+        make_element("i", " of the processor time"),
     )
-    listed = tag("p", f"parts {parts.ranges(best.parts)}")
-    return tag(
+    listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
+    return make_element(
         "div",
-        tag("h2", parts.set_name(best)),
-        tag("div", saved, class_="times"),
+        make_element("h2", parts.name_set(best)),
+        make_element("div", saved, class_="times"),
         listed,
         class_="card chosen",
     )
@@ -433,10 +501,10 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         for window in switched
     )
     cards = [
-        page.pair(
+        page.build_pair_card(
             f"Window {number}",
             (window.tr, window.td),
-            pairs([("contact", text)]),
+            build_pairs([("contact", text)]),
             history,
             "card chosen",
         )
@@ -444,18 +512,29 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
             zip(switched, contacts, strict=True), start=1
         )
     ]
-    cards = cards or [tag("p", "No flight was switched.")]
+    cards = cards or [make_element("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
     flights = [(window.free, window.contact or window.td) for window in switched]
     rigid = [(window.tr, window.td) for window in switched]
-    return document(
+    return build_document(
         f"First run: {answer.deck.name}",
-        page.front(cards, remarks(answer.cautions), pairs(drive.outlook(answer))),
-        _figures("driven-", caption, "run", history, flights, rigid),
-        section("Evidence", table("Windows", *drive.windows(answer))),
-        section("Cost", table("Legs", *drive.legs(answer))),
-        section("What was read", pairs(page.digests(answer.run.files))),
-        page.repeated(command),
+        page.build_front(
+            cards,
+            build_remarks(answer.cautions),
+            build_pairs(drive.list_savings(answer)),
+        ),
+        _build_figure("driven-", caption, "run", history, flights, rigid),
+        build_section(
+            "Evidence",
+            build_scrolling_table("Windows", *drive.list_window_rows(answer)),
+        ),
+        build_section(
+            "Cost", build_scrolling_table("Legs", *drive.list_leg_rows(answer))
+        ),
+        build_section(
+            "What was read", build_pairs(page.list_digests(answer.run.files))
+        ),
+        page.build_command(command),
         signed=page.CHECKED,
     )
 
@@ -465,39 +544,46 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        overview.verdict,
-        lambda answer: (("", ""), _told(overview.facts(answer)[1:])),
+        overview.list_verdict_lines,
+        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
     ),
     "suggestion": (
-        suggestion.verdict,
-        lambda answer: suggestion.table(answer, _FEW_ROWS),
+        suggestion.list_verdict,
+        lambda answer: suggestion.build_candidate_table(answer, _FEW_ROWS),
     ),
     "verdict": (
-        verdict.verdict,
-        lambda answer: (("measure", "value"), verdict.measured(answer)),
+        verdict.list_pair_verdict,
+        lambda answer: (("measure", "value"), verdict.list_known_measures(answer)),
     ),
     "trade_off": (
-        lambda answer: [("", trade_off.answer(answer))],
-        lambda answer: trade_off.table(trade_off.some_of(answer, _FEW_ROWS)),
+        lambda answer: [("", trade_off.give_answer(answer))],
+        lambda answer: trade_off.build_offer_table(
+            trade_off.select_offers(answer, _FEW_ROWS)
+        ),
     ),
     "plan": (
-        lambda answer: [("", plan.sentence(answer)), *plan.outlook(answer)],
-        plan.table,
+        lambda answer: [
+            ("", plan.give_plan_sentence(answer)),
+            *plan.list_plan_remarks(answer),
+        ],
+        plan.build_flight_table,
     ),
     "parts": (
-        parts.verdict_on_set,
-        lambda answer: parts.table(answer, next(iter(parts.TABLES.values()))),
+        parts.list_verdict_on_set,
+        lambda answer: parts.build_part_table(
+            answer, next(iter(parts.TABLES.values()))
+        ),
     ),
-    "study": (study.outcome, study.table),
+    "study": (study.list_outcome, study.build_run_table),
 }
 
 
-def sentence(kind: str, answer: Any) -> str:
+def give_sentence(kind: str, answer: Any) -> str:
     """Return an answer in one sentence."""
     return ": ".join(filter(None, _LOOKS[kind][0](answer)[0]))
 
 
-def of_run(run: Run) -> str:
+def describe_run(run: OpenedRun) -> str:
     """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
@@ -511,28 +597,31 @@ def of_run(run: Run) -> str:
     return f"{', '.join(map(repr, run.sources))}: {', '.join(facts)}"
 
 
-def glance(kind: str, answer: Any, figure: Figure | None) -> str:
+def show_at_a_glance(kind: str, answer: Any, figure: Figure | None) -> str:
     """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
     give_sentences, table = _LOOKS[kind]
     lines = [
-        tag("div", tag("b", name), f" {text}") for name, text in give_sentences(answer)
+        make_element("div", make_element("b", name), f" {text}")
+        for name, text in give_sentences(answer)
     ]
     head, rows = table(answer)
-    lines += [grid(*known(head, rows[:_FEW_ROWS]))] if rows else []
+    lines += [build_grid(*select_known_columns(head, rows[:_FEW_ROWS]))] if rows else []
     lines += (
-        [tag("div", f"... and {len(rows) - _FEW_ROWS} more")]
+        [make_element("div", f"... and {len(rows) - _FEW_ROWS} more")]
         if len(rows) > _FEW_ROWS
         else []
     )
-    return tag("div", *lines, *([_picture(figure)] if figure else []))
+    return make_element("div", *lines, *([_build_picture(figure)] if figure else []))
 
 
-def _picture(figure: Figure) -> Markup:
-    from d2rpick.report.figures import svg_element
+def _build_picture(figure: Figure) -> Markup:
+    from d2rpick.report.figures import render_svg_element
 
-    return tag("div", Markup(svg_element(figure, "glance-")), style=_WIDEST)
+    return make_element(
+        "div", Markup(render_svg_element(figure, "glance-")), style=_WIDEST
+    )
 
 
-def _told(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
+def _select_known_facts(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
     """Return only the facts whose values are known."""
     return [fact for fact in facts if fact[1] is not None]

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import format_ranges, list_names, make_printable
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import saved
+from d2rpick.report.decision import format_saved_share
 from d2rpick.report.fields import (
     Document,
     Field,
-    csv_of,
     each,
     many,
     maybe,
     one_of,
     row,
+    write_csv,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from d2rpick.choice.sets_of_parts import Parts, PartSet
-    from d2rpick.choice.switchable_parts import PartRow
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.parts.switchable_parts import PartRow
+    from d2rpick.report.formats import DisplayOptions
 
 # Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.
 SETS = (
@@ -159,7 +159,7 @@ _SET_NAMES: Final = {
 }
 
 
-def _free(part_set: PartSet) -> bool | None:
+def is_limited_by_no_part(part_set: PartSet) -> bool | None:
     """Return True if no deformable part limits the time step."""
     return None if part_set.step_growth is None else isinf(part_set.step_growth)
 
@@ -175,8 +175,8 @@ SET: Final = row(
     Field("mass_fraction", "number?"),
     Field("cost_share", "number?", "share of a step that is saved while it is rigid"),
     Field("step_growth", "number?", "how much the step may at least grow while it is rigid",
-          lambda part_set: None if _free(part_set) else part_set.step_growth),
-    Field("step_free", "flag?", "whether nothing deformable keeps the step", _free),
+          lambda part_set: None if is_limited_by_no_part(part_set) else part_set.step_growth),
+    Field("step_free", "flag?", "whether nothing deformable keeps the step", is_limited_by_no_part),
     Field("tr", "number?", get=lambda part_set: part_set.window and part_set.window[0]),
     Field("td", "number?", get=lambda part_set: part_set.window and part_set.window[1]),
     Field("rigid_fraction", "number?"),
@@ -197,7 +197,7 @@ SET: Final = row(
 )  # fmt: skip
 
 
-def _flights(answer: Parts) -> list[dict[str, Any]]:
+def _list_flights(answer: Parts) -> list[dict[str, Any]]:
     facts = answer.facts
     return [
         {"start": span[0], "end": span[1], "longest": at == facts.longest}
@@ -214,7 +214,7 @@ DOCUMENT: Final = Document(
         Field("deck", maybe(_DECK), get=lambda answer: answer.inventory),
         Field("weights", maybe(_WEIGHTS)),
         Field("step_ratio", "number", get=lambda answer: answer.settings.step_ratio),
-        Field("flights", many(_FLIGHT), get=_flights),
+        Field("flights", many(_FLIGHT), get=_list_flights),
         Field(
             "parts",
             many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))),
@@ -230,38 +230,43 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Parts, display: Shown) -> str:
+def as_table(answer: Parts, display: DisplayOptions) -> str:
     """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
-    lines = tables.in_line(verdict_on_set(answer))
+    lines = tables.format_in_line(list_verdict_on_set(answer))
     if answer.sets:
-        lines += ["", tables.as_text(*set_table(answer, SETS), display.width, _SPARE)]
+        lines += [
+            "",
+            tables.as_text(*build_set_table(answer, SETS), display.width, _SPARE),
+        ]
     for names in TABLES.values():
-        head, body = tables.known(*table(answer, names))
+        head, body = tables.select_known_columns(*build_part_table(answer, names))
         if body and {*head} - {"", "part", "title"}:
             lines += ["", tables.as_text(head, body, display.width, _SPARE)]
-    below = [*outlook(answer), *heading(answer)]
-    return "\n".join([*lines, "", *tables.in_line(below)])
+    below = [*list_remarks(answer), *list_heading(answer)]
+    return "\n".join([*lines, "", *tables.format_in_line(below)])
 
 
-def as_markdown(answer: Parts, _: Shown) -> str:
+def as_markdown(answer: Parts, _: DisplayOptions) -> str:
     """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
-    sets = [tables.as_markdown(*set_table(answer))] if answer.sets else []
-    above = tables.listed(verdict_on_set(answer))
-    below = tables.listed(outlook(answer))
-    return "\n\n".join([*above, *sets, tables.as_markdown(*table(answer)), *below])
+    sets = [tables.as_markdown(*build_set_table(answer))] if answer.sets else []
+    above = tables.format_as_list(list_verdict_on_set(answer))
+    below = tables.format_as_list(list_remarks(answer))
+    return "\n\n".join(
+        [*above, *sets, tables.as_markdown(*build_part_table(answer)), *below]
+    )
 
 
-def as_csv(answer: Parts, _: Shown) -> str:
+def as_csv(answer: Parts, _: DisplayOptions) -> str:
     """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
-    return csv_of(PART.keys, map(PART.plain, answer.rows), ";")
+    return write_csv(PART.keys, map(PART.plain, answer.rows), ";")
 
 
-def as_value(answer: Parts, _: Shown) -> str:
+def as_value(answer: Parts, _: DisplayOptions) -> str:
     """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
-def heading(answer: Parts) -> list[tuple[str, str]]:
+def list_heading(answer: Parts) -> list[tuple[str, str]]:
     """Return what was read, as pairs of a name and a description."""
     run = answer.files
     deck = answer.inventory
@@ -269,7 +274,7 @@ def heading(answer: Parts) -> list[tuple[str, str]]:
     lines = [
         (
             "history",
-            f"{', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}",
+            f"{', '.join(run.sources)}: {formats}, {format_count(len(run.parts), 'part')}",
         )
     ]
     if deck is None:
@@ -279,7 +284,7 @@ def heading(answer: Parts) -> list[tuple[str, str]]:
         lines.append(
             (
                 "deck",
-                f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}",
+                f"{deck.solver}, {format_count(len(deck.parts), 'part')}, {format_count(number, 'element')}",
             )
         )
     longest = answer.facts.longest
@@ -294,49 +299,49 @@ def heading(answer: Parts) -> list[tuple[str, str]]:
     return [(name, make_printable(text)) for name, text in lines]
 
 
-def table(
+def build_part_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the names and cells of all or some columns of the parts, with a star for parts of the recommended set."""
     best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
-    return tables.filled(
+    return tables.fill_table(
         {"": lambda row: "*" if row.id in best else " ", **columns}, answer.rows
     )
 
 
-def set_table(
+def build_set_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the names and cells of all or some columns of the sets, with a star for the recommended set."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
-    return tables.filled(
+    return tables.fill_table(
         {"": lambda part_set: "*" if part_set.recommended else " ", **columns},
         answer.sets,
     )
 
 
-def _position(part_set: PartSet) -> str | None:
+def _format_position_error(part_set: PartSet) -> str | None:
     """Return the position error of a set, and the assumption behind it."""
-    error = _least(part_set, part_set.position_error)
+    error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
 
-def _least(part_set: PartSet, value: float | None) -> str | None:
+def _format_lower_bound(part_set: PartSet, value: float | None) -> str | None:
     """Return an error, with a sign if it is only a lower limit."""
     if part_set.position_is_lower_bound and value is not None:
         return f">= {value:.3g}"
-    return _short(value)
+    return _format_short(value)
 
 
-def verdict(row: PartRow) -> str:
+def name_verdict(row: PartRow) -> str:
     """Return whether to make a part rigid, in one or two words."""
     if row.merge_with is not None:
         return f"merge with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
-def verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
+def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
     best = answer.recommended
     if best is None:
@@ -358,20 +363,26 @@ def verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     else:
         where = ""
     share = best.run_time_share
-    saves = "unknown" if share is None else f"{saved(share)}{where}"
+    saves = "unknown" if share is None else f"{format_saved_share(share)}{where}"
     return [
-        ("make rigid", f"--part {ranges(best.parts)}, {set_name(best)} ({bodies})"),
+        (
+            "make rigid",
+            f"--part {format_part_ranges(best.parts)}, {name_set(best)} ({bodies})",
+        ),
         ("saves", saves),
-        ("next", f"d2rpick plan --part {ranges(best.parts)} with the same files"),
+        (
+            "next",
+            f"d2rpick plan --part {format_part_ranges(best.parts)} with the same files",
+        ),
     ]
 
 
-def set_name(part_set: PartSet) -> str:
+def name_set(part_set: PartSet) -> str:
     """Return the name of a set for people."""
     return _SET_NAMES.get(part_set.name, part_set.name)
 
 
-def outlook(answer: Parts) -> list[tuple[str, str]]:
+def list_remarks(answer: Parts) -> list[tuple[str, str]]:
     """Return remarks on the recommended set, and why other sets are not compared, as pairs of a name and a sentence."""
     lines: list[tuple[str, str]] = []
     best = answer.recommended
@@ -384,78 +395,83 @@ def outlook(answer: Parts) -> list[tuple[str, str]]:
         cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
         lines.append(("time step", f"{grows}: {cures}"))
     lines += [
-        (set_name(part_set), reason)
+        (name_set(part_set), reason)
         for part_set in answer.sets
         for reason in part_set.reasons
     ]
     return lines
 
 
-def _number(count: int, noun: str) -> str:
+def format_count(count: int, noun: str) -> str:
+    """Return a count with its noun, in the plural unless it is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def _counted(row: PartRow) -> str | None:
+def _format_element_counts(row: PartRow) -> str | None:
     if row.elements is None:
         return None
     return ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
 
 
-def _sharing(row: PartRow) -> str | None:
+def _format_sharing_parts(row: PartRow) -> str | None:
     if row.shares_nodes is None:
         return None
     return list_names(row.shares_nodes, most=_MOST_SHOWN, between=",")
 
 
-def ranges(ids: Sequence[int]) -> str:
+def format_part_ranges(ids: Sequence[int]) -> str:
     """Return part ids as ``--part`` takes them.
 
     Examples
     --------
-    >>> ranges([1, 2, 3, 5, 6, 12])
+    >>> format_part_ranges([1, 2, 3, 5, 6, 12])
     '1-3,5,6,12'
     """
     return ",".join(format_ranges(ids))
 
 
-def _short(value: float | None) -> str | None:
-    return tables.shown(value, ".3g")
+def _format_short(value: float | None) -> str | None:
+    return tables.format_if_known(value, ".3g")
 
 
-def _percent(value: float | None) -> str | None:
+def _format_percent(value: float | None) -> str | None:
     return None if value is None else f"{100 * value:.3g}%"
 
 
 COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "part": lambda row: row.id,
     "title": lambda row: row.title,
-    "make rigid?": verdict,
-    "elements": _counted,
+    "make rigid?": name_verdict,
+    "elements": _format_element_counts,
     "formulation": lambda row: ", ".join(row.formulations) or None,
     "material": lambda row: row.material,
-    "mass": lambda row: _short(row.mass),
-    "energy": lambda row: _short(row.flight.mean if row.flight else None),
-    "scatter": lambda row: _percent(row.flight.scatter if row.flight else None),
+    "mass": lambda row: _format_short(row.mass),
+    "energy": lambda row: _format_short(row.flight.mean if row.flight else None),
+    "scatter": lambda row: _format_percent(row.flight.scatter if row.flight else None),
     "flies": lambda row: row.flight.flies if row.flight else None,
     "deforms": lambda row: row.flight.deforms if row.flight else None,
-    "cost": lambda row: _percent(row.cost_share),
-    "step": lambda row: _short(row.smallest_step),
-    "shares nodes with": _sharing,
+    "cost": lambda row: _format_percent(row.cost_share),
+    "step": lambda row: _format_short(row.smallest_step),
+    "shares nodes with": _format_sharing_parts,
     "why": lambda row: "; ".join(row.reasons),
 }
 SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
-    "set": set_name,
-    "parts": lambda part_set: ranges(part_set.parts),
+    "set": name_set,
+    "parts": lambda part_set: format_part_ranges(part_set.parts),
     "elements": lambda part_set: part_set.elements,
-    "mass": lambda part_set: _percent(part_set.mass_fraction),
-    "saves of a step": lambda part_set: _percent(part_set.cost_share),
+    "mass": lambda part_set: _format_percent(part_set.mass_fraction),
+    "saves of a step": lambda part_set: _format_percent(part_set.cost_share),
     "step grows": lambda part_set: (
-        "free" if _free(part_set) else tables.shown(part_set.step_growth, ".2g")
+        "free"
+        if is_limited_by_no_part(part_set)
+        else tables.format_if_known(part_set.step_growth, ".2g")
     ),
     "tr": lambda part_set: part_set.window[0] if part_set.window else None,
     "td": lambda part_set: part_set.window[1] if part_set.window else None,
-    "processor time": lambda part_set: _percent(part_set.run_time_share),
-    "saves": lambda part_set: _percent(part_set.saving),
-    "out of place": _position,
-    "turned [deg]": lambda part_set: _least(part_set, part_set.angle_error),
+    "processor time": lambda part_set: _format_percent(part_set.run_time_share),
+    "saves": lambda part_set: _format_percent(part_set.saving),
+    "out of place": _format_position_error,
+    "turned [deg]": lambda part_set: _format_lower_bound(
+        part_set, part_set.angle_error
+    ),
 }

@@ -5,28 +5,28 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.grades import USE
+from d2rpick.choice.pair.grades import USE
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import in_full, saved
+from d2rpick.report.decision import format_in_full, format_saved_share
 from d2rpick.report.fields import (
     Document,
     Field,
-    csv_of,
-    kind_of,
+    get_kind,
     many,
     maybe,
     one_of,
     row,
+    write_csv,
 )
-from d2rpick.report.situation import what_was_read
-from d2rpick.report.suggestion import given_up
+from d2rpick.report.situation import describe_input
+from d2rpick.report.suggestion import describe_given_up_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.choice.plan import Plan, Planned
-    from d2rpick.choice.situation import Situation
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.td.plan import PlannedFlight, RunPlan
+    from d2rpick.report.formats import DisplayOptions
 
 
 # When the window of a flight can be used, by its status.
@@ -48,81 +48,159 @@ _POSITION: Final = (
 _SPARE: Final = ("margin", "processor time", "out of place", "error")
 
 
-def _times(row: Planned, at: int) -> float | None:
+def _get_time(row: PlannedFlight, at: int) -> float | None:
     return row.window[at] if row.window else None
 
 
-def _situation(row: Planned) -> Situation | None:
+def _get_situation(row: PlannedFlight) -> Situation | None:
     return row.answer.situation if row.answer and row.window else None
 
 
-def _margin(key: str) -> Callable[[Planned], Any]:
+def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
     """Return a function that reads a value of the margin of a window, unless that window is done already."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
 WINDOW: Final = row(
-    Field("flight", kind_of("integer", minimum=1), "number of the flight in the record, from 1",
-          lambda row: row.number),
+    Field(
+        "flight",
+        get_kind("integer", minimum=1),
+        "number of the flight in the record, from 1",
+        lambda row: row.number,
+    ),
     Field("flight_start", "number", get=lambda row: row.start),
-    Field("flight_end", "number?", "the contact that ends it, null where the record ends in flight",
-          lambda row: row.flight.end),
+    Field(
+        "flight_end",
+        "number?",
+        "the contact that ends it, null where the record ends in flight",
+        lambda row: row.flight.end,
+    ),
     Field("flight_source", "text?", "what shows it", lambda row: row.flight.source),
-    Field("certain", "flag", "whether more than the level of the energy shows it", lambda row: row.flight.certain),
+    Field(
+        "certain",
+        "flag",
+        "whether more than the level of the energy shows it",
+        lambda row: row.flight.certain,
+    ),
     Field("status", one_of("supported", "re-plan", "done", "left-out")),
-    Field("reason", "text?", "why it is not supported, or what became of a window that is done"),
-    Field("tr", "number?", get=lambda row: _times(row, 0)),
-    Field("td", "number?", get=lambda row: _times(row, 1)),
+    Field(
+        "reason",
+        "text?",
+        "why it is not supported, or what became of a window that is done",
+    ),
+    Field("tr", "number?", get=lambda row: _get_time(row, 0)),
+    Field("td", "number?", get=lambda row: _get_time(row, 1)),
     Field("rigid_time", "number?"),
     Field("rigid_fraction", "number?", "of the record"),
     _BEST.field("run_time_share")._replace(
-        kind="number?", meaning="of the reference, with this window alone; null without a cost share"),
-    Field("locks_in", "flag?", "whether the window locks in energy, so that landings after it move"),
-    Field("basis", maybe(keys.BASIS), get=lambda row: (now := _situation(row)) and now.basis),
+        kind="number?",
+        meaning="of the reference, with this window alone; null without a cost share",
+    ),
+    Field(
+        "locks_in",
+        "flag?",
+        "whether the window locks in energy, so that landings after it move",
+    ),
+    Field(
+        "basis",
+        maybe(keys.BASIS),
+        get=lambda row: (now := _get_situation(row)) and now.basis,
+    ),
     _BEST.field("kind")._replace(kind=maybe(keys.KIND)),
-    *(_BEST.field(key)._replace(kind="number?") for key in ("level_error", "lock_in_error", "residual")),
-    Field("kinetic_share", "number?", get=lambda row: (now := _situation(row)) and now.kinetic_share),
-    Field("margin", "number?", "kept clear before the contact, null for a window that is done", _margin("time")),
-    Field("margin_source", maybe(one_of("given", "flight", "landing", "grazing", "no-contact")),
-          "given, 3 % of the flight, how far a switch may move the landing, or that of a grazing contact",
-          _margin("source")),
-    Field("landing_spread", "number?", "how far a switch may move the landing, null where the files do not tell",
-          _margin("spread")),
-    Field("landing", "number?", "of a window that is done", lambda row: row.done and row.done.landing),
-    Field("landing_planned", "number?", "in the run that it was planned from",
-          lambda row: row.done and row.done.planned),
+    *(
+        _BEST.field(key)._replace(kind="number?")
+        for key in ("level_error", "lock_in_error", "residual")
+    ),
+    Field(
+        "kinetic_share",
+        "number?",
+        get=lambda row: (now := _get_situation(row)) and now.kinetic_share,
+    ),
+    Field(
+        "margin",
+        "number?",
+        "kept clear before the contact, null for a window that is done",
+        _make_margin_getter("time"),
+    ),
+    Field(
+        "margin_source",
+        maybe(one_of("given", "flight", "landing", "grazing", "no-contact")),
+        "given, 3 % of the flight, how far a switch may move the landing, or that of a grazing contact",
+        _make_margin_getter("source"),
+    ),
+    Field(
+        "landing_spread",
+        "number?",
+        "how far a switch may move the landing, null where the files do not tell",
+        _make_margin_getter("spread"),
+    ),
+    Field(
+        "landing",
+        "number?",
+        "of a window that is done",
+        lambda row: row.done and row.done.landing,
+    ),
+    Field(
+        "landing_planned",
+        "number?",
+        "in the run that it was planned from",
+        lambda row: row.done and row.done.planned,
+    ),
     *(_BEST.field(key) for key in _POSITION),
-    keys.GRADE_OF_PAIR._replace(meaning="of the pair; null without one, and for a window that is done"),
+    keys.GRADE_OF_PAIR._replace(
+        meaning="of the pair; null without one, and for a window that is done"
+    ),
     _BEST.field("position_error_is_lower_bound"),
     *keys.DECISION,
     closed=True,
-)  # fmt: skip
-DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
-    *keys.FRAME,
-    Field("min_rigid", "number", "shorter windows are left out"),
-    Field("windows", many(WINDOW), "a row per flight, in the order of time", lambda plan: plan.flights),
-    Field("rigid_time", "number", "of all supported windows"),
-    Field("rigid_fraction", "number", "of the record, with all supported windows"),
-    Field("run_time_share", "number?", "of the reference, with all supported windows; null without a cost share"),
-))  # fmt: skip
+)
+DOCUMENT: Final = Document(
+    "d2rpick/plan/1",
+    "Answer of d2rpick plan; times in the unit of the history.",
+    row(
+        *keys.FRAME,
+        Field("min_rigid", "number", "shorter windows are left out"),
+        Field(
+            "windows",
+            many(WINDOW),
+            "a row per flight, in the order of time",
+            lambda plan: plan.flights,
+        ),
+        Field("rigid_time", "number", "of all supported windows"),
+        Field("rigid_fraction", "number", "of the record, with all supported windows"),
+        Field(
+            "run_time_share",
+            "number?",
+            "of the reference, with all supported windows; null without a cost share",
+        ),
+    ),
+)
 
 
-def as_table(plan: Plan, display: Shown) -> str:
+def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
     if plan.flights:
-        rows = tables.as_text(*table(plan), display.width, _SPARE)
+        rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
     else:
         rows = "no flight"
-    below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
+    below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
     printable = [(name, make_printable(text)) for name, text in below]
-    above = tables.in_line([("history", what_was_read(plan.history))], 8)
-    steps = tables.in_line(next_steps(plan), 4)
+    above = tables.format_in_line([("history", describe_input(plan.history))], 8)
+    steps = tables.format_in_line(list_next_steps(plan), 4)
     return "\n".join(
-        [sentence(plan), *steps, "", rows, "", *tables.in_line(printable, 9), *above]
+        [
+            give_plan_sentence(plan),
+            *steps,
+            "",
+            rows,
+            "",
+            *tables.format_in_line(printable, 9),
+            *above,
+        ]
     )
 
 
-def sentence(plan: Plan) -> str:
+def give_plan_sentence(plan: RunPlan) -> str:
     """Return what to do, in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
@@ -133,14 +211,14 @@ def sentence(plan: Plan) -> str:
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    text = f"{_how_to_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    text = f"{_describe_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
-        text += f"; saves {saved(plan.run_time_share)}"
+        text += f"; saves {format_saved_share(plan.run_time_share)}"
     waiting_text = "1 more needs" if waiting == 1 else f"{waiting} more need"
     return f"{text}; {waiting_text} a new run first" if waiting else text
 
 
-def _how_to_use(plan: Plan) -> str:
+def _describe_use(plan: RunPlan) -> str:
     """Return how many windows can be used now, and which of them only with care."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
@@ -154,7 +232,7 @@ def _how_to_use(plan: Plan) -> str:
     return f"use {len(decisions)} of {open_ones} windows now{which}"
 
 
-def next_steps(plan: Plan) -> list[tuple[str, str]]:
+def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
     """Return the next commands for the windows that can be used now, as pairs of a name and a command."""
     if not plan.windows:
         return []
@@ -166,36 +244,45 @@ def next_steps(plan: Plan) -> list[tuple[str, str]]:
     return [("next", f"{cards}{again}")]
 
 
-def verdicts(plan: Plan) -> list[tuple[str, str]]:
+def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
     """Return why the planned windows are not better and what would improve them, each with the name of its flight."""
     return [
-        (f"flight {row.number}", in_full(row.decision))
+        (f"flight {row.number}", format_in_full(row.decision))
         for row in plan.flights
         if row.window and row.decision and row.decision.cure
     ]
 
 
-def as_markdown(plan: Plan, _: Shown) -> str:
+def as_markdown(plan: RunPlan, _: DisplayOptions) -> str:
     """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
-    below = tables.listed(
-        (*next_steps(plan), *verdicts(plan), *outlook(plan), *reasons(plan))
+    below = tables.format_as_list(
+        (
+            *list_next_steps(plan),
+            *list_verdicts(plan),
+            *list_plan_remarks(plan),
+            *list_reasons(plan),
+        )
     )
     return "\n\n".join(
-        [tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below]
+        [
+            tables.escape_markdown(give_plan_sentence(plan)),
+            tables.as_markdown(*build_flight_table(plan)),
+            *below,
+        ]
     )
 
 
-def reasons(plan: Plan) -> list[tuple[str, str]]:
+def list_reasons(plan: RunPlan) -> list[tuple[str, str]]:
     """Return why windows are not supported, as pairs of a flight and a sentence."""
     return [(f"flight {row.number}", row.reason) for row in plan.flights if row.reason]
 
 
-def as_csv(plan: Plan, _: Shown) -> str:
+def as_csv(plan: RunPlan, _: DisplayOptions) -> str:
     """Return CSV with one row per flight and a column for each key of ``windows`` in the JSON output."""
-    return csv_of(WINDOW.keys, map(WINDOW.plain, plan.flights))
+    return write_csv(WINDOW.keys, map(WINDOW.plain, plan.flights))
 
 
-def as_value(plan: Plan, display: Shown) -> str:
+def as_value(plan: RunPlan, display: DisplayOptions) -> str:
     """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
     These are the windows that are done, and the supported new ones or, if asked for, all new ones.  Nothing is returned
@@ -205,13 +292,13 @@ def as_value(plan: Plan, display: Shown) -> str:
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
-def outlook(plan: Plan) -> list[tuple[str, str]]:
+def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
     """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
     supported = plan.supported
     lines = []
     pairs = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
-        (f"flight {number}", given_up(pair.longer, pair.recommended))
+        (f"flight {number}", describe_given_up_time(pair.longer, pair.recommended))
         for number, pair in pairs
         if pair.longer and pair.recommended
     ]
@@ -222,7 +309,9 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     ]
     if assumed:
         deck_hint = "; `deck` tells which do" if plan.settings.bodies is None else ""
-        listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
+        listed = ", ".join(
+            f"flight {row.number} by {_format_place_error(row)}" for row in assumed
+        )
         lines.append(
             (
                 "place",
@@ -232,7 +321,7 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     return lines
 
 
-def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
+def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of all flights; CPU time and position error only if they are known."""
     placed = any(
         row.candidate and row.candidate.position_error is not None
@@ -242,13 +331,13 @@ def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
         *["processor time"] * (plan.settings.cost_share is None),
         *["out of place"] * (not placed),
     ]
-    return tables.filled(
+    return tables.fill_table(
         {name: cell for name, cell in _COLUMNS.items() if name not in unknown},
         plan.flights,
     )
 
 
-def error(row: Planned) -> str | None:
+def format_pair_error(row: PlannedFlight) -> str | None:
     """Return the name and value of the error of a window's pair."""
     best = row.candidate
     if best is None:
@@ -259,10 +348,10 @@ def error(row: Planned) -> str | None:
         name, size = ("level error", best.level_error)
     else:
         name, size = ("residual", best.residual)
-    return f"{name} {tables.measure(size)}"
+    return f"{name} {tables.format_measure(size)}"
 
 
-def _place(row: Planned) -> str | None:
+def _format_place_error(row: PlannedFlight) -> str | None:
     """Return the position error of a rigid body at td [length]."""
     best = row.candidate
     if best is None or best.position_error is None:
@@ -271,20 +360,20 @@ def _place(row: Planned) -> str | None:
     return f"{bound_sign}{best.position_error:.2g}"
 
 
-_COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {
+_COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "": lambda row: "*" if row.status == "supported" else " ",
     "flight": lambda row: row.number,
     "from": lambda row: row.start,
     "to": lambda row: "end of record" if row.flight.end is None else row.flight.end,
     "margin": lambda row: "-" if row.done else f"{row.margin.time:.3g}",
-    "tr": lambda row: _times(row, 0),
-    "td": lambda row: _times(row, 1),
+    "tr": lambda row: _get_time(row, 0),
+    "td": lambda row: _get_time(row, 1),
     "rigid for": lambda row: row.rigid_time,
-    "processor time": lambda row: tables.shown(
+    "processor time": lambda row: tables.format_if_known(
         row.candidate.run_time_share if row.candidate else None, ".0%"
     ),
-    "error": error,
-    "out of place": _place,
+    "error": format_pair_error,
+    "out of place": _format_place_error,
     "verdict": lambda row: row.decision.verdict if row.decision else None,
     "when": lambda row: _WHEN[row.status],
 }

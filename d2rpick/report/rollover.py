@@ -6,34 +6,68 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.box_run import BOX, Outcome, Record
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, csv_of, many, row
+from d2rpick.report.fields import Document, Field, many, row, write_csv
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.base.errors import Caution
-    from d2rpick.choice.answers import Suggestion
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.answers import PairSuggestion
+    from d2rpick.report.formats import DisplayOptions
 
 # fields of each run, in JSON and as columns
-RUN: Final = row(*(Field(key, "number") for key in (
-    "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio",
-)), closed=True)  # fmt: skip
+RUN: Final = row(
+    *(
+        Field(key, "number")
+        for key in (
+            "tr",
+            "energy",
+            "energy_ratio",
+            "roll_error",
+            "x_error",
+            "z_error",
+            "omega_error",
+            "lost_energy",
+            "mean_ratio",
+        )
+    ),
+    closed=True,
+)
 DOCUMENT: Final = Document(
     "d2rpick/rollover/1",
     "Switched runs of the rollover box against the one without switching; SI units, roll_error in degrees.",
     row(
         keys.WARNINGS,
-        Field("released", "number?", "the sled pushed last", lambda scan: scan.reference.released),
-        Field("landed", "number?", "the ground pushed first; null where the run ends before",
-              lambda scan: scan.reference.landed),
+        Field(
+            "released",
+            "number?",
+            "the sled pushed last",
+            lambda scan: scan.reference.released,
+        ),
+        Field(
+            "landed",
+            "number?",
+            "the ground pushed first; null where the run ends before",
+            lambda scan: scan.reference.landed,
+        ),
         Field("td", "number", get=lambda scan: scan.answer.situation.td),
-        Field("energy_td", "number", get=lambda scan: _energy(scan.reference, scan.answer.situation.td)),
-        Field("recommended", "number?", "the tr that suggest recommends", lambda scan: _recommended(scan.answer)),
+        Field(
+            "energy_td",
+            "number",
+            get=lambda scan: _interpolate_energy(
+                scan.reference, scan.answer.situation.td
+            ),
+        ),
+        Field(
+            "recommended",
+            "number?",
+            "the tr that suggest recommends",
+            lambda scan: _get_recommended_tr(scan.answer),
+        ),
         Field("runs", many(RUN), get=lambda scan: scan.outcomes),
         title="d2rpick rollover --scan",
     ),
-)  # fmt: skip
+)
 
 
 class Scan(NamedTuple):
@@ -41,25 +75,28 @@ class Scan(NamedTuple):
 
     reference: Record
     outcomes: Sequence[Outcome]
-    answer: Suggestion
+    answer: PairSuggestion
     cautions: Sequence[Caution]
 
 
-def as_table(scan: Scan, display: Shown) -> str:
+def as_table(scan: Scan, display: DisplayOptions) -> str:
     """Return what happened in the reference run, a row for each tr, and the error of the tr that d2rpick recommends."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
-    recommended = _recommended(answer)
+    recommended = _get_recommended_tr(answer)
     above = [
         (
             "load",
-            f"until {_time(reference.released)} s, next contact at {_time(reference.landed)} s",
+            f"until {_format_time(reference.released)} s, next contact at {_format_time(reference.landed)} s",
         ),
-        ("td", f"{td:.6g} s: energy of the box {_energy(reference, td):.6g} J"),
+        (
+            "td",
+            f"{td:.6g} s: energy of the box {_interpolate_energy(reference, td):.6g} J",
+        ),
         ("units", "s, J, m, rad/s; roll_error in degrees"),
     ]
     rows = [
-        ["*" if outcome.tr == recommended else "", *_short(outcome)]
+        ["*" if outcome.tr == recommended else "", *_list_short_values(outcome)]
         for outcome in outcomes
     ]
     recommendation = "none"
@@ -72,32 +109,40 @@ def as_table(scan: Scan, display: Shown) -> str:
         recommendation = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {share:.2g} of the largest"
     shown_rows = tables.as_text(("", *RUN.keys), rows, display.width)
     return "\n".join(
-        [*tables.in_line(above), "", shown_rows, "", f"recommended  {recommendation}"]
+        [
+            *tables.format_in_line(above),
+            "",
+            shown_rows,
+            "",
+            f"recommended  {recommendation}",
+        ]
     )
 
 
-def as_markdown(scan: Scan, _: Shown) -> str:
+def as_markdown(scan: Scan, _: DisplayOptions) -> str:
     """Return a Markdown table with one row for each tr."""
-    return tables.as_markdown(RUN.keys, [_short(outcome) for outcome in scan.outcomes])
+    return tables.as_markdown(
+        RUN.keys, [_list_short_values(outcome) for outcome in scan.outcomes]
+    )
 
 
-def as_csv(scan: Scan, _: Shown) -> str:
+def as_csv(scan: Scan, _: DisplayOptions) -> str:
     """Return CSV with one row for each tr, at full precision."""
-    return csv_of(RUN.keys, map(RUN.plain, scan.outcomes))
+    return write_csv(RUN.keys, map(RUN.plain, scan.outcomes))
 
 
-def _recommended(answer: Suggestion) -> float | None:
+def _get_recommended_tr(answer: PairSuggestion) -> float | None:
     return answer.recommended.tr if answer.recommended else None
 
 
-def _short(outcome: Outcome) -> list[tables.Cell]:
+def _list_short_values(outcome: Outcome) -> list[tables.Cell]:
     """Return the cells of a run with four digits: runs already differ in the second."""
     return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 
-def _time(time: float | None) -> str:
+def _format_time(time: float | None) -> str:
     return "-" if time is None else f"{time:.6g}"
 
 
-def _energy(reference: Record, time: float) -> float:
+def _interpolate_energy(reference: Record, time: float) -> float:
     return float(reference.internal_energy[abs(reference.time - time).argmin(), BOX])

@@ -8,11 +8,11 @@ from d2rpick.base.errors import list_names, make_printable
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice import health as limits
 from d2rpick.flight.flight import MOST_WORK
-from d2rpick.report.tables import measure
+from d2rpick.report.tables import format_measure
 
 if TYPE_CHECKING:
     from d2rpick.choice.health import Health
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History
 
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 _NAMED = 5
 
 
-def what_was_read(history: History) -> str:
+def describe_input(history: History) -> str:
     """Return files, format, energy and time span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     description = (
-        f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
+        f"{', '.join(history.source)}: {history.format}, {name_energy(history)}"
     )
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
     return make_printable(f"{description}, {history.time.size} states, {span}")
 
 
-def energy_name(history: History) -> str:
+def name_energy(history: History) -> str:
     """Return the name of the energy; with many parts only the first ones are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
     if len(parts) <= _NAMED:
@@ -38,20 +38,22 @@ def energy_name(history: History) -> str:
     return f"internal energy of {list_names(parts, most=_NAMED)}"
 
 
-def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
+def list_situation_heading(
+    situation: Situation, *, verbose: bool = False
+) -> list[tuple[str, str]]:
     """Return the history and what the choice rests on, as pairs of a name and a text; ``verbose`` adds the reasons."""
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
-    kinetic = "" if share is None else f", kinetic share {measure(share)}"
+    kinetic = "" if share is None else f", kinetic share {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
-        ("history", what_was_read(situation.history)),
+        ("history", describe_input(situation.history)),
         (
             "td",
             f"{situation.td:.6g}: energy {situation.energy_td:.6g}{kinetic}{estimate}",
         ),
-        ("basis", f"{_basis(situation)}{f': {why}' if why else ''}"),
+        ("basis", f"{_describe_basis(situation)}{f': {why}' if why else ''}"),
     ]
     if flight.start is None:
         lines.append(("flight", "unknown"))
@@ -64,18 +66,18 @@ def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, s
         lines.append(
             (
                 "flight",
-                f"from {flight.start:.6g} ({spoken(flight.source)}{names}), {end}",
+                f"from {flight.start:.6g} ({name_evidence(flight.source)}{names}), {end}",
             )
         )
     return [(name, make_printable(text)) for name, text in lines]
 
 
-def spoken(source: str | None) -> str:
+def name_evidence(source: str | None) -> str:
     """Return the name of the source of a flight for people."""
     return "energy alone, not certain" if source == "energy" else str(source)
 
 
-def _basis(situation: Situation) -> str:
+def _describe_basis(situation: Situation) -> str:
     """Return what the choice rests on, and the fitted oscillator."""
     fit = situation.evidence.fit
     vibration = situation.vibration
@@ -86,7 +88,7 @@ def _basis(situation: Situation) -> str:
             kinetic = "; kinetic energy from the modes of each part"
         else:
             kinetic = ""
-        return f"{summary}{kinetic}" if summary else _level_alone(situation)
+        return f"{summary}{kinetic}" if summary else _explain_level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
@@ -100,7 +102,7 @@ def _basis(situation: Situation) -> str:
     return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
 
 
-def _level_alone(situation: Situation) -> str:
+def _explain_level_alone(situation: Situation) -> str:
     """Return a note that no deformation is known, with the reason if it is that several modes vibrate."""
     if situation.at_rest:
         return "energy: nothing vibrates"
@@ -109,7 +111,7 @@ def _level_alone(situation: Situation) -> str:
     return f"energy level alone ({several}the sign is unknown)"
 
 
-def head(health: Health) -> tuple[str, ...]:
+def list_health_columns(health: Health) -> tuple[str, ...]:
     """Return the column names of a table of health; the first says up to which time the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
@@ -128,45 +130,51 @@ class Measure(NamedTuple):
     good: bool | None
 
 
-def measures_of(health: Health) -> list[Measure]:
+def list_health_measures(health: Health) -> list[Measure]:
     """Return all health measures of a run, those of its rigid window last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)
     part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
     measures = [
-        _share("hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS),
-        _share(part, health.part_hourglass_share, limits.MOST_HOURGLASS),
+        _make_share_measure(
+            "hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS
+        ),
+        _make_share_measure(part, health.part_hourglass_share, limits.MOST_HOURGLASS),
         Measure(
             "energy ratio",
             span and f"{span[0]:.4g} to {span[1]:.4g}",
             f"within {limits.MOST_IMBALANCE:.0%} of 1",
             span and max(1 - span[0], span[1] - 1) <= limits.MOST_IMBALANCE,
         ),
-        _share("contact energy", health.sliding_share, limits.MOST_SLIDING),
-        _share(
+        _make_share_measure(
+            "contact energy", health.sliding_share, limits.MOST_SLIDING
+        ),
+        _make_share_measure(
             "negative contact energy",
             health.negative_sliding_share,
             limits.MOST_NEGATIVE_SLIDING,
         ),
-        _share("energy of deleted elements", health.eroded_share, MOST_WORK),
+        _make_share_measure(
+            "energy of deleted elements", health.eroded_share, MOST_WORK
+        ),
     ]
     if health.window:
         measures += [
-            _share(
+            _make_share_measure(
                 "change of contact energy in the window",
                 health.window_sliding,
                 MOST_WORK,
             ),
-            _share(
+            _make_share_measure(
                 "work beyond gravity and damping there", health.window_work, MOST_WORK
             ),
-            _share("energy deleted there", health.window_eroded, 0.0),
+            _make_share_measure("energy deleted there", health.window_eroded, 0.0),
         ]
     return measures
 
 
-def _share(name: str, share: float | None, limit_share: float) -> Measure:
+def _make_share_measure(name: str, share: float | None, limit_share: float) -> Measure:
     limit = f"at most {limit_share:.0%}" if limit_share else "none"
     return Measure(
         name,

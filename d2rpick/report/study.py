@@ -6,25 +6,31 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.grades import VERDICTS
-from d2rpick.choice.study import OK, Study, StudyRow, cut_runs, runs_of
+from d2rpick.choice.pair.grades import VERDICTS
+from d2rpick.choice.runs.study import (
+    OK,
+    StudyOfRuns,
+    StudyRow,
+    find_cut_runs,
+    format_number_of_runs,
+)
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
     Field,
-    csv_of,
-    kind_of,
+    get_kind,
     many,
     maybe,
     one_of,
     row,
+    write_csv,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
 
 STATUS: Final = one_of(
     "ok", "none", "unreadable", "out-of-range", "failed", "internal-error"
@@ -93,13 +99,13 @@ _SHARED: Final = row(
     Field("common_errors", many("number?"), "Errors of the runs at common_tr, in their order; empty without it.",
           lambda answer: answer.common.errors),
 )  # fmt: skip
-_RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(with_errors(answer)))
+_RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))
 _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
 # Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and the line after them.
-_CURVE: Final = kind_of(many(many("number")), minItems=2, maxItems=2)
+_CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
@@ -122,58 +128,68 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Study, display: Shown) -> str:
+def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
     """Return what the runs have in common, and one line per run with its shortened name."""
-    head, rows = tables.known(*table(answer))
+    head, rows = tables.select_known_columns(*build_run_table(answer))
     rows = [
         [name, *row[1:]]
         for name, row in zip(
-            short_names([row.source for row in answer.runs]), rows, strict=True
+            shorten_names([row.source for row in answer.runs]), rows, strict=True
         )
     ]
-    outcome_lines = tables.in_line([*outcome(answer), *reasons(answer)])
+    outcome_lines = tables.format_in_line(
+        [*list_outcome(answer), *list_run_reasons(answer)]
+    )
     return "\n".join(
         [*outcome_lines, "", tables.as_text(head, rows, display.width, _SPARE)]
     )
 
 
-def as_markdown(answer: Study, _: Shown) -> str:
+def as_markdown(answer: StudyOfRuns, _: DisplayOptions) -> str:
     """Return what the runs have in common, and the runs as a Markdown table."""
-    outcome_lines = tables.listed([*outcome(answer), *reasons(answer)])
+    outcome_lines = tables.format_as_list(
+        [*list_outcome(answer), *list_run_reasons(answer)]
+    )
     listed = "\n".join(f"* {line}" for line in outcome_lines)
-    return f"{listed}\n\n{tables.as_markdown(*table(answer))}"
+    return f"{listed}\n\n{tables.as_markdown(*build_run_table(answer))}"
 
 
-def as_csv(answer: Study, _: Shown) -> str:
+def as_csv(answer: StudyOfRuns, _: DisplayOptions) -> str:
     """Return CSV with one row per run and a column for each key of the JSON output."""
-    return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
+    return write_csv(RUN.keys, map(RUN.plain, add_errors(answer)))
 
 
-def as_ndjson(answer: Study, display: Shown) -> str:
+def as_ndjson(answer: StudyOfRuns, display: DisplayOptions) -> str:
     """Return the lines of the runs that are not written yet, and what the runs have in common."""
     return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
-def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
+def add_errors(answer: StudyOfRuns) -> Iterator[tuple[StudyRow, float | None]]:
     """Yield the runs, each with its error at the common tr."""
     return zip(
         answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True
     )
 
 
-def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
+def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of the runs."""
-    cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.runs)}
+    cut = {
+        row.source: f"cut at {row.record_end:g}; " for row in find_cut_runs(answer.runs)
+    }
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda run_and_error: run_and_error[0].source,
         "tr": lambda run_and_error: run_and_error[0].tr,
-        "+-": lambda run_and_error: tables.half(
+        "+-": lambda run_and_error: tables.format_half_width(
             run_and_error[0].tr_low, run_and_error[0].tr_high
         ),
         "td": lambda run_and_error: run_and_error[0].td,
         "E(td)": lambda run_and_error: run_and_error[0].energy_td,
-        "residual": lambda run_and_error: tables.measure(run_and_error[0].residual),
-        "error at common tr": lambda run_and_error: tables.measure(run_and_error[1]),
+        "residual": lambda run_and_error: tables.format_measure(
+            run_and_error[0].residual
+        ),
+        "error at common tr": lambda run_and_error: tables.format_measure(
+            run_and_error[1]
+        ),
         "verdict": lambda run_and_error: run_and_error[0].verdict,
         "basis": lambda run_and_error: run_and_error[0].basis,
         "status": lambda run_and_error: (
@@ -186,10 +202,10 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
             ).removeprefix(f"{run_and_error[0].source.rstrip('/')}: ")
         ),
     }
-    return tables.filled(columns, with_errors(answer))
+    return tables.fill_table(columns, add_errors(answer))
 
 
-def outcome(answer: Study) -> list[tuple[str, str]]:
+def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     """Return what the runs have in common, as pairs of a name and a text."""
     spread = answer.spread
     common = answer.common
@@ -204,39 +220,45 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     if common.tr is not None and common.window:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
-        runs = f"{answer.judged} of {runs_of(len(answer.runs))}"
-        shared = f"common tr = {common.tr:g}, for {runs}, error {_span(errors)}"
+        runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
+        shared = (
+            f"common tr = {common.tr:g}, for {runs}, error {_format_error_span(errors)}"
+        )
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
-        ("each run", _verdicts(answer)),
-        ("td", td_of(answer)),
+        ("each run", _count_verdicts(answer)),
+        ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
 
 
-def _span(errors: Sequence[float]) -> str:
+def _format_error_span(errors: Sequence[float]) -> str:
     """Return the smallest and largest of some errors, or one number if they are displayed the same."""
-    low = tables.measure(min(errors))
-    high = tables.measure(max(errors))
+    low = tables.format_measure(min(errors))
+    high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
 
 
-def _verdicts(answer: Study) -> str:
+def _count_verdicts(answer: StudyOfRuns) -> str:
     """Return how many runs have each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
-        f"{word} in {runs_of(counts[word])}"
+        f"{word} in {format_number_of_runs(counts[word])}"
         for word in VERDICTS.values()
         if counts[word]
     ]
     undecided_count = sum(row.verdict is None for row in answer.runs)
     return ", ".join(
-        [*counted, *[f"no pair in {runs_of(undecided_count)}"] * (undecided_count > 0)]
+        [
+            *counted,
+            *[f"no pair in {format_number_of_runs(undecided_count)}"]
+            * (undecided_count > 0),
+        ]
     )
 
 
-def reasons(answer: Study) -> list[tuple[str, str]]:
+def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
     """Return each reason once why pairs of runs are not better, and what would improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
@@ -244,12 +266,15 @@ def reasons(answer: Study) -> list[tuple[str, str]]:
         if row.cure and row.verdict
     )
     return [
-        ("why", f"{verdict} in {runs_of(count)}: {reason}. To improve: {cure}")
+        (
+            "why",
+            f"{verdict} in {format_number_of_runs(count)}: {reason}. To improve: {cure}",
+        )
         for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
     ]
 
 
-def td_of(answer: Study) -> str:
+def describe_td(answer: StudyOfRuns) -> str:
     """Return the td of all runs, or the range in which each run has its own td."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
@@ -258,14 +283,14 @@ def td_of(answer: Study) -> str:
     return f"{answer.td:.6g}"
 
 
-def short_names(sources: Sequence[str]) -> tuple[str, ...]:
+def shorten_names(sources: Sequence[str]) -> tuple[str, ...]:
     """Return the distinctive part of each name, without folders and file names that all have in common.
 
     Examples
     --------
-    >>> short_names(["runs/soft/glstat", "runs/hard/glstat"])
+    >>> shorten_names(["runs/soft/glstat", "runs/hard/glstat"])
     ('soft', 'hard')
-    >>> short_names(["runs/a.csv", "runs/b.csv"])
+    >>> shorten_names(["runs/a.csv", "runs/b.csv"])
     ('a.csv', 'b.csv')
     """
     paths = [PurePath(source).parts for source in sources]

@@ -5,27 +5,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.choice.grades import DO_NOT_USE
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
-    accuracy,
-    headed,
-    in_short,
-    rigid_for,
-    saving,
-    statements,
+    format_accuracy,
+    format_in_short,
+    format_rigid_time,
+    format_saving,
+    list_statements,
+    list_verdict_lines,
 )
-from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
-from d2rpick.report.situation import heading
+from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow, Suggestion
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.decision import Decision
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.answers import AcceptableWindow, PairSuggestion
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.report.formats import DisplayOptions
 
 # largest number of windows of acceptable tr that a line names
 _NAMED = 4
@@ -51,21 +51,22 @@ _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
 
 
-def _decided(answer: Suggestion) -> list[tuple[Candidate, Decision]]:
+def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
     """Return each candidate with the decision on it."""
     return [
         (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
     ]
 
 
-def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
+def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | None:
     """Return the windows of acceptable tr, and which of them contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
     if windows is None:
         return None
     return [
-        {**window._asdict(), "recommended": holds(window, tr)} for window in windows
+        {**window._asdict(), "recommended": has_recommended_tr(window, tr)}
+        for window in windows
     ]
 
 
@@ -78,9 +79,9 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
           "the longest acceptable pair in td_window, where much rigid time was given up for quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
-    Field("candidates", many(CANDIDATE), get=_decided),
+    Field("candidates", many(CANDIDATE), get=_add_decisions),
     Field("acceptable_windows", maybe(many(_WINDOW)),
-          "on basis energy: windows in which every tr is acceptable, null on another basis", _windows),
+          "on basis energy: windows in which every tr is acceptable, null on another basis", _list_acceptable_windows),
     Field("recommended", maybe(keys.TIMES)),
     *keys.QUALITY,
     keys.HEALTH,
@@ -92,37 +93,46 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 ))  # fmt: skip
 
 
-def as_table(answer: Suggestion, display: Shown) -> str:
+def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
     """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
 
     If nothing is recommended, candidates are listed only if all details are asked for.
     """
-    above = heading(answer.situation, verbose=display.verbose)
+    above = list_situation_heading(answer.situation, verbose=display.verbose)
     lines = [
-        *tables.in_line((*verdict(answer), *next_step(answer))),
+        *tables.format_in_line((*list_verdict(answer), *list_next_step(answer))),
         "",
-        *tables.in_line((*facts(answer), *outlook(answer), *above)),
+        *tables.format_in_line(
+            (*list_evidence(answer), *list_alternatives(answer), *above)
+        ),
     ]
     if answer.candidates and (answer.recommended or display.verbose):
-        lines += ["", tables.as_text(*_some(answer, display), display.width, _SPARE)]
+        lines += [
+            "",
+            tables.as_text(
+                *_select_shown_candidates(answer, display), display.width, _SPARE
+            ),
+        ]
         hidden_count = len(answer.candidates) - display.limit
         lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
     return "\n".join(lines)
 
 
-def as_markdown(answer: Suggestion, display: Shown) -> str:
+def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
     """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
-    above = tables.listed((*verdict(answer), *next_step(answer)))
-    below = tables.listed((*facts(answer), *outlook(answer)))
-    table = tables.as_markdown(*_some(answer, display))
+    above = tables.format_as_list((*list_verdict(answer), *list_next_step(answer)))
+    below = tables.format_as_list((*list_evidence(answer), *list_alternatives(answer)))
+    table = tables.as_markdown(*_select_shown_candidates(answer, display))
     return "\n\n".join([*above, table, *below])
 
 
-def _some(
-    answer: Suggestion, display: Shown
+def _select_shown_candidates(
+    answer: PairSuggestion, display: DisplayOptions
 ) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the first candidates, without empty columns."""
-    head, rows = tables.known(*table(answer, display.limit))
+    head, rows = tables.select_known_columns(
+        *build_candidate_table(answer, display.limit)
+    )
     shown_columns = [
         i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
     ]
@@ -131,49 +141,55 @@ def _some(
     ]
 
 
-def as_csv(answer: Suggestion, _: Shown) -> str:
+def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
     """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
-    return csv_of(
+    return write_csv(
         columns,
-        ({**CANDIDATE.plain(candidate), "td": td} for candidate in _decided(answer)),
+        (
+            {**CANDIDATE.plain(candidate), "td": td}
+            for candidate in _add_decisions(answer)
+        ),
     )
 
 
-def verdict(answer: Suggestion) -> list[tuple[str, str]]:
+def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better
     lines = [("no pair to use", answer.why_none)]
     if best and decision:
-        lines = headed(decision, best.tr, answer.td)
+        lines = list_verdict_lines(decision, best.tr, answer.td)
     if better and not (decision and decision.better):
         lines.append(
-            ("better pair", f"{_times(better)}: {better_about(answer, better)}")
+            (
+                "better pair",
+                f"{_format_times(better)}: {describe_improvement(answer, better)}",
+            )
         )
     return lines
 
 
-def facts(answer: Suggestion) -> list[tuple[str, str]]:
+def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the evidence for the verdict, the rigid time, and the accuracy of tr, each with its name."""
     best = answer.chosen
     decision = answer.decision
     if best is None or decision is None:
         return []
-    lines = [*statements(decision), ("rigid for", rigid_for(best))]
-    if saves := saving(best):
+    lines = [*list_statements(decision), ("rigid for", format_rigid_time(best))]
+    if saves := format_saving(best):
         lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
         lines.append(("keeps", "no switch keeps this vibration"))
-    if exact := accuracy(best):
+    if exact := format_accuracy(best):
         lines.append(("tr", exact))
     return lines
 
 
-def next_step(answer: Suggestion) -> list[tuple[str, str]]:
+def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the next command for a pair that can be used."""
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
@@ -186,24 +202,26 @@ def next_step(answer: Suggestion) -> list[tuple[str, str]]:
     ]
 
 
-def better_about(answer: Suggestion, better: Pair) -> str:
+def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
     """Return in which respect the better pair is better."""
     recommended = answer.recommended
     if recommended is None:
         return "there an acceptable tr exists"
     if better.residual is not None and recommended.residual is not None:
-        better_residual = tables.measure(better.residual)
-        return f"residual {better_residual} instead of {tables.measure(recommended.residual)}"
+        residuals = [
+            tables.format_measure(pair.residual) for pair in (better, recommended)
+        ]
+        return f"residual {residuals[0]} instead of {residuals[1]}"
     level = answer.situation.vibration.whole.energy(better.td)
     own_level = answer.situation.energy_td
     return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
 
 
-def outlook(answer: Suggestion) -> list[tuple[str, str]]:
+def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
     if answer.windows:
-        lines = [("acceptable", acceptable(answer.windows, chosen))]
+        lines = [("acceptable", describe_acceptable_windows(answer.windows, chosen))]
     else:
         lines = []
     best = answer.chosen
@@ -211,15 +229,19 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
         lines.append(
             (
                 "position",
-                position(best, deck=answer.situation.settings.bodies is not None),
+                describe_position_error(
+                    best, deck=answer.situation.settings.bodies is not None
+                ),
             )
         )
     if answer.longer and answer.recommended:
-        lines.append(("longer", given_up(answer.longer, answer.recommended)))
+        lines.append(
+            ("longer", describe_given_up_time(answer.longer, answer.recommended))
+        )
     return lines
 
 
-def position(best: Candidate, *, deck: bool) -> str:
+def describe_position_error(best: Candidate, *, deck: bool) -> str:
     """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
@@ -233,27 +255,33 @@ def position(best: Candidate, *, deck: bool) -> str:
     return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
-def given_up(longer: Pair, chosen: Pair) -> str:
+def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
     """Return how much rigid time was given up for a better level or residual, and how much better it is."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:
-        better_quality = f"residual {tables.measure(longer.residual)}"
+        better_quality = f"residual {tables.format_measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
     return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
-def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
+def describe_acceptable_windows(
+    windows: Sequence[AcceptableWindow], tr: float | None
+) -> str:
     """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
     named_windows = sorted(
-        windows, key=lambda window: (not holds(window, tr), window.start - window.end)
+        windows,
+        key=lambda window: (
+            not has_recommended_tr(window, tr),
+            window.start - window.end,
+        ),
     )[:_NAMED]
     window_texts = [
-        f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
+        f"{format_window(w.start, w.end)} ({w.share:.1%}{', recommended' * has_recommended_tr(w, tr)})"
         for w in named_windows
     ]
     if len(windows) > len(named_windows):
@@ -263,12 +291,12 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     return f"every tr from {'; '.join(window_texts)}{shorter_text}; in all {share:.0%} of the flight up to td"
 
 
-def holds(window: AcceptableWindow, tr: float | None) -> bool:
+def has_recommended_tr(window: AcceptableWindow, tr: float | None) -> bool:
     """Return True if the recommended tr lies in the window."""
     return tr is not None and window.start <= tr <= window.end
 
 
-def as_value(answer: Suggestion, _: Shown) -> str:
+def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
     """Return the recommended tr, and td if it was chosen too, with the fewest digits that give the same number.
 
     Without a recommendation the text is empty.
@@ -279,35 +307,37 @@ def as_value(answer: Suggestion, _: Shown) -> str:
     return f"{pair.tr!r} {pair.td!r}" if answer.td_window else repr(pair.tr)
 
 
-def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.Cell]]]:
+def build_candidate_table(
+    answer: PairSuggestion, limit: int
+) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of the first ``limit`` candidates."""
     columns: dict[str, Callable[[Candidate], tables.Cell]] = {
         "": lambda c: "*" if c.recommended else " ",
         "rank": lambda c: c.rank,
         "tr": lambda c: c.tr,
-        "+-": lambda c: tables.half(c.tr_low, c.tr_high),
+        "+-": lambda c: tables.format_half_width(c.tr_low, c.tr_high),
         "kind": lambda c: c.kind,
         "E(tr)/E(td)": lambda c: c.level_ratio,
         "direction": lambda c: {True: "same", False: "opposite", None: None}[
             c.sign_match
         ],
-        "lock-in error": lambda c: tables.measure(c.lock_in_error),
-        "residual": lambda c: tables.measure(c.residual),
-        "timing tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
+        "lock-in error": lambda c: tables.format_measure(c.lock_in_error),
+        "residual": lambda c: tables.format_measure(c.residual),
+        "timing tolerance": lambda c: tables.format_if_known(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,
         "verdict": lambda c: _shorten_verdict(answer, c),
     }
-    return tables.filled(columns, answer.candidates[:limit])
+    return tables.fill_table(columns, answer.candidates[:limit])
 
 
-def _shorten_verdict(answer: Suggestion, candidate: Candidate) -> str:
+def _shorten_verdict(answer: PairSuggestion, candidate: Candidate) -> str:
     """Return the verdict on a candidate with its reason, unless the lines above the table give the same reason."""
     decision = answer.decision_on(candidate)
     answered = answer.decision
     if answered is not None and decision.reason == answered.reason:
         return decision.verdict
-    return in_short(decision)
+    return format_in_short(decision)
 
 
-def _times(pair: Pair) -> str:
+def _format_times(pair: Pair) -> str:
     return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"

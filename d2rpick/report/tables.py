@@ -27,12 +27,12 @@ _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
 _TEXT: Final = 20
 
 
-def short(value: Cell) -> str:
+def format_short(value: Cell) -> str:
     """Write a cell for people: six significant digits, a dash if the value is unknown.
 
     Examples
     --------
-    >>> short(0.0128852793630525), short(None), short(True)
+    >>> format_short(0.0128852793630525), format_short(None), format_short(True)
     ('0.0128853', '-', 'yes')
     """
     if value is None:
@@ -42,35 +42,35 @@ def short(value: Cell) -> str:
     return f"{value:.6g}" if isinstance(value, float) else make_printable(str(value))
 
 
-def measure(value: float | None) -> str:
+def format_measure(value: float | None) -> str:
     """Write a share or an error with three decimals, such as 0.957, or a dash if it is unknown.
 
     Examples
     --------
-    >>> measure(0.95744), measure(3e-16)
+    >>> format_measure(0.95744), format_measure(3e-16)
     ('0.957', '0.000')
     """
     return "-" if value is None else f"{value:.3f}"
 
 
-def shown(value: float | None, form: str) -> str | None:
+def format_if_known(value: float | None, form: str) -> str | None:
     """Format a number by a Python format such as ``.0%``; return None if it is unknown."""
     return None if value is None else format(value, form)
 
 
-def half(low: float | None, high: float | None) -> str | None:
+def format_half_width(low: float | None, high: float | None) -> str | None:
     """Return half the width of an interval as text, for use after +-; None if it is unknown."""
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
-def known(
+def select_known_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
     """Leave out the columns without a known value.
 
     Examples
     --------
-    >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
+    >>> select_known_columns(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
     (['tr'], [[0.5], [0.7]])
     """
     known_columns = [
@@ -83,14 +83,14 @@ def known(
     ]
 
 
-def filled(
+def fill_table(
     columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]
 ) -> tuple[list[str], list[list[Cell]]]:
     """Return the names of the columns, and one row of cells per object.
 
     Examples
     --------
-    >>> filled({"word": str, "letters": len}, ["tr", "flight"])
+    >>> fill_table({"word": str, "letters": len}, ["tr", "flight"])
     (['word', 'letters'], [['tr', 2], ['flight', 6]])
     """
     return list(columns), [
@@ -98,7 +98,7 @@ def filled(
     ]
 
 
-def unstarred(
+def remove_star_column(
     head: Sequence[str], rows: Iterable[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
     """Leave out the first column, which has a star for what is recommended, and write +- as ``±`` for a page."""
@@ -107,16 +107,18 @@ def unstarred(
     ]
 
 
-def in_line(named_texts: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
+def format_in_line(
+    named_texts: Iterable[tuple[str, Cell]], width: int = 0
+) -> list[str]:
     """Return aligned lines of a name and its text; names take ``width`` letters, by default as many as the longest."""
     lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
-    return [f"{name.ljust(width)}  {short(value)}" for name, value in lines]
+    return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
 
 
-def listed(named_texts: Iterable[tuple[str, str]]) -> list[str]:
+def format_as_list(named_texts: Iterable[tuple[str, str]]) -> list[str]:
     """Return pairs of a name and a text as paragraphs of Markdown."""
-    return [f"{name}: {in_markdown(text)}" for name, text in named_texts]
+    return [f"{name}: {escape_markdown(text)}" for name, text in named_texts]
 
 
 def as_text(
@@ -144,7 +146,10 @@ def as_text(
     """
     body = list(rows)
     columns = {name: [row[i] for row in body] for i, name in enumerate(head)}
-    texts = {name: [short(name), *map(short, cells)] for name, cells in columns.items()}
+    texts = {
+        name: [format_short(name), *map(format_short, cells)]
+        for name, cells in columns.items()
+    }
     widths = {name: max(map(len, column)) for name, column in texts.items()}
     for name in spare:
         if (
@@ -156,39 +161,42 @@ def as_text(
         all(cell is None or isinstance(cell, (int, float)) for cell in columns[name])
         for name in texts
     ]
-    narrow = _narrowed([*zip(*texts.values(), strict=True)], [*widths.values()], width)
+    narrow = _reduce_widths(
+        [*zip(*texts.values(), strict=True)], [*widths.values()], width
+    )
     lines = (
         "  ".join(
             t.rjust(w) if r else t.ljust(w)
             for t, w, r in zip(line, narrow, is_number, strict=True)
         )
         for row in zip(*texts.values(), strict=True)
-        for line in _broken(row, narrow)
+        for line in _wrap_cells(row, narrow)
     )
     return "\n".join(line.rstrip() for line in lines)
 
 
-def wrapped(text: str, width: int) -> str:
+def wrap_lines(text: str, width: int) -> str:
     r"""Wrap the lines of a text that are longer than ``width``; further lines are indented to the text after the name.
 
     Examples
     --------
-    >>> print(wrapped("quality  fair: the sign is unknown\nbasis    energy", 24))
+    >>> print(wrap_lines("quality  fair: the sign is unknown\nbasis    energy", 24))
     quality  fair: the sign
              is unknown
     basis    energy
     """
     return "\n".join(
-        line if len(line) <= width else _below(line, width) for line in text.split("\n")
+        line if len(line) <= width else _wrap_below_name(line, width)
+        for line in text.split("\n")
     )
 
 
-def continued(line: str, width: int) -> str:
+def wrap_command(line: str, width: int) -> str:
     r"""Wrap a command line that is longer than ``width`` before options, so that a shell reads it as one line.
 
     Examples
     --------
-    >>> print(continued("d2rpick drive --engine 'engine -i {deck}' -o driven", 44))
+    >>> print(wrap_command("d2rpick drive --engine 'engine -i {deck}' -o driven", 44))
     d2rpick drive --engine 'engine -i {deck}' \
         -o driven
     """
@@ -207,7 +215,7 @@ def continued(line: str, width: int) -> str:
     return " \\\n".join(wrapper.wrap(line))
 
 
-def _below(line: str, width: int) -> str:
+def _wrap_below_name(line: str, width: int) -> str:
     """Wrap a line, and indent its further lines to the text after the name, or like the line itself."""
     from textwrap import fill
 
@@ -222,7 +230,7 @@ def _below(line: str, width: int) -> str:
     )
 
 
-def _narrowed(
+def _reduce_widths(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
     """Reduce the widest columns until a table fits: first wrap names, then cells, and split words last."""
@@ -247,18 +255,18 @@ def _narrowed(
     return narrowed
 
 
-def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
+def _wrap_cells(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
     """Yield the lines of a row whose cells are wrapped to the widths of their columns."""
     from itertools import zip_longest
 
     cells = (
-        _lines(text, width) if len(text) > width else [text]
+        _wrap_words(text, width) if len(text) > width else [text]
         for text, width in zip(row, widths, strict=True)
     )
     yield from (list(line) for line in zip_longest(*cells, fillvalue=""))
 
 
-def _lines(text: str, width: int) -> list[str]:
+def _wrap_words(text: str, width: int) -> list[str]:
     """Wrap a text between words; too long words break after the signs that join names, folders and part ids."""
     from textwrap import TextWrapper
 
@@ -279,19 +287,19 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     | 0.5 | crossing |
     """
     lines = [
-        [short(name) for name in head],
+        [format_short(name) for name in head],
         ["---"] * len(head),
-        *([in_markdown(short(c)) for c in row] for row in rows),
+        *([escape_markdown(format_short(c)) for c in row] for row in rows),
     ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def in_markdown(text: str) -> str:
+def escape_markdown(text: str) -> str:
     r"""Escape the Markdown markup in a name, and replace unprintable characters.
 
     Examples
     --------
-    >>> print(in_markdown("a|b"), in_markdown("C:\\run"), in_markdown("<i>part_1</i>"))
+    >>> print(escape_markdown("a|b"), escape_markdown("C:\\run"), escape_markdown("<i>part_1</i>"))
     a\|b C:\\run \<i>part_1\</i>
     """
     return re.sub(
@@ -318,12 +326,12 @@ def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(_exact, head))
-    writer.writerows(map(_exact, row) for row in rows)
+    writer.writerow(map(_make_exact_cell, head))
+    writer.writerows(map(_make_exact_cell, row) for row in rows)
     return text.getvalue()
 
 
-def _exact(value: Cell) -> Cell:
+def _make_exact_cell(value: Cell) -> Cell:
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(value, str):
@@ -352,12 +360,12 @@ def as_json(result: Any, indent: int | None = 2) -> str:
     )
 
 
-def shell_line(words: Iterable[str]) -> str:
+def quote_shell_line(words: Iterable[str]) -> str:
     r"""Quote words so that bash, zsh and POSIX shells of 2024 restore them, in printable characters only.
 
     Examples
     --------
-    >>> print(shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
+    >>> print(quote_shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
     import shlex  # imported here to keep the start fast
@@ -365,17 +373,17 @@ def shell_line(words: Iterable[str]) -> str:
     return " ".join(
         shlex.quote(word)
         if word.isprintable()
-        else f"$'{''.join(map(_escaped, word))}'"
+        else f"$'{''.join(map(_escape_letter, word))}'"
         for word in words
     )
 
 
-def positional(names: Sequence[str]) -> tuple[str, ...]:
+def make_positional(names: Sequence[str]) -> tuple[str, ...]:
     """Return names as they are typed after the options: after ``--`` if one could be mistaken for an option.
 
     Examples
     --------
-    >>> positional(["glstat", "-"]), positional(["-run.csv"])
+    >>> make_positional(["glstat", "-"]), make_positional(["-run.csv"])
     (('glstat', '-'), ('--', '-run.csv'))
     """
     return (
@@ -388,7 +396,7 @@ def positional(names: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def _escaped(letter: str) -> str:
+def _escape_letter(letter: str) -> str:
     if letter.isprintable():
         return f"\\{letter}" if letter in "\\'" else letter
     # Bytes of a file name that are not valid text are lone surrogates.

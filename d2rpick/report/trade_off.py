@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.quality import EQUALLY_GOOD
+from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import headed, in_short
-from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
-from d2rpick.report.situation import what_was_read
+from d2rpick.report.decision import format_in_short, list_verdict_lines
+from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.situation import describe_input
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.trade_off import Offer, TradeOff
-    from d2rpick.report.formats import Shown
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
+    from d2rpick.report.formats import DisplayOptions
 
 OFFER: Final = row(
     Field("td", "number"),
@@ -62,20 +62,22 @@ _SPARE: Final = (
 _NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
 
 
-def as_table(trade_off: TradeOff, display: Shown) -> str:
+def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     """Return the answer in a sentence, the verdict on the best pair, some Pareto-optimal offers, and the input."""
-    listed_offers = some_of(trade_off, display.limit)
+    listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
-            *tables.known(*table(listed_offers)), display.width, _SPARE
+            *tables.select_known_columns(*build_offer_table(listed_offers)),
+            display.width,
+            _SPARE,
         )
     else:
         offered = "nothing to offer"
     low, high = trade_off.td_window
     window = f"{len(trade_off.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
-        make_printable(answer(trade_off)),
-        *tables.in_line(verdict(trade_off)),
+        make_printable(give_answer(trade_off)),
+        *tables.format_in_line(list_offer_verdict(trade_off)),
         "",
         offered,
     ]
@@ -83,36 +85,38 @@ def as_table(trade_off: TradeOff, display: Shown) -> str:
     if hidden_count:
         lines.append(f"... and {hidden_count} more td (--limit; csv and json have all)")
     input_lines = [
-        ("history", what_was_read(trade_off.situation.history)),
+        ("history", describe_input(trade_off.situation.history)),
         ("td", window),
     ]
-    return "\n".join([*lines, "", *tables.in_line(input_lines)])
+    return "\n".join([*lines, "", *tables.format_in_line(input_lines)])
 
 
-def verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
+def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
     best = trade_off.recommended
     if best is None or best.best is None or best.decision is None:
         return [("no pair to use", "no td in the window has an acceptable tr")]
-    return headed(best.decision, best.best.tr, best.td)
+    return list_verdict_lines(best.decision, best.best.tr, best.td)
 
 
-def as_markdown(trade_off: TradeOff, display: Shown) -> str:
+def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
     """Return the same offers as a Markdown table, with the answer below it."""
-    offer_table = tables.known(*table(some_of(trade_off, display.limit)))
+    offer_table = tables.select_known_columns(
+        *build_offer_table(select_offers(trade_off, display.limit))
+    )
     paragraphs = [
-        tables.in_markdown(answer(trade_off)),
-        *tables.listed(verdict(trade_off)),
+        tables.escape_markdown(give_answer(trade_off)),
+        *tables.format_as_list(list_offer_verdict(trade_off)),
     ]
     return "\n\n".join([*paragraphs, tables.as_markdown(*offer_table)])
 
 
-def as_csv(trade_off: TradeOff, _: Shown) -> str:
+def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
     """Return CSV with all offers and a column for each key of ``offers`` in the JSON output that is a single value."""
-    return csv_of(COLUMNS, map(OFFER.plain, trade_off.offers))
+    return write_csv(COLUMNS, map(OFFER.plain, trade_off.offers))
 
 
-def answer(trade_off: TradeOff) -> str:
+def give_answer(trade_off: TradeOff) -> str:
     """Return in one sentence how good the requested td is, and what a change to another td gains or costs.
 
     Without a requested td, the comparison starts from the td that saves most.
@@ -128,17 +132,19 @@ def answer(trade_off: TradeOff) -> str:
         return (
             quality_text
             if step is None
-            else f"{quality_text}; {_away(start, step, unit)} has one"
+            else f"{quality_text}; {_describe_distance(start, step, unit)} has one"
         )
     if not trade_off.asked:
-        quality_text = f"{start_text}, {_error(start)}"
+        quality_text = f"{start_text}, {_format_offer_error(start)}"
     else:
-        quality_text = f"{start_text}: {_error(start)}"
+        quality_text = f"{start_text}: {_format_offer_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
         return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
-    change = f"{_less(start, step)} and {_cost(start, step)}"
-    return f"{quality_text}; {_away(start, step, unit)} {change}"
+    distance = _describe_distance(start, step, unit)
+    error_change = _describe_error_change(start, step)
+    cost_change = _describe_cost_change(start, step)
+    return f"{quality_text}; {distance} {error_change} and {cost_change}"
 
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
@@ -147,7 +153,7 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
     Field("td_window", "span",
           "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
-    Field("answer", "text", "the shortest sensible answer", answer),
+    Field("answer", "text", "the shortest sensible answer", give_answer),
     Field("recommended", maybe(keys.TIMES)),
     Field("start", "number?",
           "td of the offer that the answer starts from: the one asked for, else the one that saves most",
@@ -160,14 +166,14 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 ))  # fmt: skip
 
 
-def _away(start: Offer, step: Offer, unit: str) -> str:
+def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
     """Return how far the other td is away, and its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
 
 
-def _less(start: Offer, step: Offer) -> str:
+def _describe_error_change(start: Offer, step: Offer) -> str:
     """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
@@ -177,7 +183,7 @@ def _less(start: Offer, step: Offer) -> str:
     return f"{'halves the error' if halves else 'cuts the error'} to {step.error:.3f}"
 
 
-def _cost(start: Offer, step: Offer) -> str:
+def _describe_cost_change(start: Offer, step: Offer) -> str:
     """Return how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
@@ -194,16 +200,18 @@ def _cost(start: Offer, step: Offer) -> str:
     return f"makes the rigid time {change:.1%} longer"
 
 
-def _error(offer: Offer) -> str:
+def _format_offer_error(offer: Offer) -> str:
     """Return the error of an offer with its name."""
     if offer.error is None:
         return "a level above twice the mean energy"
     if offer.basis == "energy":
-        return f"error {tables.measure(offer.error)} (shortfall of the level at td)"
-    return f"residual {tables.measure(offer.error)}"
+        return (
+            f"error {tables.format_measure(offer.error)} (shortfall of the level at td)"
+        )
+    return f"residual {tables.format_measure(offer.error)}"
 
 
-def some_of(trade_off: TradeOff, limit: int) -> list[Offer]:
+def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
     """Return the offers that the answer names, and Pareto-optimal ones at even distances, up to ``limit`` in all."""
     named_td = {
         offer.td
@@ -227,15 +235,17 @@ def some_of(trade_off: TradeOff, limit: int) -> list[Offer]:
     return [offer for offer in trade_off.offers if offer.td in named_td]
 
 
-def table(offers: Sequence[Offer]) -> tuple[list[str], list[list[tables.Cell]]]:
+def build_offer_table(
+    offers: Sequence[Offer],
+) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of some offers; the recommended offer has a star."""
-    return tables.filled(_COLUMNS, offers)
+    return tables.fill_table(_COLUMNS, offers)
 
 
-def _of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
+def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
     """Return a function that formats a measure of the best pair of an offer."""
     return lambda offer: (
-        tables.shown(getattr(offer.best, key), form) if offer.best else None
+        tables.format_if_known(getattr(offer.best, key), form) if offer.best else None
     )
 
 
@@ -244,16 +254,16 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "td": lambda offer: offer.td,
     "peak": lambda offer: "peak" if offer.peak else "",
     "tr": lambda offer: offer.tr,
-    "error": lambda offer: tables.measure(offer.error),
-    "level error": lambda offer: tables.measure(
+    "error": lambda offer: tables.format_measure(offer.error),
+    "level error": lambda offer: tables.format_measure(
         offer.best.level_error if offer.best else None
     ),
-    "kinetic fraction": lambda offer: tables.measure(offer.kinetic_share),
+    "kinetic fraction": lambda offer: tables.format_measure(offer.kinetic_share),
     "rigid for": lambda offer: offer.rigid_time,
-    "of simulated time": _of_best("rigid_fraction", ".1%"),
-    "processor time": _of_best("run_time_share", ".0%"),
-    "timing tolerance": _of_best("timing_tolerance", ".1e"),
+    "of simulated time": _make_getter_of_best("rigid_fraction", ".1%"),
+    "processor time": _make_getter_of_best("run_time_share", ".0%"),
+    "timing tolerance": _make_getter_of_best("timing_tolerance", ".1e"),
     "verdict": lambda offer: (
-        in_short(offer.decision) if offer.decision else offer.answer.why_none
+        format_in_short(offer.decision) if offer.decision else offer.answer.why_none
     ),
 }

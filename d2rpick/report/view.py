@@ -14,7 +14,7 @@ from d2rpick.vibration.oscillator import Replay, State, make_from_mode
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
@@ -53,14 +53,14 @@ class Scale(NamedTuple):
     logarithmic: bool
 
 
-def merged(
+def merge_windows(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
     """Join windows in ascending order that are less than ``gap`` apart [time]: noise makes hundreds of short ones.
 
     Examples
     --------
-    >>> merged([(0.0, 1.0), (1.1, 2.0), (3.0, 4.0)], 0.5)
+    >>> merge_windows([(0.0, 1.0), (1.1, 2.0), (3.0, 4.0)], 0.5)
     [(0.0, 2.0), (3.0, 4.0)]
     """
     joined = list(windows[:1])
@@ -72,12 +72,12 @@ def merged(
     return joined
 
 
-def scale_of(low: float, high: float, level: float) -> Scale:
+def make_scale(low: float, high: float, level: float) -> Scale:
     """Return the scale for values from ``low`` to ``high`` on which ``level`` is easy to see [energy].
 
     Examples
     --------
-    >>> scale_of(1.0, 2.0, 1.5), scale_of(0.0, 1000.0, 1.0).logarithmic
+    >>> make_scale(1.0, 2.0, 1.5), make_scale(0.0, 1000.0, 1.0).logarithmic
     (Scale(low=0.92, high=2.08, logarithmic=False), True)
     """
     if level > 0 and high > LOGARITHMIC * level:
@@ -88,25 +88,29 @@ def scale_of(low: float, high: float, level: float) -> Scale:
     return Scale(low - room, high + room, logarithmic=False)
 
 
-def scale_in(situation: Situation, view: View, levels: Sequence[float]) -> Scale:
+def make_scale_of_flight(
+    situation: Situation, view: View, levels: Sequence[float]
+) -> Scale:
     """Return the scale for a flight and its levels; if nothing vibrates, for the energy of the whole run [energy]."""
     if situation.at_rest:
-        return scale_of(
+        return make_scale(
             0.0,
             max(float(situation.history.energy.max()), round_off(situation.history)),
             0.0,
         )
-    return scale_of(min(view.low, *levels), max(view.high, *levels), median(levels))
+    return make_scale(min(view.low, *levels), max(view.high, *levels), median(levels))
 
 
-def view_of(situation: Situation, *times: float) -> View:
+def make_view_of_situation(situation: Situation, *times: float) -> View:
     """Return the view of the flight of a situation, its td and other ``times`` [time]."""
     span = situation.evidence.span
     last_known = max(span.end, situation.td) if span else None
-    return view(situation.history, situation.flight, [situation.td, *times], last_known)
+    return make_view(
+        situation.history, situation.flight, [situation.td, *times], last_known
+    )
 
 
-def view(
+def make_view(
     history: History,
     flight: Flight,
     times: list[float],
@@ -132,7 +136,7 @@ def view(
     end = min(last, inner[1] + beyond)
     begin = inner[0] if flight.start is None else flight.start
     stop = inner[1] if flight.end is None else flight.end
-    flown = _flown(history, begin, stop, inner)
+    flown = _read_flight_energies(history, begin, stop, inner)
     low = float(flown.min())
     high = float(flown.max())
     middle = min(max(start, (begin + stop) / 2), end)
@@ -150,7 +154,7 @@ def view(
     )
 
 
-def _flown(
+def _read_flight_energies(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
     """Return the energies in the flight without its ends, or the adjacent states if the flight contains none."""
@@ -159,7 +163,7 @@ def _flown(
     return flown if flown.size else history.energies_at(np.array(inner))
 
 
-class Motion(NamedTuple):
+class ReplayedMotion(NamedTuple):
     """Deformations over ``time`` [time] of one shape, without switching and ``switched`` [square root of energy]."""
 
     time: Samples
@@ -167,9 +171,9 @@ class Motion(NamedTuple):
     switched: Samples
 
 
-def replayed_motion(
+def replay_motion(
     situation: Situation, tr: float, time: Samples | None = None
-) -> Motion | None:
+) -> ReplayedMotion | None:
     """Replay a pair of switch times with the one oscillator that describes the record.
 
     Parameters
@@ -201,7 +205,7 @@ def replayed_motion(
     def deformation(state: State) -> Samples:
         return np.asarray(mode.preload + state.y - state.z)
 
-    return Motion(
+    return ReplayedMotion(
         time, deformation(replay.reference(time)), deformation(replay.motion(time))
     )
 
@@ -221,7 +225,7 @@ class Response(NamedTuple):
     preload: float
 
 
-def response(situation: Situation) -> Response | None:
+def compute_response(situation: Situation) -> Response | None:
     """Return the response of the one oscillator that describes the record, None if no oscillator does."""
     mode = situation.vibration.whole.mode
     span = situation.evidence.span
@@ -239,7 +243,9 @@ def response(situation: Situation) -> Response | None:
     )
 
 
-def locked_in(situation: Situation, tr: float | None) -> float | None:
+def compute_locked_in_deformation(
+    situation: Situation, tr: float | None
+) -> float | None:
     """Return the deformation locked in at tr [square root of energy], None if no single oscillator describes it."""
     if tr is None or not situation.vibration.whole.described(tr):
         mode = None

@@ -9,12 +9,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
-from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at, verify_of
-from d2rpick.choice.deck_of_run import in_deck
+from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import (
+    POOR_KINETIC_SHARE,
+    describe_end_of_flight,
+    describe_end_of_load,
+)
+from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
 from d2rpick.flight.contact_times import (
     ContactTimes,
@@ -33,10 +37,10 @@ from d2rpick.histories.surroundings import UNKNOWN
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
-    from d2rpick.histories.opening import Run, Selection
+    from d2rpick.histories.opening import OpenedRun, Selection
 
 # Codes of warnings of verify that no rule reports, so the check passes them on.
 _KEPT: Final = (
@@ -70,7 +74,7 @@ class HistoryJudge:
     the windows in which the run was switched already: the run cannot judge these.
     """
 
-    run: Run
+    run: OpenedRun
     selection: Selection
     settings: Settings
     done: tuple[Times, ...] = ()
@@ -88,7 +92,7 @@ class HistoryJudge:
             inventory = read_inventory(deck)
         except DeckError:
             inventory = None
-        run = in_deck(self.run.within(UNKNOWN), inventory)
+        run = add_surroundings(self.run.within(UNKNOWN), inventory)
         if run.surroundings is not self.run.surroundings:
             self.run = run
             self._references.clear()
@@ -255,7 +259,7 @@ class HistoryJudge:
             return
         if (tr, td) in self.done:
             return
-        verdict = verify_of(reference, tr, td, self.settings)
+        verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
             # Parts without energy lock in nothing, as a note of the reader reports: only the flight limits the times.
             yield from (
@@ -270,7 +274,7 @@ class HistoryJudge:
         yield from find_faults(verdict)
 
 
-def find_faults(verdict: Verdict) -> Iterator[Fault]:
+def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
@@ -300,11 +304,11 @@ def _judge_open_window(
     """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
     tr.
     """
-    last = examine(history, float(history.time[-1]), settings)
+    last = examine_td(history, float(history.time[-1]), settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
         return
-    around = examine(history, tr, settings)
+    around = examine_td(history, tr, settings)
     start = around.earliest_tr
     if (
         around.flight.source != "energy"
@@ -315,11 +319,11 @@ def _judge_open_window(
     if earliest is None:
         yield Fault("D2R204", False, _UNKNOWN)
     else:
-        end = f"before {end_of_load(last)} ({last.flight.source})"
+        end = f"before {describe_end_of_load(last)} ({last.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; choose a later tr")
 
 
-def _judge_flight(verdict: Verdict) -> Iterator[Fault]:
+def _judge_flight(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield objections to times outside the flight: tr before the end of the load, or td after the next contact."""
     situation = verdict.situation
     tr = verdict.candidate.tr
@@ -327,18 +331,18 @@ def _judge_flight(verdict: Verdict) -> Iterator[Fault]:
     if earliest is None:
         yield Fault("D2R204", False, situation.flight.refusal or _UNKNOWN)
     elif tr < round_to_first_as_read(earliest):
-        end = f"before {end_of_load(situation)} ({situation.flight.source})"
+        end = f"before {describe_end_of_load(situation)} ({situation.flight.source})"
         yield Fault(
             "D2R204", False, f"tr = {tr:.6g} lies {end}; {_suggest_cure(verdict)}"
         )
     if situation.td > situation.latest_td:
-        end = f"after {end_of_flight(situation)}"
+        end = f"after {describe_end_of_flight(situation)}"
         yield Fault(
             "D2R204", True, f"td = {situation.td:.6g} lies {end}; choose an earlier td"
         )
 
 
-def _judge_error(verdict: Verdict) -> Iterator[Fault]:
+def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield an objection to the locked-in deformation: a wrong sign, or an error above the tolerance."""
     candidate = verdict.candidate
     situation = verdict.situation
@@ -368,7 +372,7 @@ def _judge_error(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R201", False, f"{levels}: {expected}; {_suggest_cure(verdict)}")
 
 
-def _suggest_cure(verdict: Verdict) -> str:
+def _suggest_cure(verdict: PairVerdict) -> str:
     """Return what to do: a tr that suits this td, else a better pair, else where to look for one."""
     suggestion = suggest_at(verdict.situation, with_better=False)
     if suggestion.recommended:

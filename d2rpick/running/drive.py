@@ -16,13 +16,13 @@ from d2rpick.base.files import (
 )
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
-from d2rpick.running.evidence import Evidence
+from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     LOAD,
-    Findings,
     Leg,
+    LegFindings,
     Order,
     choose_next_leg,
     collect_joined_legs,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.writing import DrivenDeck
     from d2rpick.histories.history import History
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.running.engine import Commands, Solver
     from d2rpick.running.sequence import Limits, Window
 
@@ -67,7 +67,7 @@ class Driven:
         Share of a deformable run that is saved, by the cost model and by processor time; None if unknown.
     """
 
-    run: Run
+    run: OpenedRun
     deck: DrivenDeck
     windows: tuple[Window, ...]
     legs: tuple[Leg, ...]
@@ -339,7 +339,7 @@ class Driver:
 
 def _read_leg(record: dict[str, Any]) -> Leg:
     """Make a leg of a record of the journal."""
-    findings = Findings(*record["seen"])
+    findings = LegFindings(*record["seen"])
     short = tuple((start, end) for start, end in findings.short)
     return Leg(
         Order(*record["order"]),
@@ -382,11 +382,11 @@ class Observer:
         self._new_states = Looks(selection, inventory)
         self._whole_record = Looks(selection, inventory)
         self._given, self._of_deck = wait, of_deck
-        self._evidence, self._motion = Evidence(), InnerMotion(None, of_deck)
+        self._evidence, self._motion = GrowingEvidence(), InnerMotion(None, of_deck)
 
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
-    ) -> Findings:
+    ) -> LegFindings:
         """Return what the histories of joined legs show at the end of the last one.
 
         ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
@@ -395,7 +395,7 @@ class Observer:
         names = [str(path) for path in histories]
         states, follows = self._new_states.new_states(names)
         if not follows:
-            self._evidence = Evidence()
+            self._evidence = GrowingEvidence()
             self._motion = InnerMotion(None, self._of_deck, wait_before)
         if states is not None and states.time.size:
             self._evidence.take(states)
@@ -403,10 +403,10 @@ class Observer:
         history = self._evidence.history
         if order.rigid:
             start = float(history.time[0])
-            return Findings(contact=self._evidence.contact_after(start))
+            return LegFindings(contact=self._evidence.contact_after(start))
         return self._find_flight(order, history)
 
-    def _find_flight(self, order: Order, history: History) -> Findings:
+    def _find_flight(self, order: Order, history: History) -> LegFindings:
         """Return the findings of a deformable leg."""
         now = float(history.time[-1])
         flights = self._evidence.flights(self._get_needed_wait)
@@ -418,7 +418,7 @@ class Observer:
         if self._given is not None and not idle:
             longer = shown_wait is not None and shown_wait.time > self._given
             why = f"as given, but {why}" if longer else "as given"
-        return Findings(
+        return LegFindings(
             free=free,
             wait=wait,
             why=why,

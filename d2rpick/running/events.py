@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.flight.window import FEWEST
-from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
+from d2rpick.running.evidence import GrowingEvidence, highest_energy, range_of_energy
 from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Event(NamedTuple):
 
 
 def find_events(
-    evidence: Evidence, motion: InnerMotion, decided: Decided | None = None
+    evidence: GrowingEvidence, motion: InnerMotion, decided: Decided | None = None
 ) -> tuple[Event, ...]:
     """Return all events in the order in which they were seen.
 

@@ -15,8 +15,8 @@ from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches
-from d2rpick.running.record import Column, GrowingRecord, find_momenta
-from d2rpick.running.witness import Quiet, Witness
+from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
+from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -33,18 +33,18 @@ _HIGH: Final = 0.75
 _GRAVITY_STATES: Final = 1000
 
 
-class Evidence:
+class GrowingEvidence:
     """Finds since when no force has acted on the parts of a growing record, and their flights."""
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
-        self._of_parts: list[Witness] = []
-        self._of_model: list[Witness] = []  # at most one
+        self._of_parts: list[GrowingWitness] = []
+        self._of_model: list[GrowingWitness] = []  # at most one
         # Witnesses of parts that are not over, by the numbers of their parts.
-        self._going_on: dict[tuple[int, ...], Witness] = {}
+        self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         # For each state, which parts have moved so far, and whether the parts have all of the momentum of the model.
-        self._moved, self._complete = Column(), Column()
+        self._moved, self._complete = GrowingColumn(), GrowingColumn()
         self._largest_momentum = 0.0
 
     @property
@@ -53,7 +53,7 @@ class Evidence:
         return self._record.history
 
     @property
-    def witnesses(self) -> list[Witness]:
+    def witnesses(self) -> list[GrowingWitness]:
         """Witnesses of parts, then the one of the whole model if it writes a momentum or contact energy."""
         return [*self._of_parts, *self._of_model]
 
@@ -108,7 +108,7 @@ class Evidence:
         """Add the witness of a set of parts that begins at a state."""
         assert momenta.parts is not None
         parts = tuple(momenta.parts[number] for number in members)
-        witness = Witness(members, parts, origin)
+        witness = GrowingWitness(members, parts, origin)
         self._going_on[members] = witness
         self._of_parts.append(witness)
 
@@ -148,7 +148,7 @@ class Evidence:
         else:
             return
         if not self._of_model:
-            self._of_model.append(Witness(members, None, 0))
+            self._of_model.append(GrowingWitness(members, None, 0))
         self._of_model[0].add(
             time=time,
             momentum=momentum,
@@ -176,7 +176,9 @@ class Evidence:
                 chosen.append(_find_end(flight, last_time, all_flights))
         return tuple(chosen)
 
-    def _find_gravity(self, witness: Witness, first: int, last: int) -> float | None:
+    def _find_gravity(
+        self, witness: GrowingWitness, first: int, last: int
+    ) -> float | None:
         """Return the gravity between two states of a witness, as `Laws.gravity`; None if a support holds parts.
 
         Only states up to the last one are used, and of a long record only some.
@@ -263,7 +265,7 @@ class Evidence:
 
 def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
     """Find all flights of a finished record, as `Evidence.flights`."""
-    evidence = Evidence()
+    evidence = GrowingEvidence()
     evidence.take(history)
     return evidence.flights(needed)
 

@@ -16,8 +16,8 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.evidence import Evidence
-from d2rpick.running.record import Column
+from d2rpick.running.evidence import GrowingEvidence
+from d2rpick.running.record import GrowingColumn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -93,7 +93,9 @@ class _Motion:
         self.name, self._factor = name, halves_per_swing
         self.has_free_swing = False  # whether it has swung once without a push
         self.swings: list[_HalfPeriod] = []
-        self._columns = {name: Column() for name in ("time", "values", "least_swing")}
+        self._columns = {
+            name: GrowingColumn() for name in ("time", "values", "least_swing")
+        }
         self._lowest, self._highest = np.inf, -np.inf
         # State of the last turn, None before anything moves, and of the extreme value since then.
         self._turn: int | None = None
@@ -232,7 +234,7 @@ class InnerMotion:
         self._half_of_springs = of_deck.time if of_deck else np.inf
         if before > (of_deck.time if of_deck else 0.0):
             self._least = Wait(before, "record", "as in the flight before")
-        self._evidence = Evidence()
+        self._evidence = GrowingEvidence()
         self._part_motions: list[_Motion] = []
         # Those of parts that still move, by the number of the part and of the axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
@@ -248,12 +250,12 @@ class InnerMotion:
         cls, history: History, given: float | None = None, of_deck: Wait | None = None
     ) -> InnerMotion:
         """Return the inner motion of a finished record."""
-        evidence, motion = Evidence(), cls(given, of_deck)
+        evidence, motion = GrowingEvidence(), cls(given, of_deck)
         evidence.take(history)
         motion.take(history, evidence)
         return motion
 
-    def take(self, states: History, evidence: Evidence) -> None:
+    def take(self, states: History, evidence: GrowingEvidence) -> None:
         """Append states, which the ``evidence`` has taken already."""
         self._evidence = evidence
         for momenta in states.momenta:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.choice.deck_of_run import in_deck
+from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Source, open_run, open_sources
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
 _HEAD: Final = 8192  # bytes by which a Radioss history is recognised
@@ -134,8 +134,10 @@ class Looks:
             )
         return end > begin
 
-    def _make_history(self, run: Run) -> History:
-        return Reference.of(in_deck(run, self._inventory), self._selection).history
+    def _make_history(self, run: OpenedRun) -> History:
+        return Reference.of(
+            add_surroundings(run, self._inventory), self._selection
+        ).history
 
 
 def _read_file(name: str) -> bytes | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _FEWEST_ROWS: Final = 64
 
 
-class Column:
+class GrowingColumn:
     """An array that grows by rows and is copied only when its room doubles."""
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class GrowingRecord:
 
     def __init__(self) -> None:
         self._latest_tables: list[Table] = []
-        self._columns: list[dict[str, Column]] = []
+        self._columns: list[dict[str, GrowingColumn]] = []
         self._history: History | None = None
 
     def add(self, states: History) -> None:
@@ -61,7 +61,9 @@ class GrowingRecord:
         self._latest_tables = tables
         arrays = [_get_arrays(table) for table in tables]
         if not self._columns:
-            self._columns = [{name: Column() for name in table} for table in arrays]
+            self._columns = [
+                {name: GrowingColumn() for name in table} for table in arrays
+            ]
         if [table.keys() for table in arrays] != [
             table.keys() for table in self._columns
         ]:

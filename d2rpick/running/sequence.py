@@ -97,7 +97,7 @@ class Order(NamedTuple):
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
-class Findings(NamedTuple):
+class LegFindings(NamedTuple):
     """What the record shows up to the end of a leg.
 
     Attributes
@@ -137,7 +137,7 @@ class Leg(NamedTuple):
     """A computed leg, with its ``cycles`` and processor time ``cpu`` [s], None if its listing does not contain them."""
 
     order: Order
-    findings: Findings
+    findings: LegFindings
     cycles: int | None = None
     cpu: float | None = None
 
@@ -348,7 +348,7 @@ def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
     return collect_joined_legs(legs[-1].order, legs)[0]
 
 
-def _get_flight_findings(legs: Sequence[Leg]) -> Findings:
+def _get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
     """Return what was seen of the flight when it was switched: at the end of the last deformable leg."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 

@@ -14,7 +14,7 @@ from d2rpick.base.errors import FormatError, HistoryError, RangeError
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
-from d2rpick.running.evidence import Evidence
+from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
 from d2rpick.running.looks import Looks
 
@@ -68,7 +68,7 @@ class Watch:
 
     def _begin_again(self) -> None:
         """Forget all states of the run, but not the reported events."""
-        self._evidence = Evidence()
+        self._evidence = GrowingEvidence()
         self._motion = InnerMotion(self._wait, self._wait_of_deck)
         self._decided: Decided = {}
 

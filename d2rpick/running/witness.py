@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
 from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, find_farthest
-from d2rpick.running.record import Column
+from d2rpick.running.record import GrowingColumn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,7 +89,7 @@ class _SampledFall(FreeFall):
         return sampled._fitted(0, _MOST_COMPARED - 1)
 
 
-class Witness:
+class GrowingWitness:
     """Tells at each of its states since when no force has acted on some parts, or on the whole model.
 
     Attributes
@@ -113,7 +113,7 @@ class Witness:
         # For each state, whether the written digits are enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         names = ("time", "momentum", "contact", "alone")
-        self._columns = {name: Column() for name in names}
+        self._columns = {name: GrowingColumn() for name in names}
         self._tested_count = self._test_again_at = 0
 
     @property
@@ -190,7 +190,7 @@ class Witness:
     def look(
         self,
         needed: Needed,
-        find_gravity: Callable[[Witness, int, int], float | None],
+        find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
         """Add the flights that begin in the new states, and the ends of those that end in them.
 

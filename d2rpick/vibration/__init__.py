@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.swings import Swings
 
 
-class Together(Protocol):
+class VibratingTogether(Protocol):
     """What vibrates together in a flight."""
 
     @property
@@ -56,10 +56,12 @@ class Together(Protocol):
 
 if TYPE_CHECKING:
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
+    Finder: TypeAlias = Callable[[History, Span, VibratingTogether], SignedModel | None]
 
 
-def _find_parts(history: History, within: Span, _: Together) -> SignedModel | None:
+def _find_parts(
+    history: History, within: Span, _: VibratingTogether
+) -> SignedModel | None:
     """Read the signs of single parts if their energies are written."""
     time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
@@ -75,7 +77,7 @@ def _find_parts(history: History, within: Span, _: Together) -> SignedModel | No
 
 
 def _find_modal(
-    history: History, within: Span, together: Together
+    history: History, within: Span, together: VibratingTogether
 ) -> SignedModel | None:
     """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
     if not together.complete:
@@ -89,7 +91,9 @@ def _find_modal(
     )
 
 
-def _find_swings(history: History, within: Span, _: Together) -> SignedModel | None:
+def _find_swings(
+    history: History, within: Span, _: VibratingTogether
+) -> SignedModel | None:
     """Count the swings of the energy if they come down to a floor."""
     from d2rpick.vibration.swings import count_swings
 
@@ -113,7 +117,7 @@ def find_models(
     settled: Span | None,
     doubtful: Callable[[], bool],
     memory: Memory,
-    together: Together,
+    together: VibratingTogether,
 ) -> dict[str, SignedModel]:
     """Look for models, best first, until one tells the sign; those after the oscillator only if that is ``doubtful``.
 

@@ -22,7 +22,7 @@ _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
-class Stretch(NamedTuple):
+class StretchLine(NamedTuple):
     """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy]."""
 
     line: int
@@ -32,7 +32,7 @@ class Stretch(NamedTuple):
 
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
-) -> tuple[Stretch, ...]:
+) -> tuple[StretchLine, ...]:
     """Find the lines of modes that vibrate about a stretch, as in a spinning body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
@@ -43,7 +43,7 @@ def find_stretches(
     phase = _find_phases_in_middle(lines, span)
     strongest = float(size.max(initial=0.0))
     order = np.argsort(-size).tolist()
-    stretches: list[Stretch] = []
+    stretches: list[StretchLine] = []
     for line in order:
         if size[line] < max(NOTABLE * strongest, ABOVE_SCATTER * scatter):
             continue
@@ -60,7 +60,7 @@ def find_stretches(
                 < _SAME_PHASE + unsure
             ):
                 stretches.append(
-                    Stretch(
+                    StretchLine(
                         line, own_line, float(size[line] ** 2 / (8 * size[own_line]))
                     )
                 )

@@ -20,7 +20,7 @@ from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
     ABOVE_SCATTER,
     NOTABLE,
-    Stretch,
+    StretchLine,
     find_stretches,
     measure_harmonics,
 )
@@ -581,7 +581,7 @@ def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
     return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
 
 
-def _mask_modes(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
+def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask:
     """Return a mask of the lines that do not belong to a stretch."""
     is_kept = np.ones(lines.poles.size, dtype=bool)
     is_kept[[stretch.line for stretch in stretches]] = False

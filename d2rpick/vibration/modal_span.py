@@ -27,7 +27,7 @@ _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
 _MOST_REFITS: Final = 3
 
 
-class Described(NamedTuple):
+class ModalWindow(NamedTuple):
     """A ``vibration`` that describes the record in a ``span``."""
 
     vibration: ModalVibration
@@ -36,7 +36,7 @@ class Described(NamedTuple):
 
 def find_described(
     history: History, td: float, guess: Span | None, memory: Memory
-) -> Described | None:
+) -> ModalWindow | None:
     """Find a window around td whose modes go on by themselves; None if none is found.
 
     Parameters
@@ -56,7 +56,9 @@ def find_described(
     return None
 
 
-def _described_from(history: History, window: Span, memory: Memory) -> Described | None:
+def _described_from(
+    history: History, window: Span, memory: Memory
+) -> ModalWindow | None:
     """Grow a window whose modes go on by themselves; None if they do not.
 
     What comes out depends on the window alone, not on the td that was asked for first.
@@ -65,11 +67,11 @@ def _described_from(history: History, window: Span, memory: Memory) -> Described
     return memory.once(key, lambda: _look_in(history, window, memory))
 
 
-def _look_in(history: History, window: Span, memory: Memory) -> Described | None:
+def _look_in(history: History, window: Span, memory: Memory) -> ModalWindow | None:
     vibration = _identify_window(history, window, memory)
     if vibration is None or not vibration.convinces:
         return None
-    return _grow_window(history, Described(vibration, window), memory)
+    return _grow_window(history, ModalWindow(vibration, window), memory)
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
@@ -108,7 +110,9 @@ def _identify_window(
     )
 
 
-def _grow_window(history: History, described: Described, memory: Memory) -> Described:
+def _grow_window(
+    history: History, described: ModalWindow, memory: Memory
+) -> ModalWindow:
     """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
     for _ in range(_MOST_REFITS):
         span = _find_reach(history, described)
@@ -117,11 +121,11 @@ def _grow_window(history: History, described: Described, memory: Memory) -> Desc
         vibration = _identify_window(history, span, memory)
         if vibration is None or not vibration.convinces:
             break
-        described = Described(vibration, span)
+        described = ModalWindow(vibration, span)
     return described
 
 
-def _find_reach(history: History, found: Described) -> Span:
+def _find_reach(history: History, found: ModalWindow) -> Span:
     """Give the window in which the record stays with the modes, at least that in which they were found."""
     time = history.time
     energy = history.energy

@@ -16,9 +16,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import d2rpick as d2
-from d2rpick.api.answer import written
+from d2rpick.api.answer import write_page
 from d2rpick.report.keys import MEASURES
-from d2rpick.report.plan import sentence as plan_sentence
+from d2rpick.report.plan import give_plan_sentence as plan_sentence
 from tests.command import (
     BOX,
     DECK,
@@ -878,7 +878,7 @@ def test_a_figure_shows_itself() -> None:
             ValueError,
             r"source holds 'a\\x00b' with a NUL byte",
         ),
-        (lambda: written("a\0b", ""), ValueError, "path holds .* with a NUL byte"),
+        (lambda: write_page("a\0b", ""), ValueError, "path holds .* with a NUL byte"),
         (
             lambda: loose.plan(d2.read(BOX), deck="a\0b"),
             ValueError,

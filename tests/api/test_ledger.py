@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.api.studies import Ledger, fingerprint, line
+from d2rpick.api.studies import Ledger, compute_fingerprint, write_row
 from d2rpick.base.errors import FormatError
-from d2rpick.choice import study
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import Question, StudyRow, ask
+from d2rpick.choice.runs import study
+from d2rpick.choice.runs.study import Question, StudyRow, judge_run
 from d2rpick.histories.opening import Selection
 from tests import variants
 from tests.command import put
@@ -36,7 +36,7 @@ def keep_run_in_ledger(
 ) -> tuple[str, str, StudyRow]:
     """Return a run, the ledger that contains it, and its row."""
     name, ledger = variants.write(folder / "run.csv"), str(folder / "ledger.ndjson")
-    row = ask(question, name)
+    row = judge_run(question, name)
     Ledger(ledger, question).add(row)
     return name, ledger, row
 
@@ -82,7 +82,7 @@ def test_a_row_of_another_question_is_not_taken(
 
 def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> None:
     question = replace(QUESTION, curve=True)
-    assert fingerprint(question) == fingerprint(QUESTION)
+    assert compute_fingerprint(question) == compute_fingerprint(QUESTION)
     name, ledger, _ = keep_run_in_ledger(tmp_path, question)
     assert list_values(Ledger(ledger, QUESTION).find(name))["curve"] is None
 
@@ -98,7 +98,7 @@ def test_a_row_of_changed_files_is_not_taken(tmp_path: Path, change: str) -> Non
         ).read_bytes(),
     )
     ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
-    ledger.add(ask(QUESTION, str(folder)))
+    ledger.add(judge_run(QUESTION, str(folder)))
     assert Ledger(ledger.name, QUESTION).find(str(folder))
     state = glstat.stat()
     if change == "touched":
@@ -117,11 +117,11 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
     name = str(tmp_path / "energy.csv")
     Path(name).write_text("nothing of use\n")
-    ledger.add(ask(QUESTION, name))
-    ledger.add(study.failed(name, MemoryError()))
+    ledger.add(judge_run(QUESTION, name))
+    ledger.add(study.make_failed_row(name, MemoryError()))
     assert not Path(ledger.name).exists()  # the first row makes it
     short = variants.write(tmp_path / "short.csv", end=0.05)
-    ledger.add(ask(QUESTION, short))
+    ledger.add(judge_run(QUESTION, short))
     assert (
         list_values(Ledger(ledger.name, QUESTION).find(short))["status"]
         == "out-of-range"
@@ -134,7 +134,7 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(
     name, ledger, row = keep_run_in_ledger(tmp_path)
     whole = Path(ledger).read_bytes()
     other_file = variants.write(tmp_path / "other.csv", variants.make_variant(1.01))
-    next_row = ask(QUESTION, other_file)
+    next_row = judge_run(QUESTION, other_file)
     for cut in range(0, len(whole) - 1, 97):
         Path(ledger).write_bytes(whole + whole[:cut])
         Ledger(ledger, QUESTION).add(next_row)
@@ -165,7 +165,7 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
 
 
 def test_a_line_is_json_with_the_windows_of_the_row(tmp_path: Path) -> None:
-    row = ask(QUESTION, variants.write(tmp_path / "run.csv"))
-    row_document = json.loads(line(row, "asked"))
+    row = judge_run(QUESTION, variants.write(tmp_path / "run.csv"))
+    row_document = json.loads(write_row(row, "asked"))
     assert row_document["acceptable"] == [row.acceptable.tolist(), row.alike.tolist()]
     assert np.array(row_document["acceptable"][0]).size

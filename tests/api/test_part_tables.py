@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import d2rpick as d2
-from d2rpick.choice.cost import Weights
+from d2rpick.choice.parts.cost import Weights
 from tests.command import ENERGY, MATSUM, run, run_json
 from tests.sample_deck import DECK
 

@@ -7,7 +7,7 @@ import pytest
 from d2rpick.api.arguments import Choosing
 from d2rpick.api.request import OPTIONS, OSCILLATOR, Request
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice.cost import Weights
+from d2rpick.choice.parts.cost import Weights
 
 ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
 

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.question import Settings, read
-from d2rpick.choice.situation import examine
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.question import Settings, read_reference
 from tests.benchmarks.chains import Chains, apply_to_first, integrate_chains
 from tests.written_runs import FALL_WRITERS, Written
 
@@ -83,7 +83,9 @@ def integrate_falls(
 def find_flight_start(path: str, td: float) -> float | None:
     """Return the start of the flight around td found in a file; None if there is no flight."""
     try:
-        flight = examine(read([path]).history, td, Settings(replay=False)).flight
+        flight = examine_td(
+            read_reference([path]).history, td, Settings(replay=False)
+        ).flight
     except D2RPickError:
         return None
     return None if flight.refusal else flight.start

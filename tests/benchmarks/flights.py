@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
 from tests.records import round_as_printed
@@ -205,7 +205,7 @@ def make_history(run: Flown, form: str) -> History:
 
 def count_flights(run: Flown, form: str) -> Counter[str]:
     """Count claimed flights not graded poor, wrong ones among them, true flights, and missed ones."""
-    claimed_flights = flights_of(make_history(run, form), Settings(replay=False))
+    claimed_flights = find_flights(make_history(run, form), Settings(replay=False))
     claims = [
         (f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in claimed_flights
     ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
@@ -110,7 +110,7 @@ def _state_residual(rng: np.random.Generator, least_share: float) -> Stated | No
     energy = sum_energies(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
-    answer = suggest(
+    answer = suggest_in_history(
         History(time, energy, source=("made",), format="csv", channel="E"),
         td,
         Settings(after=0.0),

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.flights import flights_of
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.question import Settings, read_reference
+from d2rpick.choice.td.flights import find_flights
 from tests.benchmarks.chains import (
     Chains,
     Run,
@@ -227,7 +227,7 @@ def count_pairs(reference: Reference, run: Run) -> Counter[str]:
     largest = float(np.linalg.norm(run.written.momentum.sum(axis=1), axis=1).max())
     for td in (None, *ASKED):
         try:
-            answer = suggest_of(reference, td, Settings(), with_better=False)
+            answer = suggest_in_run(reference, td, Settings(), with_better=False)
         except D2RPickError:
             continue
         pair = answer.recommended
@@ -241,7 +241,7 @@ def count_pairs(reference: Reference, run: Run) -> Counter[str]:
     try:
         shown_flights = [
             flight_found.within(time)
-            for flight_found in flights_of(reference.history, Settings(replay=False))
+            for flight_found in find_flights(reference.history, Settings(replay=False))
         ]
     except D2RPickError:
         shown_flights = []
@@ -285,7 +285,9 @@ def main(count: int = 60, seed: int = 48) -> None:
             for form, write in WRITERS.items():
                 total: Counter[str] = Counter()
                 for run in runs:
-                    total += count_pairs(read([write(run.written, Path(folder))]), run)
+                    total += count_pairs(
+                        read_reference([write(run.written, Path(folder))]), run
+                    )
                 print(
                     f"{name:15s}{form:10s}"
                     + "".join(f"{total[load_name]:9d}" for load_name in names),

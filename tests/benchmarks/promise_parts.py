@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from tests.benchmarks.promise import Pair, Trial, run_benchmark
@@ -196,7 +196,7 @@ def recommend_pair(record: Record) -> Pair | None:
     """Ask for a pair; return None if none is recommended."""
     first, last = record.window
     ask = (
-        partial(suggest, td=first)
+        partial(suggest_in_history, td=first)
         if first == last
         else partial(suggest_in_window, window=record.window)
     )

@@ -19,7 +19,7 @@ from time import perf_counter
 
 import numpy as np
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, make_history, simulate
@@ -80,7 +80,7 @@ def main() -> int:
         print(measure_saving(mesh), flush=True)
     run = simulate(Parameters(), 0.4)
     start = perf_counter()
-    suggest(make_history(run), 0.37, Settings())
+    suggest_in_history(make_history(run), 0.37, Settings())
     ratio = run.seconds / (perf_counter() - start)
     print(
         f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100"

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import (
-    suggest,
     suggest_at,
-    suggest_of,
-    verify,
+    suggest_in_history,
+    suggest_in_run,
     verify_at,
-    verify_of,
+    verify_in_history,
+    verify_run,
 )
-from d2rpick.choice.candidates import Pair
-from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.question import Reference, Settings, read
-from d2rpick.choice.situation import examine
+from d2rpick.choice.judged_card import CardRequest, print_judged_card
+from d2rpick.choice.pair.candidates import Pair
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.question import Reference, Settings, read_reference
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
@@ -42,7 +42,7 @@ PLAIN = Settings()
 @pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
     """According to the contact energy, the trip ends at 90.8 ms."""
-    answer = suggest(read_rollover(), 0.37, PLAIN)
+    answer = suggest_in_history(read_rollover(), 0.37, PLAIN)
     flight = answer.situation.flight
     assert (answer.situation.basis, flight.source, flight.certain) == (
         "energy",
@@ -75,7 +75,9 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(
     energy = 20 * np.exp(-8 * time) + np.random.default_rng(seed).standard_normal(
         time.size
     )
-    answer = suggest(make_energy_history(energy, time), 0.9, Settings(replay=False))
+    answer = suggest_in_history(
+        make_energy_history(energy, time), 0.9, Settings(replay=False)
+    )
     situation, better = answer.situation, require(answer.better_pair).td
     nearer = [
         td
@@ -99,8 +101,8 @@ def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
     scaled_history = make_energy_history(
         joule * plain.energy, unit * (plain.time + shift)
     )
-    expected = suggest(plain, 3.1, PLAIN)
-    suggestion = suggest(scaled_history, float(unit * (3.1 + shift)), PLAIN)
+    expected = suggest_in_history(plain, 3.1, PLAIN)
+    suggestion = suggest_in_history(scaled_history, float(unit * (3.1 + shift)), PLAIN)
     assert require(suggestion.recommended).tr / unit - shift == pytest.approx(
         require(expected.recommended).tr, abs=1e-7
     )
@@ -111,7 +113,7 @@ def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
 
 def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> None:
     time = np.linspace(0.0, 0.01, 400)
-    answer = suggest(
+    answer = suggest_in_history(
         make_energy_history(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time),
         0.01,
         Settings(),
@@ -124,13 +126,13 @@ def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> 
 def test_without_a_known_flight_the_verdict_is_unknown() -> None:
     history = read_rollover()
     flying = history.time > 0.1
-    answer = suggest(
+    answer = suggest_in_history(
         make_energy_history(history.energy[flying], history.time[flying]), 0.37, PLAIN
     )
     assert answer.situation.flight.start is None
     assert answer.recommended is None
     assert {"no-flight", "no-candidate"} <= list_codes(answer)
-    judged = verify(
+    judged = verify_in_history(
         make_energy_history(history.energy[flying], history.time[flying]),
         0.12,
         0.37,
@@ -140,7 +142,7 @@ def test_without_a_known_flight_the_verdict_is_unknown() -> None:
 
 
 def test_the_sign_is_judged_before_the_tolerance() -> None:
-    judged = verify(
+    judged = verify_in_history(
         paper.make_history(),
         0.0122658849405802,
         paper.TD,
@@ -151,8 +153,8 @@ def test_the_sign_is_judged_before_the_tolerance() -> None:
 
 
 def test_verify_measures_what_suggest_measures() -> None:
-    best = suggest(paper.make_history(), paper.TD, PLAIN).candidates[0]
-    judged = verify(paper.make_history(), best.tr, paper.TD, PLAIN)
+    best = suggest_in_history(paper.make_history(), paper.TD, PLAIN).candidates[0]
+    judged = verify_in_history(paper.make_history(), best.tr, paper.TD, PLAIN)
     for name in [
         "energy",
         "level_ratio",
@@ -189,9 +191,9 @@ def make_ringing_history() -> History:
 @pytest.mark.slow
 def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
     history, settings_asked = make_ringing_history(), Settings(after=0.05)
-    suggestion = suggest(history, 0.4, settings_asked).candidates
+    suggestion = suggest_in_history(history, 0.4, settings_asked).candidates
     assert suggestion
-    situation = examine(history, 0.4, settings_asked)
+    situation = examine_td(history, 0.4, settings_asked)
     for remark_row in suggestion:
         judged = verify_at(situation, remark_row.tr).candidate
         assert judged.notes == remark_row.notes
@@ -242,7 +244,7 @@ def verify_pair(history: History, pair: Pair | None, settings_asked: Settings) -
     """Return True if a pair verifies; no pair counts as verified."""
     if pair is None:
         return True
-    return verify(history, pair.tr, pair.td, settings_asked).admissible
+    return verify_in_history(history, pair.tr, pair.td, settings_asked).admissible
 
 
 @settings(max_examples=8)
@@ -251,7 +253,7 @@ def test_what_is_chosen_for_a_td_is_verified(
     history: History, td: float, settings_asked: Settings
 ) -> None:
     td = min(td, float(history.time[-1]))
-    answer = suggest(history, td, settings_asked)
+    answer = suggest_in_history(history, td, settings_asked)
     assert verify_pair(history, answer.recommended, settings_asked)
     assert verify_pair(history, answer.better_pair, settings_asked)
 
@@ -273,7 +275,7 @@ def test_what_is_chosen_in_a_window_is_verified(
 def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
     history = read_solved("faults/better_td_unverified.csv").history
     assert verify_pair(
-        history, suggest(history, td, Settings()).better_pair, Settings()
+        history, suggest_in_history(history, td, Settings()).better_pair, Settings()
     )
 
 
@@ -301,7 +303,7 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
 def test_too_few_states_per_period_recommend_nothing() -> None:
     time = np.linspace(0, 10, 141)
     history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
-    answer = suggest(
+    answer = suggest_in_history(
         history, 8.0, Settings()
     )  # six states in each period of the energy
     assert answer.situation.basis == "energy"
@@ -313,17 +315,17 @@ BOX = Selection(parts=("box",))
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:
-    whole = read([T01], BOX)
+    whole = read_reference([T01], BOX)
     answer, in_window = (
-        suggest_of(whole, 0.37, PLAIN),
-        suggest_of(whole, (0.3, 0.38), PLAIN),
+        suggest_in_run(whole, 0.37, PLAIN),
+        suggest_in_run(whole, (0.3, 0.38), PLAIN),
     )
-    verdict = verify_of(whole, require(answer.recommended).tr, 0.37, PLAIN)
+    verdict = verify_run(whole, require(answer.recommended).tr, 0.37, PLAIN)
     assert require(answer.health) == verdict.health
     assert require(answer.health).window == (require(answer.recommended).tr, 0.37)
     assert in_window.health is not None
     assert (
-        suggest_of(read([ENERGY]), 0.064, PLAIN).health is None
+        suggest_in_run(read_reference([ENERGY]), 0.064, PLAIN).health is None
     )  # a table of two columns tells nothing of it
 
 
@@ -340,17 +342,17 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
 
 
 def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
-    verdict = verify_of(read([GLSTAT]), 0.02, 0.0687, PLAIN)
+    verdict = verify_run(read_reference([GLSTAT]), 0.02, 0.0687, PLAIN)
     assert any("suits this td" in fault.message for fault in find_faults(verdict))
 
 
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
-    reference, fits = read([T01], BOX), CountedFits()
-    box = suggest_of(reference, 0.37, PLAIN, fits=fits)
+    reference, fits = read_reference([T01], BOX), CountedFits()
+    box = suggest_in_run(reference, 0.37, PLAIN, fits=fits)
     fits_made = fits.made
     assert fits_made > 0
-    judge = partial(verify_of, reference, settings=PLAIN, earlier=box.situation)
-    assert judged_card(
+    judge = partial(verify_run, reference, settings=PLAIN, earlier=box.situation)
+    assert print_judged_card(
         [require(box.recommended)[:2]],
         box.situation.history,
         judge,

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
-from d2rpick.choice.calibration import (
+from d2rpick.choice.parts.calibration import (
     Observation,
-    calibrate,
-    observations_of,
-    observations_of_runs,
+    fit_weights,
+    read_observations,
+    read_observations_of_runs,
 )
-from d2rpick.choice.cost import MEASURED
+from d2rpick.choice.parts.cost import MEASURED
 from tests.deck.test_radioss_inventory import BEGIN, PROPS, write_nodes
 from tests.decks import pad
 
@@ -45,7 +45,7 @@ def make_legs(*, elements: bool = True) -> list[Observation]:
 
 @pytest.mark.parametrize("elements", [True, False])
 def test_weights_of_a_made_site_are_found(elements: bool) -> None:
-    calibration = calibrate(make_legs(elements=elements))
+    calibration = fit_weights(make_legs(elements=elements))
     assert calibration.misfit < 0.03
     for name, weight in TRUE.items():
         assert calibration.weights.per_element[name] == pytest.approx(weight, rel=0.1)
@@ -57,7 +57,7 @@ def test_weights_of_a_made_site_are_found(elements: bool) -> None:
 
 
 def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
-    calibration = calibrate(
+    calibration = fit_weights(
         [make_leg({"QBAT": 400.0, "BT": 1000.0, "solid": 180.0}, 0)]
     )
     ratios = {calibration.weights.per_element[name] / MEASURED[name] for name in ALL}
@@ -67,7 +67,7 @@ def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
 
 def test_a_run_without_switching_is_needed() -> None:
     with pytest.raises(ConfigurationError, match="no leg without rigid parts"):
-        calibrate([make_leg(ALL, 10)])
+        fit_weights([make_leg(ALL, 10)])
 
 
 def write_listing(cycles: int, elements: float, total: float) -> str:
@@ -97,12 +97,12 @@ def run_folder(folder: Path) -> Path:
 
 
 def test_legs_of_radioss_are_read_with_what_is_rigid_in_them(tmp_path: Path) -> None:
-    free, rigid = observations_of(str(run_folder(tmp_path)))
+    free, rigid = read_observations(str(run_folder(tmp_path)))
     assert (free.counts, free.rigid_nodes) == ({"QEPH": 2.0, "point": 4.0}, 0.0)
     assert [free.elements, free.total] == pytest.approx([8.0, 10.0])
     assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0, "point": 2.0}, 4.0)
     assert [rigid.elements, rigid.total] == pytest.approx([4.0, 7.0])
-    calibration = calibrate([free, rigid]).weights.per_element
+    calibration = fit_weights([free, rigid]).weights.per_element
     assert calibration["QEPH"] + 2 * calibration["point"] == pytest.approx(
         4.0, rel=0.02
     )  # an element of three layers
@@ -137,7 +137,7 @@ def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
         )
     )
     (tmp_path / "glstat").write_text(states)
-    free, rigid = observations_of(str(tmp_path))
+    free, rigid = read_observations(str(tmp_path))
     assert (free.counts, free.elements) == ({"BT": 2.0, "point": 2.0}, None)
     assert (rigid.counts, rigid.rigid_nodes) == ({"BT": 1.0, "point": 1.0}, 4.0)
     assert [free.total, rigid.total] == pytest.approx([10.0, 6.0])
@@ -145,30 +145,30 @@ def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
 
 def test_folders_that_say_nothing_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DeckError, match="no main deck"):
-        observations_of(str(tmp_path))
+        read_observations(str(tmp_path))
     folder = run_folder(tmp_path)
     (folder / "TEST_0001.out").write_text("TOTAL NUMBER OF CYCLES : 7\n")
     with pytest.raises(FormatError, match="no times of elements"):
-        observations_of(str(folder))
+        read_observations(str(folder))
     for name in ("TEST_0001.out", "TEST_0002.out"):
         (folder / name).unlink()
     with pytest.raises(FormatError, match="nothing says what the run took"):
-        observations_of(str(folder))
+        read_observations(str(folder))
 
 
 def test_a_run_that_is_given_twice_counts_once(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     folder = run_folder(tmp_path / "run")
     copy = shutil.copytree(folder, tmp_path / "copy")
-    once = observations_of(str(folder))
+    once = read_observations(str(folder))
     for again in (str(folder), f"{folder}/.", str(copy)):
-        observations, cautions = observations_of_runs([str(folder), again])
+        observations, cautions = read_observations_of_runs([str(folder), again])
         assert observations == once
         assert [caution.code for caution in cautions] == ["same-leg-twice"] * 2
         assert (
             "has the content of" if again == str(copy) else "is given twice; it counts"
         ) in cautions[0].message
     (copy / "TEST_0002.out").write_text(write_listing(200, 0.8e-3, 1.3e-3))
-    observations, cautions = observations_of_runs([str(folder), str(copy)])
+    observations, cautions = read_observations_of_runs([str(folder), str(copy)])
     assert len(observations) == 3
     assert len(cautions) == 1

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.candidates import judged_of
-from d2rpick.choice.quality import candidates_at, ranked
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.candidates import judge_candidates
+from d2rpick.choice.pair.quality import rank_candidates, rank_judged
+from d2rpick.choice.pair.situation import make_look
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import looking
 from d2rpick.vibration import measures
 from tests import paper
 from tests.energies import (
@@ -21,7 +21,7 @@ PLAIN = Settings()
 
 
 def test_all_crossings_of_the_published_example_and_their_signs() -> None:
-    answer = suggest(paper.make_history(), paper.TD, PLAIN)
+    answer = suggest_in_history(paper.make_history(), paper.TD, PLAIN)
     crossings = sorted(
         (c.tr * 1e3, c.sign_match) for c in answer.candidates if c.kind == "crossing"
     )
@@ -32,7 +32,7 @@ def test_all_crossings_of_the_published_example_and_their_signs() -> None:
 
 
 def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
-    answer = suggest(paper.make_history(), paper.TD, PLAIN)
+    answer = suggest_in_history(paper.make_history(), paper.TD, PLAIN)
     opposite = [c for c in answer.candidates if c.sign_match is False]
     share = (4 * paper.ENERGY_TD + paper.KINETIC_TD) / (
         paper.ENERGY_TD + paper.KINETIC_TD
@@ -44,7 +44,7 @@ def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
 
 
 def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
-    answer = suggest(paper.make_history(), 0.05, PLAIN)
+    answer = suggest_in_history(paper.make_history(), 0.05, PLAIN)
     for c in answer.candidates:
         expected = measures.residual(
             require(c.lock_in_error), require(answer.situation.kinetic_share)
@@ -54,7 +54,7 @@ def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
 
 def test_the_first_sample_counts_like_any_other() -> None:
     time = np.linspace(0, 1, 2001)
-    answer = suggest(
+    answer = suggest_in_history(
         make_energy_history(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN
     )
     assert require(answer.recommended).tr == pytest.approx(0.0, abs=1e-9)
@@ -62,7 +62,7 @@ def test_the_first_sample_counts_like_any_other() -> None:
 
 def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
     time = np.linspace(0, 1, 2001)
-    answer = suggest(
+    answer = suggest_in_history(
         make_energy_history(4 * np.sin(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN
     )
     times = [round(c.tr, 6) for c in answer.candidates if c.kind == "crossing"]
@@ -73,7 +73,7 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
     None
 ):
     history = make_vibration_energy()
-    answer = suggest(history, 3.25, PLAIN)
+    answer = suggest_in_history(history, 3.25, PLAIN)
     assert {c.kind for c in answer.candidates if c.acceptable} == {"extremum"}
     # the peak at 0.75 has the other sign; of 0.25, 1.25, 2.25 the earliest saves most
     assert require(answer.recommended).tr == pytest.approx(0.25, abs=1e-6)
@@ -82,33 +82,41 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
 
 @pytest.mark.parametrize("energy", [np.zeros(50), np.full(50, 3.0), -np.ones(50)])
 def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> None:
-    answer = suggest(make_energy_history(energy, np.arange(50.0)), 40.0, PLAIN)
+    answer = suggest_in_history(
+        make_energy_history(energy, np.arange(50.0)), 40.0, PLAIN
+    )
     assert not answer.candidates
     assert answer.recommended is None
     assert "no-candidate" in list_codes(answer)
 
 
 def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -> None:
-    look = looking(paper.make_history(), PLAIN)
+    look = make_look(paper.make_history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]
-    alone = [next(candidates_at([ranked_at_td]))[:] for ranked_at_td in situations]
-    for together in (judged_of(situations), judged_of(situations, most=15)):
+    alone = [next(rank_candidates([ranked_at_td]))[:] for ranked_at_td in situations]
+    for together in (
+        judge_candidates(situations),
+        judge_candidates(situations, most=15),
+    ):
         assert [
-            ranked_at_td[:] for judged in together for ranked_at_td in ranked(judged)
+            ranked_at_td[:]
+            for judged in together
+            for ranked_at_td in rank_judged(judged)
         ] == alone
-    assert list(judged_of([])) == []
+    assert list(judge_candidates([])) == []
 
 
 def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_once() -> (
     None
 ):
     energy = np.r_[np.zeros(20), 4 + np.random.default_rng(1).random(4000)]
-    look = looking(
+    look = make_look(
         make_energy_history(energy, np.arange(energy.size, dtype=float)), PLAIN
     )
     situations = [look(td) for td in (10.0, *np.linspace(3900, 4000, 40))]
     assert (
-        max(judged.place.size for judged in judged_of(situations, most=4000)) < 40_000
+        max(judged.place.size for judged in judge_candidates(situations, most=4000))
+        < 40_000
     )
 
 
@@ -117,7 +125,9 @@ def test_a_candidate_alone_is_the_one_among_all(noise: float) -> None:
     clean = make_vibration_energy()
     energy = clean.energy + noise * np.random.default_rng(1).random(clean.energy.size)
     ranked_candidates = next(
-        candidates_at([looking(make_energy_history(energy, clean.time), PLAIN)(3.2)])
+        rank_candidates(
+            [make_look(make_energy_history(energy, clean.time), PLAIN)(3.2)]
+        )
     )
     assert len(ranked_candidates) > 3
     assert (

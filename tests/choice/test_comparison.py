@@ -11,15 +11,18 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import Verdict, compare_with, verify_of
-from d2rpick.choice.comparison import (
+from d2rpick.choice.answers import PairVerdict, compare_with, verify_run
+from d2rpick.choice.question import Settings
+from d2rpick.choice.switched.comparison import (
     MOST_MOMENTUM_ERROR,
     Comparison,
     compare_runs,
-    times_of,
+    find_switch_times,
 )
-from d2rpick.choice.question import Settings
-from d2rpick.choice.switched_run import rigid_parts, switched_history
+from d2rpick.choice.switched.switched_run import (
+    detect_rigid_parts,
+    prepare_switched_history,
+)
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import (
@@ -134,11 +137,11 @@ def test_a_run_without_rigid_times_is_refused_with_the_cause() -> None:
     other = make_history(2.0 + np.sin(41 * TIME) ** 2)
     constant = make_history(np.full_like(TIME, 2.0))
     with pytest.raises(RangeError, match="never stays constant"):
-        times_of(other, swinging)
+        find_switch_times(other, swinging)
     with pytest.raises(RangeError, match="from 0 to 1, but that of the reference run"):
-        times_of(constant, make_history(np.full_like(TIME, 3.0)))
+        find_switch_times(constant, make_history(np.full_like(TIME, 3.0)))
     with pytest.raises(RangeError, match="are the same"):
-        times_of(swinging, make_history(swinging.energy))
+        find_switch_times(swinging, make_history(swinging.energy))
 
 
 def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
@@ -676,10 +679,10 @@ def list_legs(run: str) -> list[str]:
     ]
 
 
-def compare_car(run: str, *parts: str) -> Verdict:
+def compare_car(run: str, *parts: str) -> PairVerdict:
     """Return the verdict on the car with engine, battery and wheels as six rigid bodies, or as one."""
     solved_run = read_solved("carT01.gz", *parts)
-    verdict = verify_of(solved_run, CAR_TR, CAR_TD, Settings())
+    verdict = verify_run(solved_run, CAR_TR, CAR_TD, Settings())
     return compare_with(
         verdict,
         solved_run,
@@ -690,7 +693,7 @@ def compare_car(run: str, *parts: str) -> Verdict:
 def test_the_parts_that_were_rigid_are_recognised_in_several_bodies() -> None:
     heavy = open_run(list_legs("car_heavy"), Selection())
     rigid = require(
-        rigid_parts(heavy, heavy.parts[:17], heavy.part_time, CAR_TR, CAR_TD)
+        detect_rigid_parts(heavy, heavy.parts[:17], heavy.part_time, CAR_TR, CAR_TD)
     )
     assert [
         part.title
@@ -699,11 +702,13 @@ def test_the_parts_that_were_rigid_are_recognised_in_several_bodies() -> None:
     ] == ["engine", "battery", "wheels"]
     one_run = open_run(list_legs("car_all"), Selection())
     rigid = require(
-        rigid_parts(one_run, one_run.parts[:17], one_run.part_time, CAR_TR, CAR_TD)
+        detect_rigid_parts(
+            one_run, one_run.parts[:17], one_run.part_time, CAR_TR, CAR_TD
+        )
     )
     assert rigid.all()
     assert (
-        rigid_parts(
+        detect_rigid_parts(
             one_run, one_run.parts[:17], one_run.part_time, CAR_TR, CAR_TR + 5e-4
         )
         is None
@@ -758,7 +763,7 @@ def test_where_all_energies_are_reported_wrongly_only_the_motion_is_judged(
 
 def test_plans_go_on_from_a_run_of_which_some_parts_were_rigid() -> None:
     heavy = read(list_legs("car_heavy"), Selection(parts=("11-14",)))
-    history, windows, cautions = switched_history(heavy, [(CAR_TR, CAR_TD)])
+    history, windows, cautions = prepare_switched_history(heavy, [(CAR_TR, CAR_TD)])
     assert windows == ((CAR_TR, CAR_TD),)
     (message,) = cautions
     assert message.code == "partly-rigid"
@@ -768,6 +773,6 @@ def test_plans_go_on_from_a_run_of_which_some_parts_were_rigid() -> None:
         for momenta_of_run in history.momenta
         if momenta_of_run.parts is not None
     ]
-    assert not switched_history(
+    assert not prepare_switched_history(
         read(list_legs("car_heavy"), Selection(parts=("12-14",))), [(CAR_TR, CAR_TD)]
     )[2]

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.choice.cost import (
+from d2rpick.choice.parts.cost import (
     CostModel,
     Weights,
+    compute_saved_share,
+    format_weights_as_toml,
     read_weights,
-    saved_share,
-    weights_as_toml,
 )
 from d2rpick.deck.formulations import find_ls_dyna_formulation, find_radioss_formulation
 from d2rpick.deck.mesh import Elements
@@ -132,12 +132,12 @@ def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit
 ) -> None:
     weights = Weights({"BT": 1.0}, share, 0.05)
     scaled = Weights({"BT": scale}, share, 0.05 * scale)
-    share_saved = saved_share(weights, total, part * total, nodes)
+    share_saved = compute_saved_share(weights, total, part * total, nodes)
     assert 0.0 <= share_saved <= share * (1 + 1e-12)
-    assert saved_share(
+    assert compute_saved_share(
         scaled, scale * total, scale * part * total, nodes
     ) == pytest.approx(share_saved, abs=1e-9)
-    assert saved_share(weights, total, total, 0) == pytest.approx(share)
+    assert compute_saved_share(weights, total, total, 0) == pytest.approx(share)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
     weights = Weights(
         {"BT": 0.3, 'a "strange" one': 2.5, "träge \U0001f422": 1.0}, 0.9, 0.01, "site"
     )
-    (tmp_path / "site.toml").write_text(weights_as_toml(weights), "utf-8")
+    (tmp_path / "site.toml").write_text(format_weights_as_toml(weights), "utf-8")
     assert read_weights(str(tmp_path / "site.toml")) == weights
 
 

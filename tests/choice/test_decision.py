@@ -3,7 +3,7 @@
 import pytest
 
 import d2rpick as d2
-from d2rpick.choice.grades import DO_NOT_USE, GRADES, VERDICTS
+from d2rpick.choice.pair.grades import DO_NOT_USE, GRADES, VERDICTS
 from tests.command import ENERGY, GLSTAT, MATSUM, run_json
 from tests.energies import require
 

@@ -10,11 +10,11 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.base.errors import Caution, D2RPickError
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.deck_of_run import doubts_of_solver
-from d2rpick.choice.flights import flights_of
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck import read_inventory
 from d2rpick.flight.momentum import find_flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta
@@ -52,7 +52,7 @@ def list_warnings(*args: str) -> dict[str, str]:
 
 def list_doubts(deck: str, *parts: int) -> dict[str, Caution]:
     return {
-        doubt.code: doubt for doubt in doubts_of_solver(parts, read_inventory(deck))
+        doubt.code: doubt for doubt in warn_about_solver(parts, read_inventory(deck))
     }
 
 
@@ -453,9 +453,11 @@ def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_give
     None
 ):
     held = Surroundings(supports={1: (Support("/BCS/7 (deck:12)"),)})
-    assert suggest(make_flying_history(Surroundings()), 0.8, PLAIN).recommended
+    assert suggest_in_history(
+        make_flying_history(Surroundings()), 0.8, PLAIN
+    ).recommended
     for settings in (PLAIN, replace(PLAIN, after=0.3)):
-        suggestion = suggest(make_flying_history(held), 0.8, settings)
+        suggestion = suggest_in_history(make_flying_history(held), 0.8, settings)
         assert suggestion.recommended is None
         (why,) = [
             caution.message
@@ -463,7 +465,7 @@ def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_give
             if caution.code == "no-free-flight"
         ]
         assert "part 1 is held or moved by /BCS/7 (deck:12)" in why
-    assert flights_of(make_flying_history(held), PLAIN) == ()
+    assert find_flights(make_flying_history(held), PLAIN) == ()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, replace(PLAIN, after=0.3)])
@@ -471,12 +473,12 @@ def test_a_flight_begins_where_an_imposed_motion_ends_and_ends_where_one_begins(
     settings: Settings,
 ) -> None:
     moved = Surroundings(supports={1: (Support("a", 0.0, 0.4), Support("b", 0.9, 2.0))})
-    flight = examine(make_flying_history(moved), 0.7, settings).flight
+    flight = examine_td(make_flying_history(moved), 0.7, settings).flight
     assert (flight.start, flight.end) == (0.4, 0.9)
-    assert examine(make_flying_history(moved), 0.35, settings).flight.refusal
+    assert examine_td(make_flying_history(moved), 0.35, settings).flight.refusal
     assert [
         (flight_row.start, flight_row.end)
-        for flight_row in flights_of(make_flying_history(moved), settings)
+        for flight_row in find_flights(make_flying_history(moved), settings)
     ] == [(0.4, 0.9)]
 
 

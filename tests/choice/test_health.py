@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.health import Health, assess, cautions_of_health, unsound
+from d2rpick.choice.health import Health, assess_health, list_flaws, warn_about_health
 from d2rpick.histories.balance import read_balance
 from d2rpick.histories.history import Balance, Given, History, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
-from d2rpick.report.situation import measures_of
+from d2rpick.report.situation import list_health_measures
 from tests.command import BOX, ENERGY, GLSTAT, list_warning_codes, put, run, run_json
 from tests.computed import locate_stored
 from tests.energies import make_energy_history, require
@@ -36,14 +36,18 @@ WINDOW = (0.2, 0.8)
 def list_warnings(
     balance: Balance, window: tuple[float, float] | None = WINDOW
 ) -> list[str]:
-    return [caution.code for caution in cautions_of_health(assess(balance, window))]
+    return [
+        caution.code for caution in warn_about_health(assess_health(balance, window))
+    ]
 
 
 def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
-    health = assess(HEALTHY, WINDOW)
-    assert not list(cautions_of_health(health))
+    health = assess_health(HEALTHY, WINDOW)
+    assert not list(warn_about_health(health))
     assert health.window_work == pytest.approx(0.0, abs=1e-3)
-    assert all(measure.good for measure in measures_of(health) if measure.value)
+    assert all(
+        measure.good for measure in list_health_measures(health) if measure.value
+    )
 
 
 @pytest.mark.parametrize(
@@ -87,9 +91,9 @@ def test_a_warning_comes_beyond_its_threshold_only(
 def test_what_the_files_do_not_have_is_unknown_and_not_zero(
     term: str, measures: list[str]
 ) -> None:
-    health = assess(replace(HEALTHY, **{term: None}), WINDOW)  # type: ignore[arg-type]
+    health = assess_health(replace(HEALTHY, **{term: None}), WINDOW)  # type: ignore[arg-type]
     assert [getattr(health, name) for name in measures] == [None] * len(measures)
-    assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(
+    assert [getattr(assess_health(HEALTHY, WINDOW), name) for name in measures].count(
         None
     ) == 0
 
@@ -99,9 +103,10 @@ def test_a_window_of_too_few_states_is_not_judged() -> None:
     reason = (
         "the window holds 5 states: at least 6 are needed to tell a load from gravity"
     )
-    assert assess(HEALTHY, few_states).window_reason == reason
+    assert assess_health(HEALTHY, few_states).window_reason == reason
     assert [
-        caution.message for caution in cautions_of_health(assess(HEALTHY, few_states))
+        caution.message
+        for caution in warn_about_health(assess_health(HEALTHY, few_states))
     ] == [reason]
     assert list_warnings(HEALTHY, few_states) == ["window-not-judged"]
     assert "window-not-judged" not in list_warnings(HEALTHY, enough)
@@ -128,14 +133,14 @@ def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> Non
 
 
 def test_nothing_known_is_nothing_said() -> None:
-    assert assess(Balance(TIME)) == Health()
+    assert assess_health(Balance(TIME)) == Health()
 
 
 @pytest.mark.parametrize("internal", [2e-20 * ONES, 1e-5 * INTERNAL])
 def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(
     internal: Samples,
 ) -> None:
-    health = assess(replace(HEALTHY, internal=internal, hourglass=ONES), WINDOW)
+    health = assess_health(replace(HEALTHY, internal=internal, hourglass=ONES), WINDOW)
     assert health.hourglass_share is None
     assert health.sliding_share is None
     assert health.reason
@@ -148,7 +153,7 @@ def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(
 
 def test_a_part_without_energy_of_its_own_is_not_the_worst_part() -> None:
     parts = ((PART, 0.05, 1.0), (Part(8, "trim"), 0.005, 0.008))
-    assert assess(replace(HEALTHY, hourglass_of_parts=parts)).part == PART
+    assert assess_health(replace(HEALTHY, hourglass_of_parts=parts)).part == PART
 
 
 def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None:
@@ -167,12 +172,12 @@ def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_i
         HEALTHY, kinetic=require(HEALTHY.kinetic) - taken, total=None, ratio=None
     )
     assert "energy-ratio" in list_warnings(damped)
-    whole = assess(HEALTHY, WINDOW)
+    whole = assess_health(HEALTHY, WINDOW)
     for term in ("damping", "wall"):
-        health = assess(replace(damped, **{term: taken}), WINDOW)  # type: ignore[arg-type]
+        health = assess_health(replace(damped, **{term: taken}), WINDOW)  # type: ignore[arg-type]
         assert health.energy_ratio_min == pytest.approx(whole.energy_ratio_min)
     total = 50 + require(HEALTHY.external_work)
-    written = assess(replace(damped, total=total), WINDOW)
+    written = assess_health(replace(damped, total=total), WINDOW)
     assert (written.energy_ratio_min, written.energy_ratio_max) == pytest.approx(
         (1.0, 1.0)
     )
@@ -187,7 +192,7 @@ def test_the_total_energy_of_abaqus_is_without_the_external_work(
         "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode(),
     )
     run_of = open_run([str(path)])
-    health = assess(require(read_balance(run_of.databases, None)))
+    health = assess_health(require(read_balance(run_of.databases, None)))
     assert (health.energy_ratio_min, health.energy_ratio_max) == (1.0, 1.0)
 
 
@@ -212,21 +217,21 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
     run_of = open_run([BOX])
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
-    up_to_td = assess(
+    up_to_td = assess_health(
         read_balance(run_of.databases, box, until=0.37) or Balance(TIME),
         flight,
         locked=1.75,
     )
-    assert not list(cautions_of_health(up_to_td))
+    assert not list(warn_about_health(up_to_td))
     assert up_to_td.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
     for window, code in (
         ((0.06, 0.37), "work-in-window"),
         ((0.0886, 0.4), "contact-in-window"),
     ):
-        whole = assess(
+        whole = assess_health(
             read_balance(run_of.databases, box) or Balance(TIME), window, locked=1.75
         )
-        assert code in {caution.code for caution in cautions_of_health(whole)}
+        assert code in {caution.code for caution in warn_about_health(whole)}
 
 
 @pytest.mark.parametrize(
@@ -234,11 +239,11 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
 )
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     run_of = open_run([locate_stored(name)])
-    health = assess(
+    health = assess_health(
         read_balance(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064)
     )
     assert require(health.window_work) < 1e-3
-    assert not list(cautions_of_health(health))
+    assert not list(warn_about_health(health))
 
 
 def test_suggest_and_info_tell_the_health() -> None:
@@ -342,14 +347,14 @@ def record(internal: Samples, kinetic: Samples, **terms: Any) -> History:
 
 
 def list_objections(history: History) -> list[str]:
-    return [objection.code for objection in unsound(history)]
+    return [objection.code for objection in list_flaws(history)]
 
 
 @pytest.mark.parametrize("terms", [{}, {"external_work": 4 * LOADED}])
 def test_a_run_that_gains_energy_from_nothing_blew_up(
     terms: dict[str, Samples],
 ) -> None:
-    (objection_row,) = unsound(record(TORN_INTERNAL, TORN_KINETIC, **terms))
+    (objection_row,) = list_flaws(record(TORN_INTERNAL, TORN_KINETIC, **terms))
     assert objection_row.code == "blew-up"
     assert "from 0.1" in objection_row.message
     assert "its energy reaches 1.5e+13 at 0.0305" in objection_row.message

@@ -5,8 +5,8 @@ from functools import partial
 
 import pytest
 
-from d2rpick.choice.answers import verify
-from d2rpick.choice.judged_card import CardRequest, judged_card
+from d2rpick.choice.answers import verify_in_history
+from d2rpick.choice.judged_card import CardRequest, print_judged_card
 from d2rpick.choice.question import Settings
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
@@ -15,7 +15,7 @@ from tests.reading import read_history
 
 PAIR = (0.0135867, 0.0687534)
 HISTORY = read_history([ENERGY])
-JUDGE = partial(verify, HISTORY, settings=Settings())
+JUDGE = partial(verify_in_history, HISTORY, settings=Settings())
 
 
 @pytest.mark.parametrize(
@@ -39,9 +39,11 @@ def test_the_run_ends_with_the_history_unless_told() -> None:
 
 
 def test_without_anybody_to_switch_there_is_no_card() -> None:
-    assert judged_card([PAIR], HISTORY, JUDGE, CardRequest()) is None
+    assert print_judged_card([PAIR], HISTORY, JUDGE, CardRequest()) is None
     assert (
-        judged_card([PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,))))
+        print_judged_card(
+            [PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,)))
+        )
         is None
     )
 
@@ -49,9 +51,11 @@ def test_without_anybody_to_switch_there_is_no_card() -> None:
 def test_each_window_has_its_verdict_in_the_comments() -> None:
     windows = [PAIR, (0.0939, 0.119)]
     history = read_history([GLSTAT])
-    judge = partial(verify, history, settings=Settings())
+    judge = partial(verify_in_history, history, settings=Settings())
     printed_card = require(
-        judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,))))
+        print_judged_card(
+            windows, history, judge, CardRequest(printing=Printing(part=(1,)))
+        )
     )
     card, verdicts = printed_card
     assert card.windows == tuple(windows)

@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
-from d2rpick.choice.plan import plan_of
+from d2rpick.choice.answers import (
+    PairVerdict,
+    suggest_in_history,
+    verify_at,
+    verify_in_history,
+)
+from d2rpick.choice.pair.windows import find_acceptable_windows
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.windows import acceptable_windows
+from d2rpick.choice.td.plan import plan_run
 from d2rpick.flight.flight import find_all_seen, find_seen_flight
 from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
-from d2rpick.report.suggestion import acceptable
+from d2rpick.report.suggestion import describe_acceptable_windows
 from d2rpick.rules.judgement import find_faults
 from tests.choice.test_same_answers import make_record
 from tests.command import BOX, run
@@ -36,7 +41,7 @@ from tests.reading import read
 PLAIN = Settings()
 # no oscillator describes the box, and none is sought: the level alone is poor
 LEVEL = Settings(replay=False, min_quality="poor")
-planned = cache(plan_of)
+planned = cache(plan_run)
 
 
 @pytest.fixture(scope="module")
@@ -53,17 +58,19 @@ def make_resting_history() -> History:
     return make_energy_history(np.ones(time.size), time)
 
 
-def read_again(history: History, tr: float, td: float, settings: Settings) -> Verdict:
+def read_again(
+    history: History, tr: float, td: float, settings: Settings
+) -> PairVerdict:
     """Judge a pair with its times as they are printed."""
-    return verify(history, round_as_read(tr), round_as_read(td), settings)
+    return verify_in_history(history, round_as_read(tr), round_as_read(td), settings)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.7, 0.8])
 def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
     history = make_record("five modes")
-    pair = require(suggest(history, td, PLAIN).better_pair)
-    assert suggest(history, pair.td, PLAIN).recommended == pair
+    pair = require(suggest_in_history(history, td, PLAIN).better_pair)
+    assert suggest_in_history(history, pair.td, PLAIN).recommended == pair
 
 
 @pytest.mark.parametrize(
@@ -73,17 +80,17 @@ def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(
     arguments: dict[str, Any],
 ) -> None:
     history, settings = make_resting_history(), Settings(after=0.3, **arguments)
-    answer = suggest(history, 0.8, settings)
+    answer = suggest_in_history(history, 0.8, settings)
     assert answer.situation.at_rest
-    assert not verify(history, 0.5, 0.8, settings).admissible
+    assert not verify_in_history(history, 0.5, 0.8, settings).admissible
     assert not answer.windows
-    assert not acceptable_windows(answer.situation, answer.candidates, None).size
+    assert not find_acceptable_windows(answer.situation, answer.candidates, None).size
 
 
 def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
     history = make_resting_history()
     settings = Settings(after=float(history.time[0]))
-    answer = suggest(history, 0.8, settings)
+    answer = suggest_in_history(history, 0.8, settings)
     assert "at-rest" in list_codes(answer)
     assert read_again(history, *require(answer.recommended)[:2], settings).admissible
 
@@ -91,7 +98,7 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
 @pytest.mark.slow
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
     settings = replace(LEVEL, margin=0.0123456789)
-    for row in plan_of(box, settings).flights:
+    for row in plan_run(box, settings).flights:
         if row.window:
             assert read_again(box.history, *row.window, settings).admissible
 
@@ -99,8 +106,8 @@ def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
 @pytest.mark.slow
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
     history, settings = make_record("five modes"), Settings(after=0.1, replay=False)
-    answer = suggest(history, 0.8, settings)
-    line = acceptable(answer.windows or (), None)
+    answer = suggest_in_history(history, 0.8, settings)
+    line = describe_acceptable_windows(answer.windows or (), None)
     windows = re.findall(r"(\S+) to (\S+) \(", line)
     assert len(windows) > 2
     assert all(
@@ -117,11 +124,11 @@ def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) ->
     settings = replace(LEVEL, after=load_end)
     (row,) = (
         flight_row
-        for flight_row in plan_of(box, settings).flights
+        for flight_row in plan_run(box, settings).flights
         if flight_row.number == second.number
     )
     assert row.window
-    flight = verify(box.history, *row.window, settings).situation.flight
+    flight = verify_in_history(box.history, *row.window, settings).situation.flight
     assert (row.flight.start, row.flight.end, row.flight.source) == (
         load_end,
         flight.end,
@@ -134,7 +141,9 @@ def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) ->
 def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
     settings = replace(LEVEL, margin=0.01)
     flight = planned(box, LEVEL).flights[1]
-    verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, settings)
+    verdict = verify_in_history(
+        box.history, flight.start + 0.005, flight.end - 0.005, settings
+    )
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
     messages = [
         fault.message for fault in find_faults(verdict) if fault.rule == "D2R204"
@@ -149,7 +158,9 @@ def test_the_last_td_that_is_named_lies_in_the_flight(
     box: Reference, margin: float | None
 ) -> None:
     settings, flights = replace(LEVEL, margin=margin), planned(box, LEVEL).flights
-    answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, settings)
+    answer = suggest_in_history(
+        box.history, (flights[1].end + flights[2].start) / 2, settings
+    )
     (message,) = (
         caution.message
         for caution in answer.cautions
@@ -161,7 +172,7 @@ def test_the_last_td_that_is_named_lies_in_the_flight(
             message,
         )
     )
-    assert suggest(box.history, float(match[1]), settings).recommended
+    assert suggest_in_history(box.history, float(match[1]), settings).recommended
 
 
 @pytest.mark.parametrize(
@@ -178,12 +189,12 @@ def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
 
 def test_an_error_that_is_refused_reads_as_too_large() -> None:
     history, td = make_record("one mode"), 0.8
-    best = require(suggest(history, td, PLAIN).chosen)
+    best = require(suggest_in_history(history, td, PLAIN).chosen)
     assert best.residual
     barely = Settings(max_residual=best.residual * (1 - 1e-6))
     (reason,) = (
         reason_text
-        for reason_text in verify(history, best.tr, td, barely).reasons
+        for reason_text in verify_in_history(history, best.tr, td, barely).reasons
         if "above the limit" in reason_text
     )
     value, limit = map(float, re.findall(r"[\d.]+", reason))
@@ -204,10 +215,12 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
     energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
     energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
     record = make_reference(make_energy_history(energy, time))
-    rows = [row for row in plan_of(record, PLAIN).flights if row.window]
+    rows = [row for row in plan_run(record, PLAIN).flights if row.window]
     assert rows
     for row in rows:
-        flight = verify(record.history, *require(row.window), PLAIN).situation.flight
+        flight = verify_in_history(
+            record.history, *require(row.window), PLAIN
+        ).situation.flight
         assert (row.flight.source, row.flight.certain, row.start) == (
             flight.source,
             flight.certain,
@@ -224,8 +237,10 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
         make_reference(make_energy_history(energy, time)),
         Settings(after=0.1),
     )
-    (row,) = plan_of(record, settings).flights
-    flight = verify(record.history, *require(row.window), settings).situation.flight
+    (row,) = plan_run(record, settings).flights
+    flight = verify_in_history(
+        record.history, *require(row.window), settings
+    ).situation.flight
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
@@ -271,7 +286,7 @@ def test_a_plan_keeps_the_margin_that_it_lists() -> None:
     )
     rows = [
         row
-        for row in plan_of(
+        for row in plan_run(
             make_reference(make_energy_history(energy, time)), LEVEL
         ).flights
         if row.window and row.flight.end
@@ -288,9 +303,9 @@ def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> N
     settings = replace(LEVEL, after=start)
     assert round_as_read(start) < start
     for tr in (start, round_as_read(start)):
-        verdict = verify(history, tr, float(time[60] + np.pi / 10), settings)
+        verdict = verify_in_history(history, tr, float(time[60] + np.pi / 10), settings)
         assert verdict.admissible
         assert not list(find_faults(verdict))
-    assert not verify(
+    assert not verify_in_history(
         history, start - 1e-5, float(time[60] + np.pi / 10), settings
     ).admissible

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.plan import Plan, plan_of
+from d2rpick.choice.answers import suggest_in_run
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.trade_off import explored_flights
+from d2rpick.choice.td.plan import RunPlan, plan_run
+from d2rpick.choice.td.trade_off import explore_flights
 from d2rpick.histories.digits import round_to_first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import locate_stored
@@ -36,16 +36,16 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
 
 
 @pytest.fixture(scope="module")
-def plan(reference: Reference) -> Plan:
-    return plan_of(reference, PLAIN)
+def plan(reference: Reference) -> RunPlan:
+    return plan_run(reference, PLAIN)
 
 
-def list_statuses(plan: Plan) -> list[str]:
+def list_statuses(plan: RunPlan) -> list[str]:
     return [row.status for row in plan.flights]
 
 
 @pytest.mark.slow
-def test_every_flight_of_the_box_is_listed_where_it_lies(plan: Plan) -> None:
+def test_every_flight_of_the_box_is_listed_where_it_lies(plan: RunPlan) -> None:
     touched = drop().landings
     assert len(plan.flights) >= 3
     for row in plan.flights:
@@ -56,7 +56,7 @@ def test_every_flight_of_the_box_is_listed_where_it_lies(plan: Plan) -> None:
 
 
 def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_energy_is_the_last_supported(
-    plan: Plan,
+    plan: RunPlan,
 ) -> None:
     first, *other_rows = [row for row in plan.flights if row.window]
     assert require(first.window)[0] == 0.0
@@ -72,17 +72,17 @@ def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_ener
 
 
 def test_each_window_is_what_suggest_says_for_its_td(
-    reference: Reference, plan: Plan
+    reference: Reference, plan: RunPlan
 ) -> None:
     for tr, td in plan.all_windows:
-        suggestion = suggest_of(reference, td, PLAIN)
+        suggestion = suggest_in_run(reference, td, PLAIN)
         assert (
             require(suggestion.recommended).tr,
             require(suggestion.recommended).td,
         ) == (tr, td)
 
 
-def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
+def test_windows_keep_their_margin_and_follow_each_other(plan: RunPlan) -> None:
     windows = plan.all_windows
     assert all(
         earlier_window[1] < later_window[0]
@@ -101,7 +101,7 @@ def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
 
 
 def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
-    planned = plan_of(reference, replace(PLAIN, margin=0.02))
+    planned = plan_run(reference, replace(PLAIN, margin=0.02))
     assert {row.margin.time for row in planned.flights} == {0.02}
     assert planned.flights[0].window == pytest.approx(
         (0.02, planned.flights[0].end - 0.02), abs=1e-9
@@ -109,19 +109,19 @@ def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
 
 
 def test_short_windows_are_left_out_with_the_reason(reference: Reference) -> None:
-    planned = plan_of(reference, PLAIN, min_rigid=0.2)
+    planned = plan_run(reference, PLAIN, min_rigid=0.2)
     for row in planned.flights:
         assert (row.status == "left-out") == (row.window is None)
         assert row.window is None or row.window[1] - row.window[0] >= 0.2
         assert row.status != "left-out" or "at least 0.2 was asked for" in (
             row.reason or ""
         )
-    assert plan_of(reference, PLAIN, min_rigid=2.0).supported == ()
+    assert plan_run(reference, PLAIN, min_rigid=2.0).supported == ()
 
 
-def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> None:
+def test_after_counts_in_its_flight_alone(reference: Reference, plan: RunPlan) -> None:
     second = plan.flights[1]
-    planned = plan_of(reference, replace(PLAIN, after=(second.start + second.end) / 2))
+    planned = plan_run(reference, replace(PLAIN, after=(second.start + second.end) / 2))
     assert planned.flights[0].status == "left-out"
     assert (
         planned.flights[1].window is None
@@ -137,11 +137,11 @@ def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> N
 
 @pytest.mark.slow
 def test_a_switched_run_is_recognised_and_the_next_window_planned(
-    reference: Reference, plan: Plan, tmp_path: Path
+    reference: Reference, plan: RunPlan, tmp_path: Path
 ) -> None:
     done = plan.windows
     switched = read(write_run_files(drop(*done), tmp_path), BOX)
-    planned = plan_of(switched, PLAIN, done=done, before=reference)
+    planned = plan_run(switched, PLAIN, done=done, before=reference)
     assert [row.window for row in planned.flights if row.status == "done"] == list(done)
     assert planned.windows
     assert planned.windows[0][0] > done[-1][1]
@@ -158,13 +158,13 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
     )
     assert planned.next_run == (*done, *planned.windows)
     assert plan.next_run == done
-    assert plan_of(switched, PLAIN, done=done, min_rigid=1.0).next_run == ()
+    assert plan_run(switched, PLAIN, done=done, min_rigid=1.0).next_run == ()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("window", [(0.31, 0.5), (0.281, 0.75)])
 def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
-    plan: Plan, window: tuple[float, float], tmp_path: Path
+    plan: RunPlan, window: tuple[float, float], tmp_path: Path
 ) -> None:
     """The box becomes rigid before or while it stands on the ground, and takes off while it is rigid."""
     done = [
@@ -174,7 +174,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     ] + [window]
     record = drop(*done)
     (take_off,) = [end for _, end in record.landings if window[0] < end < window[1]]
-    planned = plan_of(read(write_run_files(record, tmp_path), BOX), PLAIN, done=done)
+    planned = plan_run(read(write_run_files(record, tmp_path), BOX), PLAIN, done=done)
     (row_done,) = [
         row.done for row in planned.flights if row.done and row.window == window
     ]
@@ -193,7 +193,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
 
 
 def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(
-    reference: Reference, plan: Plan
+    reference: Reference, plan: RunPlan
 ) -> None:
     resting = [
         row
@@ -226,7 +226,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(
 @pytest.mark.slow
 def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> None:
     window = (0.31, 0.36)  # on the ground all the time
-    planned = plan_of(
+    planned = plan_run(
         read(write_run_files(drop(window), tmp_path), BOX), PLAIN, done=[window]
     )
     assert (
@@ -237,12 +237,12 @@ def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> No
 
 
 def test_a_run_that_was_not_switched_is_not_taken_for_one(
-    reference: Reference, plan: Plan
+    reference: Reference, plan: RunPlan
 ) -> None:
     with pytest.raises(RangeError, match="said to be done"):
-        plan_of(reference, PLAIN, done=plan.windows)
+        plan_run(reference, PLAIN, done=plan.windows)
     with pytest.raises(RangeError, match="outside the record"):
-        plan_of(reference, PLAIN, done=[(0.1, 9.0)])
+        plan_run(reference, PLAIN, done=[(0.1, 9.0)])
 
 
 # ---- a real solver
@@ -254,7 +254,7 @@ def test_the_flights_and_windows_of_the_computed_box() -> None:
 
     A window of more than half the longest one is planned first: one more run then gives both windows.
     """
-    planned = plan_of(read_solved("drop2T01.gz"), PLAIN)
+    planned = plan_run(read_solved("drop2T01.gz"), PLAIN)
     flights = [
         (0, 0.2858),
         (0.3022, 0.3386),
@@ -283,10 +283,10 @@ def test_a_landing_while_rigid_is_told() -> None:
     """Three windows planned from one reference: the third landed 5.4 ms early, while it was rigid."""
     legs = [locate_stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
     done = [(0.0, 0.2838), (0.3654, 0.4176), (0.5046, 0.5946)]
-    planned = plan_of(read(legs), PLAIN, done=done, before=read_solved("drop2T01.gz"))
+    planned = plan_run(read(legs), PLAIN, done=done, before=read_solved("drop2T01.gz"))
     moved = [row.done.moved for row in planned.flights if row.done]
     assert moved == pytest.approx([0.0, -1.6e-3, -5.4e-3], abs=3e-4)
-    again = plan_of(
+    again = plan_run(
         read(legs), PLAIN, done=done, before=read(legs)
     )  # rigid times of that run are no flights
     assert [row.done.moved for row in again.flights if row.done] == [0.0, 0.0, 0.0]
@@ -297,7 +297,7 @@ def test_a_landing_while_rigid_is_told() -> None:
     ]
     assert planned.supported == ()
     assert "landed-rigid" in [caution.code for caution in planned.cautions]
-    alone = plan_of(
+    alone = plan_run(
         read(legs), PLAIN
     )  # recognised by the kinetic energy that the parts lack
     recognised = [row.window for row in alone.flights if row.done and row.window]
@@ -308,7 +308,7 @@ def test_a_landing_while_rigid_is_told() -> None:
 
 def test_the_switched_car_landed_as_computed() -> None:
     legs = [locate_stored(f"car_all_T0{leg}.gz") for leg in range(1, 4)]
-    planned = plan_of(
+    planned = plan_run(
         read(legs), PLAIN, done=[(0.0496, 0.1464)], before=read_solved("carT01.gz")
     )
     (moved,) = (row.done.moved for row in planned.flights if row.done)
@@ -324,7 +324,7 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
     table.write_text(
         "time,internal_energy\n" + "".join(f"{t!r},{energy!r}\n" for t, energy in rows)
     )
-    planned = plan_of(read([str(table)]), PLAIN)
+    planned = plan_run(read([str(table)]), PLAIN)
     assert len(planned.flights) == 3
     assert all(
         earlier_row.end < later_row.start
@@ -357,7 +357,7 @@ def make_bouncing_energy(seed: int) -> Reference:
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
     """The energy shows another flight start for each td; a window must not begin before the flight of its row."""
     reference = make_bouncing_energy(seed)
-    plan = plan_of(reference, PLAIN)
+    plan = plan_run(reference, PLAIN)
     for row in plan.flights:
         assert (
             row.window is None
@@ -371,7 +371,7 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
         for earlier_row, later_row in pairwise(plan.flights)
     )
     if len(plan.flights) == 1 and plan.flights[0].window:
-        alone = require(suggest_of(reference, None, PLAIN).recommended)
+        alone = require(suggest_in_run(reference, None, PLAIN).recommended)
         assert plan.flights[0].window == (alone.tr, alone.td)
 
 
@@ -380,10 +380,10 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
 def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int) -> None:
     """The page of a plan must not offer pairs that are rigid before the previous flight has landed."""
     reference = make_bouncing_energy(seed)
-    plan = plan_of(reference, PLAIN)
+    plan = plan_run(reference, PLAIN)
     landings = {row.number: row.end for row in plan.flights}
     rows = [row for row in plan.flights if row.window]
-    for row, explored in zip(rows, explored_flights(reference, plan), strict=True):
+    for row, explored in zip(rows, explore_flights(reference, plan), strict=True):
         assert (require(explored.asked).tr, require(explored.asked).td) == row.window
         assert all(
             offer.tr is None or offer.tr >= landings.get(row.number - 1, 0.0)
@@ -404,12 +404,12 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
     car: Reference,
 ) -> None:
     """The car is rigid for 17 ms between two pushes, and for 108 ms after them; `parts` compares sets for 108 ms."""
-    planned = plan_of(car, PLAIN)
+    planned = plan_run(car, PLAIN)
     assert list_statuses(planned) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (
         planned.flights[0].reason or ""
     )
-    longest = require(suggest_of(car, None, PLAIN).recommended)
+    longest = require(suggest_in_run(car, None, PLAIN).recommended)
     assert planned.windows == ((longest.tr, longest.td),)
 
 
@@ -419,7 +419,7 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
 ) -> None:
     """Flight 2 is left out for flight 4, which waits for flight 3; with flight 2 it would wait one run longer."""
     box = read(write_run_files(drop(height=0.15, tilt=80.0), tmp_path), BOX)
-    planned = plan_of(box, PLAIN)
+    planned = plan_run(box, PLAIN)
     assert list_statuses(planned)[:4] == [
         "supported",
         "left-out",
@@ -429,7 +429,7 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
     reason = planned.flights[1].reason or ""
     assert "flight 4 behind it for 0.192: this window locks in energy" in reason
     assert "that flight would wait for one run more" in reason
-    plan_made = plan_of(box, PLAIN, min_rigid=0.07)
+    plan_made = plan_run(box, PLAIN, min_rigid=0.07)
     assert list_statuses(plan_made)[:4] == [
         "supported",
         "supported",
@@ -442,7 +442,7 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(
     car: Reference,
 ) -> None:
-    planned = plan_of(car, PLAIN, min_rigid=0.013)
+    planned = plan_run(car, PLAIN, min_rigid=0.013)
     assert list_statuses(planned) == ["supported", "re-plan"]
     assert planned.flights[0].rigid_time == pytest.approx(0.0131, abs=1e-4)
     assert [caution.code for caution in planned.cautions][-1] == "longer-window-later"

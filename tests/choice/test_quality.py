@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, verify
-from d2rpick.choice.grades import GRADES
-from d2rpick.choice.quality import (
+from d2rpick.choice.answers import suggest_in_history, verify_in_history
+from d2rpick.choice.pair.grades import GRADES
+from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     Grade,
     Quality,
-    candidates_at,
-    order,
-    over_limits,
-    quality_of,
-    ranked,
-    states_per_period,
+    count_states_per_period,
+    grade_pair,
+    list_exceeded_limits,
+    order_by_quality,
+    rank_candidates,
+    rank_judged,
 )
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
-from d2rpick.report.formats import Shown
+from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
@@ -45,9 +45,9 @@ rows = st.lists(
 
 def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     settings_asked = Settings(max_residual=10.0, replay=False)
-    answer = suggest(read_rollover(), 0.37, settings_asked)
+    answer = suggest_in_history(read_rollover(), 0.37, settings_asked)
     assert answer.recommended is None
-    judged = verify(read_rollover(), 0.0886, 0.37, settings_asked)
+    judged = verify_in_history(read_rollover(), 0.0886, 0.37, settings_asked)
     assert "residual unknown" in " ".join(judged.reasons)
 
 
@@ -67,7 +67,7 @@ def test_the_order_of_candidates(
         np.array([row[2] for row in candidate_rows], dtype=np.int32),
         np.array([row[3] for row in candidate_rows], dtype=bool),
     )
-    order_found = order(
+    order_found = order_by_quality(
         group, error, rigid, is_out_of_place, np.full(3, EQUALLY_GOOD)
     ).tolist()
     assert sorted(order_found) == list(range(len(candidate_rows)))
@@ -95,8 +95,8 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     """A jump from 49.6 to 82.4 ms, for td 3 ms later, would gain nothing: the mean energy after td hardly changes."""
     history, known_fits, grades = read_solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
-        situation = examine(history, td, Settings(), known_fits)
-        best = require(next(candidates_at([situation])).chosen)
+        situation = examine_td(history, td, Settings(), known_fits)
+        best = require(next(rank_candidates([situation])).chosen)
         assert require(best.level_error) < 0.06
         grades.append(best.tr)
     assert max(grades) - min(grades) < 3e-3
@@ -104,15 +104,15 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
 
 
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
-    situation = examine(read_solved("carT01.gz", "1-17").history, 0.12, Settings())
+    situation = examine_td(read_solved("carT01.gz", "1-17").history, 0.12, Settings())
     assert situation.bodies is not None
-    ranked_candidates = next(candidates_at([situation]))
+    ranked_candidates = next(rank_candidates([situation]))
 
     def first(until: float) -> float:
         """Return the best tr if those before ``until`` displace the body."""
         out_of_place = np.where(ranked_candidates.judged.moments.tr < until, 1.0, 0.0)
         return next(
-            ranked(
+            rank_judged(
                 replace(
                     ranked_candidates.judged,
                     columns={
@@ -145,12 +145,12 @@ def make_fits(_: float) -> Fits:
 def test_candidates_are_kept_together_as_one_by_one(
     history: History, td: float, limits: dict[str, float]
 ) -> None:
-    situation = examine(history, td, Settings(**limits), make_fits(td))  # type: ignore[arg-type]
-    ranked = next(candidates_at([situation]))
+    situation = examine_td(history, td, Settings(**limits), make_fits(td))  # type: ignore[arg-type]
+    ranked = next(rank_candidates([situation]))
     assert len(ranked) > 3
     kept_flags = ranked.kept.tolist()
     assert kept_flags == [
-        candidate.admissible and not over_limits(situation, candidate)
+        candidate.admissible and not list_exceeded_limits(situation, candidate)
         for candidate in ranked
     ]
     assert ranked.recommended == (kept_flags.index(True) if any(kept_flags) else None)
@@ -171,14 +171,14 @@ ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
 
 def find_grade(history: History, td: float, **arguments: float | bool) -> str | None:
     """Return the grade of the recommendation at a td."""
-    suggestion = suggest(history, td, Settings(**arguments)).quality  # type: ignore[arg-type]
+    suggestion = suggest_in_history(history, td, Settings(**arguments)).quality  # type: ignore[arg-type]
     return suggestion.grade if suggestion else None
 
 
 @settings(max_examples=15)
 @given(st.floats(0.04, 0.14))
 def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
-    answer = suggest(RECORD, td, Settings())
+    answer = suggest_in_history(RECORD, td, Settings())
     if answer.chosen is None or answer.quality is None:
         return
     residual = require(answer.chosen.residual)
@@ -194,7 +194,7 @@ def test_the_energy_alone_says_nothing_of_the_vibration() -> None:
     at_a_peak = float(mode.peaks(0.06, 0.08)[0])
     assert find_grade(record, at_a_peak) == "good"
     assert find_grade(record, at_a_peak, replay=False, after=0.005) == "poor"
-    answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
+    answer = suggest_in_history(record, at_a_peak, Settings(replay=False, after=0.005))
     (reason,) = require(answer.quality).reasons
     assert reason.startswith(
         "how the deformations at tr and td lie to each other is unknown"
@@ -219,7 +219,7 @@ def test_a_record_that_no_level_can_be_read_from_is_poor(
 ) -> None:
     history = make_energy_history(energy, np.linspace(0, 1, 400))
     answers = [
-        suggest(history, td, Settings(after=0.1, replay=False))
+        suggest_in_history(history, td, Settings(after=0.1, replay=False))
         for td in np.linspace(0.7, 0.9, 3)
     ]
     grades = [answer.quality for answer in answers if answer.quality]
@@ -238,21 +238,23 @@ def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
         np.zeros(500),
     )
     energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
-    answer = suggest(make_energy_history(energy, time), 0.8, Settings())
+    answer = suggest_in_history(make_energy_history(energy, time), 0.8, Settings())
     guessed = replace(
         answer.situation, flight=answer.situation.flight._replace(source="energy")
     )
-    motion = quality_of(guessed, require(answer.chosen)).motion
+    motion = grade_pair(guessed, require(answer.chosen)).motion
     assert (motion.grade, motion.reasons) == ("fair", ("the flight is not certain",))
 
 
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
     for td in (0.064, 0.0687534, 0.07):
-        answer = suggest(RECORD, td, Settings())
-        verdict = verify(RECORD, require(answer.recommended).tr, td, Settings())
+        answer = suggest_in_history(RECORD, td, Settings())
+        verdict = verify_in_history(
+            RECORD, require(answer.recommended).tr, td, Settings()
+        )
         assert require(verdict.quality).grade == require(answer.quality).grade
-        assert quality_of(verdict.situation, verdict.candidate).grade in GRADES
-    assert verify(RECORD, 0.02, 0.064, Settings()).quality is None
+        assert grade_pair(verdict.situation, verdict.candidate).grade in GRADES
+    assert verify_in_history(RECORD, 0.02, 0.064, Settings()).quality is None
 
 
 @given(st.integers(4, 40), st.integers(3, 30))
@@ -260,19 +262,19 @@ def test_states_per_period_are_counted_over_whole_periods(
     states: int, periods: int
 ) -> None:
     wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
-    states_per_cycle = require(states_per_period(wave))
+    states_per_cycle = require(count_states_per_period(wave))
     assert states_per_cycle == pytest.approx(states, rel=2 / periods)
     noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
-    noisy = states_per_period(wave + noise)
+    noisy = count_states_per_period(wave + noise)
     assert noisy == pytest.approx(
         states, rel=2 / periods
     )  # noise about the mean is not taken for periods
 
 
 def test_without_a_period_there_are_no_states_of_one() -> None:
-    assert states_per_period(np.ones(10)) is None
-    assert states_per_period(np.linspace(0, 1, 50)) is None
-    assert states_per_period(np.zeros(0)) is None
+    assert count_states_per_period(np.ones(10)) is None
+    assert count_states_per_period(np.linspace(0, 1, 50)) is None
+    assert count_states_per_period(np.zeros(0)) is None
 
 
 def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
@@ -280,7 +282,9 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(
         1
     ).random(201)
-    suggestion = suggest(make_energy_history(energy, time), 0.9, Settings(after=0.25))
+    suggestion = suggest_in_history(
+        make_energy_history(energy, time), 0.9, Settings(after=0.25)
+    )
     assert suggestion.situation.at_rest
     assert suggestion.quality == ALL_GOOD
     guessed = replace(
@@ -288,7 +292,7 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
         flight=suggestion.situation.flight._replace(source="energy"),
     )
     assert guessed.at_rest
-    quality = quality_of(guessed, require(suggestion.chosen))
+    quality = grade_pair(guessed, require(suggestion.chosen))
     assert (quality.grade, quality.reasons) == ("fair", ("the flight is not certain",))
 
 
@@ -326,7 +330,7 @@ def test_rest_is_told_from_a_vibration(
     energy_after: float,
     energy_at_rest: bool,
 ) -> None:
-    suggestion = suggest(
+    suggestion = suggest_in_history(
         make_energy_history(energy, time), td, Settings(after=energy_after)
     )
     assert suggestion.situation.at_rest is energy_at_rest
@@ -338,7 +342,9 @@ def test_rest_is_told_from_a_vibration(
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing far."""
     history = read_solved("oscillator_referenceT01.gz").history
-    early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
+    early, late = (
+        suggest_in_history(history, td, Settings()) for td in (0.068753, 0.144191)
+    )
     for answer, wanted in ((early, "good"), (late, "fair")):
         best, quality = answer.chosen, answer.quality
         assert best is not None
@@ -347,13 +353,15 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
         assert (
             require(best.tr_high) - best.tr > 4 * require(best.timing_tolerance)
         ) is (wanted == "fair")
-        verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
+        verdict = verify_in_history(
+            history, best.tr, answer.situation.td, Settings()
+        ).quality
         assert verdict == require(quality)
     worst = [
         float(
             re.findall(
                 r"At worst: vibration\s+wrong by (\d+)%",
-                as_table(answer_of_td, Shown()),
+                as_table(answer_of_td, DisplayOptions()),
             )[0]
         )
         for answer_of_td in (early, late)
@@ -369,7 +377,7 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
         np.where(time < 0.2, 50 * time, 10.0)
         + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
     )
-    quiet = suggest(
+    quiet = suggest_in_history(
         make_energy_history(energy, time), 0.4, Settings(after=0.25)
     ).situation
     assert quiet.at_rest  # of what comes after td nothing is known
@@ -381,14 +389,18 @@ def test_where_nothing_vibrates_there_is_no_residual() -> None:
     """If the energy is round-off, the oscillator describes noise, and no vibration is left."""
     time = np.linspace(0, 1, 4001)
     energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
-    suggestion = suggest(make_energy_history(energy, time), 0.95, Settings(after=0.6))
+    suggestion = suggest_in_history(
+        make_energy_history(energy, time), 0.95, Settings(after=0.6)
+    )
     assert suggestion.situation.vibration.unknown is None
     assert suggestion.situation.at_rest
     assert suggestion.situation.kinetic_share is None
     best = require(suggestion.chosen)
     assert (best.residual, best.sign_match, best.notes) == (None, None, ())
     assert suggestion.quality == ALL_GOOD
-    verdict = verify(suggestion.situation.history, 0.7, 0.95, Settings(after=0.6))
+    verdict = verify_in_history(
+        suggestion.situation.history, 0.7, 0.95, Settings(after=0.6)
+    )
     assert verdict.verified
     assert verdict.candidate.residual is None
 
@@ -404,7 +416,9 @@ def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> N
     def places(rounding: float) -> list[int]:
         noise = rounding * rng.standard_normal(count)
         room = np.full(1, EQUALLY_GOOD)
-        return [*map(int, order(group, error + noise, rigid, out_of_place, room))]
+        return [
+            *map(int, order_by_quality(group, error + noise, rigid, out_of_place, room))
+        ]
 
     assert places(1e-16) == places(1e-7) == places(0.0)
     places_above = [

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import Suggestion, suggest, suggest_of
-from d2rpick.choice.candidates import Pair
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.answers import PairSuggestion, suggest_in_history, suggest_in_run
+from d2rpick.choice.pair.candidates import Pair
+from d2rpick.choice.question import Settings, read_reference
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
@@ -60,21 +60,23 @@ def make_record(name: str) -> History:
 
 def suggest_for(
     name: str, td: float | tuple[float, float], **arguments: float | bool
-) -> Suggestion:
+) -> PairSuggestion:
     """Choose a pair in a sample or a synthetic record, for one td or for a td range given by its two ends."""
     settings = Settings(**arguments)  # type: ignore[arg-type]
     if name in SAMPLES:
         file, selection = SAMPLES[name]
-        return suggest_of(
-            read([str(ROOT / "sample_data" / file)], selection), td, settings
+        return suggest_in_run(
+            read_reference([str(ROOT / "sample_data" / file)], selection), td, settings
         )
     if name in COMPUTED:
         file, selection = COMPUTED[name]
-        return suggest_of(read([locate_stored(file)], selection), td, settings)
+        return suggest_in_run(
+            read_reference([locate_stored(file)], selection), td, settings
+        )
     return (
         suggest_in_window(make_record(name), td, settings)
         if isinstance(td, tuple)
-        else suggest(make_record(name), td, settings)
+        else suggest_in_history(make_record(name), td, settings)
     )
 
 
@@ -104,7 +106,7 @@ class FrozenAnswer(NamedTuple):
     windows: tuple[tuple[float, float], ...]
 
 
-def summarize(suggestion: Suggestion) -> FrozenAnswer:
+def summarize(suggestion: PairSuggestion) -> FrozenAnswer:
     """Return the facts of a suggestion that must not change."""
     chosen = suggestion.chosen
     tr_half_width = None

@@ -9,22 +9,26 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.question import Settings
-from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
-from d2rpick.choice.switchable_parts import (
+from d2rpick.choice.parts.cost import CostModel, Weights
+from d2rpick.choice.parts.sets_of_parts import (
+    Parts,
+    compare_sets_of_parts,
+    recommend_parts,
+)
+from d2rpick.choice.parts.switchable_parts import (
     InFlight,
     PartFacts,
     PartRow,
-    facts_of,
-    landing_alone,
-    rows_of,
-    step_growth,
+    collect_facts,
+    compute_step_growth,
+    find_landing_alone,
+    judge_parts,
 )
+from d2rpick.choice.question import Settings
 from d2rpick.deck import read_inventory
 from d2rpick.histories.formats import radioss_th
 from d2rpick.histories.opening import open_run
-from d2rpick.report.formats import Shown
+from d2rpick.report.formats import DisplayOptions
 from d2rpick.vibration.measures import run_time_share
 from tests import made_car
 from tests.command import ENERGY, MATSUM, put, run, run_json
@@ -41,7 +45,12 @@ opened = cache(lambda history: open_run([history]))
 
 def rank_sets(history: str, deck: str | None = None, **options: object) -> Parts:
     model = CostModel(read_inventory(deck)) if deck else None
-    return parts_of(opened(history), Settings(replay=False), model, **options)  # type: ignore[arg-type]
+    return compare_sets_of_parts(
+        opened(history),
+        Settings(replay=False),
+        model,
+        **options,  # type: ignore[arg-type]
+    )
 
 
 def test_without_a_deck_no_verdict_is_guessed_and_the_cost_stays_open() -> None:
@@ -156,7 +165,7 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
         part_answer.recommended is None
     )  # elements of a part that no *PART defines: the cost is not known
     with pytest.raises(FormatError, match="no set of parts can be recommended"):
-        recommended_parts(
+        recommend_parts(
             open_run([MATSUM]),
             Settings(),
             CostModel(read_inventory(str(tmp_path / "main.k"))),
@@ -168,7 +177,7 @@ def test_none_is_recommended_of_a_table_which_says_what_to_give_instead() -> Non
         FormatError,
         match=r"^[^:]+: this table has no parts; give the matsum, .* instead",
     ):
-        recommended_parts(
+        recommend_parts(
             open_run([ENERGY]), Settings(), CostModel(read_inventory(str(DECK)))
         )
 
@@ -192,14 +201,16 @@ def test_the_step_grows_by_what_stays_deformable() -> None:
         make_row(part, None, None)._replace(smallest_step=step)
         for part, step in enumerate((2e-6, 6e-6, 3e-6, None), 1)
     )
-    assert step_growth([first_row, two, three], {1}) == pytest.approx(1.5)
-    assert step_growth([first_row, two, three], {2}) == 1.0
-    assert step_growth([first_row, two, three], {1, 2, 3}) == float("inf")
+    assert compute_step_growth([first_row, two, three], {1}) == pytest.approx(1.5)
+    assert compute_step_growth([first_row, two, three], {2}) == 1.0
+    assert compute_step_growth([first_row, two, three], {1, 2, 3}) == float("inf")
     assert (
-        step_growth([first_row, two, four], {1}) is None
+        compute_step_growth([first_row, two, four], {1}) is None
     )  # the step of part 4 is not known
-    assert step_growth([first_row, two, four], {1, 4}) == 3.0
-    assert step_growth([first_row, four._replace(kind="rigid")], {1}) == float("inf")
+    assert compute_step_growth([first_row, two, four], {1, 4}) == 3.0
+    assert compute_step_growth([first_row, four._replace(kind="rigid")], {1}) == float(
+        "inf"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -347,12 +358,12 @@ def make_row(part: int, landing: float | None, cost: float | None) -> PartRow:
 def test_which_part_drives_the_landing_alone(
     rows: list[PartRow], alone: int | None
 ) -> None:
-    assert landing_alone(rows) == alone
+    assert find_landing_alone(rows) == alone
 
 
 def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
     model = CostModel(read_inventory(str(DECK)), Weights({"BT": 1.0, "QBAT": 0.1}))
-    facts = facts_of(open_run([MATSUM]), Settings())
+    facts = collect_facts(open_run([MATSUM]), Settings())
 
     def with_landing(part: PartFacts, landing: float) -> PartFacts:
         return part._replace(
@@ -365,7 +376,7 @@ def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
         1: with_landing(facts.parts[1], 0.01),
         2: with_landing(facts.parts[2], 5.0),
     }
-    rows = rows_of(facts._replace(parts=parts_by_id), model)
+    rows = judge_parts(facts._replace(parts=parts_by_id), model)
     assert [part_row.verdict for part_row in rows] == ["switch", "keep", "keep"]
     assert rows[1].reasons == ("drives the landing alone, at little cost",)
 
@@ -631,19 +642,21 @@ def test_a_slow_swing_makes_the_error_a_lower_bound(
     assert verdict["position_error_is_lower_bound"] is bound
     assert (
         "off by at least"
-        in d2.suggest(run, float(TD), **arguments).text("table", Shown())
+        in d2.suggest(run, float(TD), **arguments).text("table", DisplayOptions())
     ) is bound
     assert all(
         ("off by at least" in message) is bound
         for message in list_messages(verdict, "out-of-place")
     )
-    assert (">= 0.0" in d2.plan(run, **arguments).text("table", Shown())) is bound
+    assert (
+        ">= 0.0" in d2.plan(run, **arguments).text("table", DisplayOptions())
+    ) is bound
     if deck:
         sets = d2.parts(run, replay=False, deck=starter_deck)
         assert require(sets.recommended).position_is_lower_bound is bound
         (row,) = [
             line
-            for line in sets.text("table", Shown()).splitlines()
+            for line in sets.text("table", DisplayOptions()).splitlines()
             if f"  {CAR}  " in line
         ]
         assert row.count(">= ") == (2 if bound else 0)  # position and angle
@@ -673,7 +686,9 @@ def test_parts_of_one_title_are_told_apart_by_number(folder: Path) -> None:
 
 
 def test_of_a_run_without_states_nothing_is_said_of_its_parts() -> None:
-    facts = facts_of(open_contents(radioss_th, bytes(make_t01(0).data)), Settings())
+    facts = collect_facts(
+        open_contents(radioss_th, bytes(make_t01(0).data)), Settings()
+    )
     assert (facts.parts, facts.reason) == (
         {},
         "run: no states; did the run reach its first output?",

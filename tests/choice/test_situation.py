@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import suggest, suggest_at
+from d2rpick.choice.answers import suggest_at, suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
@@ -23,20 +23,20 @@ PLAIN = Settings()
 
 
 def test_the_basis_is_the_best_that_can_be_relied_on() -> None:
-    assert examine(paper.make_history(), paper.TD, PLAIN).basis == "oscillator"
+    assert examine_td(paper.make_history(), paper.TD, PLAIN).basis == "oscillator"
     assert (
-        examine(paper.make_history(), paper.TD, Settings(replay=False)).basis
+        examine_td(paper.make_history(), paper.TD, Settings(replay=False)).basis
         == "energy"
     )
-    assert examine(chain.read_chain_history(), chain.TD_LATE, PLAIN).basis == "parts"
+    assert examine_td(chain.read_chain_history(), chain.TD_LATE, PLAIN).basis == "parts"
 
 
 @pytest.mark.slow
 def test_every_model_answers_alike() -> None:
     for situation in (
-        examine(paper.make_history(), paper.TD, PLAIN),
-        examine(chain.read_chain_history(), chain.TD_LATE, PLAIN),
-        examine(read_rollover(), 0.37, PLAIN),
+        examine_td(paper.make_history(), paper.TD, PLAIN),
+        examine_td(chain.read_chain_history(), chain.TD_LATE, PLAIN),
+        examine_td(read_rollover(), 0.37, PLAIN),
     ):
         vibration = situation.vibration
         moments = vibration.moments(situation.settings.tolerance)
@@ -61,7 +61,7 @@ def test_every_model_answers_alike() -> None:
 
 
 def test_from_another_td_the_same_evidence_is_seen() -> None:
-    situation = examine(paper.make_history(), paper.TD, PLAIN)
+    situation = examine_td(paper.make_history(), paper.TD, PLAIN)
     situation_there = situation.at(paper.BETTER_TD)
     assert situation_there.evidence is situation.evidence
     assert situation_there.kinetic_share == pytest.approx(0.0, abs=1e-9)
@@ -77,7 +77,7 @@ def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
         ["sample_data/rollover_box.matsum"], Selection(parts=("all",))
     ).history
     fits, settings = Fits(), Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
-    situations = {td: examine(history, td, settings, fits) for td in order}
+    situations = {td: examine_td(history, td, settings, fits) for td in order}
     assert len({situation.flight[:2] for situation in situations.values()}) == 1
     open_ = {
         td: situation.bodies.unknown
@@ -89,7 +89,9 @@ def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
 
 def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     wrong_mode = to_mode(replace(paper.OSCILLATOR, stiffness=500e3), 6.0)
-    answer = suggest(paper.make_history(), paper.TD, Settings(oscillator=wrong_mode))
+    answer = suggest_in_history(
+        paper.make_history(), paper.TD, Settings(oscillator=wrong_mode)
+    )
     assert answer.situation.basis == "energy"
     assert "the given oscillator does not describe the record" in require(
         answer.situation.vibration.unknown
@@ -117,12 +119,12 @@ def test_what_was_found_with_another_end_of_the_load_changes_nothing(
     history: History, td: float
 ) -> None:
     """A plan remembers results for all flights, and only one flight has the given end of the load."""
-    fits, fresh = Fits(), suggest(history, td, PLAIN).candidates[:]
+    fits, fresh = Fits(), suggest_in_history(history, td, PLAIN).candidates[:]
     other_candidates = suggest_at(
-        examine(history, td, Settings(after=0.6 * td), fits)
+        examine_td(history, td, Settings(after=0.6 * td), fits)
     ).candidates[:]
     assert other_candidates != fresh
-    assert suggest_at(examine(history, td, PLAIN, fits)).candidates[:] == fresh
+    assert suggest_at(examine_td(history, td, PLAIN, fits)).candidates[:] == fresh
 
 
 def make_one_mode() -> History:
@@ -143,16 +145,16 @@ def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_an
     None
 ):
     history, fits = make_one_mode(), CountedFits()
-    first = examine(history, 0.6, PLAIN, fits, quick=True)
+    first = examine_td(history, 0.6, PLAIN, fits, quick=True)
     fits_made = fits.made
-    quick = examine(history, 0.8, PLAIN, fits, quick=True)
+    quick = examine_td(history, 0.8, PLAIN, fits, quick=True)
     assert fits.made == fits_made
     assert quick.sees_as(first)
-    anew = examine(history, 0.8, PLAIN)
+    anew = examine_td(history, 0.8, PLAIN)
     assert (quick.basis, quick.flight) == (anew.basis, anew.flight)
     assert quick.kinetic_share == pytest.approx(anew.kinetic_share, rel=1e-9)
     assert (
-        examine(history, 0.05, PLAIN, fits, quick=True).evidence.span
+        examine_td(history, 0.05, PLAIN, fits, quick=True).evidence.span
         != first.evidence.span
     )
 
@@ -162,7 +164,8 @@ def test_a_quick_look_refuses_what_a_full_one_does_without_its_misfit() -> None:
         np.random.default_rng(3).random(200), np.linspace(0.0, 1.0, 200)
     )
     quick, full = (
-        examine(noise, 0.9, Settings(after=0.5), quick=quick) for quick in (True, False)
+        examine_td(noise, 0.9, Settings(after=0.5), quick=quick)
+        for quick in (True, False)
     )
     assert (quick.basis, quick.flight) == (full.basis, full.flight)
     assert require(full.evidence.fit).misfit

@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.api.studies import find_runs
-from d2rpick.choice.answers import verify
+from d2rpick.choice.answers import verify_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import (
+from d2rpick.choice.runs.study import (
     NONE,
     OK,
     UNREADABLE,
     Question,
     StudyRow,
-    ask,
-    cut_runs,
-    failed,
-    fewest_digits,
-    outliers,
-    summarise,
+    compare_rows,
+    find_cut_runs,
+    find_fewest_digits,
+    find_outliers,
+    judge_run,
+    make_failed_row,
 )
 from d2rpick.histories.opening import Selection
 from tests import variants
@@ -55,7 +55,7 @@ def make_study_row(
 
 def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
     name = variants.write(tmp_path / "run.csv")
-    run_row = ask(ASKED, name)
+    run_row = judge_run(ASKED, name)
     assert (run_row.status, run_row.message, run_row.basis, run_row.warnings) == (
         "ok",
         None,
@@ -95,19 +95,19 @@ def test_what_is_wrong_with_a_run_is_said_in_its_row(
     file = tmp_path / "run.csv"
     if content is not None:
         file.write_text(content)
-    run_row = ask(ASKED, str(file))
+    run_row = judge_run(ASKED, str(file))
     assert (run_row.status, run_row.tr) == (status, None)
     assert message in (run_row.message or "")
 
 
 def test_a_process_that_did_not_answer_is_a_row() -> None:
-    failed_row = failed("run", MemoryError())
+    failed_row = make_failed_row("run", MemoryError())
     assert (failed_row.source, failed_row.status) == ("run", "failed")
     assert (
         failed_row.message
         == "run: there is not enough memory; give it more, or name fewer files"
     )
-    failed_row = failed("run", KeyError("time"))
+    failed_row = make_failed_row("run", KeyError("time"))
     assert (failed_row.source, failed_row.status) == ("run", "internal-error")
     assert (
         failed_row.message == "run: internal error, please report it (KeyError: 'time')"
@@ -116,7 +116,7 @@ def test_a_process_that_did_not_answer_is_a_row() -> None:
 
 def test_another_version_gives_no_answer() -> None:
     with pytest.raises(Exception, match=r"d2rpick 0\.0\.1 asks d2rpick"):
-        ask(replace(ASKED, tool_version="0.0.1"), "run")
+        judge_run(replace(ASKED, tool_version="0.0.1"), "run")
 
 
 # Many runs.
@@ -126,10 +126,12 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
     tmp_path: Path,
 ) -> None:
     names = variants.write_variants(tmp_path)
-    answer = summarise(variants.TD, [ask(ASKED, name) for name in names])
+    answer = compare_rows(variants.TD, [judge_run(ASKED, name) for name in names])
     for name in names:
         for tr in (require(answer.common.tr), *require(answer.common.window)):
-            assert verify(read_history([name]), tr, variants.TD, Settings()).verified
+            assert verify_in_history(
+                read_history([name]), tr, variants.TD, Settings()
+            ).verified
     assert answer.spread is not None
     assert answer.spread.min < answer.spread.median < answer.spread.max
     assert answer.agree is False
@@ -145,19 +147,21 @@ def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(
 ) -> None:
     name = locate_stored("chain_ref.csv.gz")
     question = Question(0.238, Settings(), Selection(energy=energies))
-    run_row = ask(question, name)
-    answer = summarise(0.238, [run_row, run_row])
+    run_row = judge_run(question, name)
+    answer = compare_rows(0.238, [run_row, run_row])
     history = read_history([name], question.selection)
-    assert verify(history, require(answer.common.tr), 0.238, Settings()).verified
+    assert verify_in_history(
+        history, require(answer.common.tr), 0.238, Settings()
+    ).verified
 
 
 def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
     tmp_path: Path,
 ) -> None:
-    run_row = ask(ASKED, variants.write(tmp_path / "run.csv"))
+    run_row = judge_run(ASKED, variants.write(tmp_path / "run.csv"))
     single_study, two = (
-        summarise(variants.TD, [run_row]),
-        summarise(variants.TD, [run_row, run_row]),
+        compare_rows(variants.TD, [run_row]),
+        compare_rows(variants.TD, [run_row, run_row]),
     )
     assert single_study.agree is two.agree is True
     assert (
@@ -174,13 +178,13 @@ def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
 def test_runs_that_agree_have_their_own_tr_in_common(times: list[float]) -> None:
     """No two times differ by more than their uncertainty."""
     rows = [make_study_row(str(i), (1, 3), tr=tr) for i, tr in enumerate(times)]
-    common_tr = summarise(10.0, rows).common
+    common_tr = compare_rows(10.0, rows).common
     assert common_tr.tr == pytest.approx(float(np.median(times)))
     assert common_tr.keeps_tolerance
     without = replace(
         make_study_row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None
     )
-    assert summarise(10.0, [*rows, without]).common.tr == 1.0
+    assert compare_rows(10.0, [*rows, without]).common.tr == 1.0
 
 
 def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
@@ -189,24 +193,24 @@ def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
         variants.write(tmp_path / "short.csv", end=0.06),
         variants.write(tmp_path / "late.csv", end=0.1),
     )
-    rows = [ask(ASKED, name) for name in (*whole, short, late)]
+    rows = [judge_run(ASKED, name) for name in (*whole, short, late)]
     assert [run_row.record_end for run_row in rows] == pytest.approx(
         [0.15] * 3 + [0.06, 0.1]
     )
     assert [run_row.status for run_row in rows] == [OK] * 3 + ["out-of-range", OK]
     messages = {
         caution.code: caution.message
-        for caution in summarise(variants.TD, rows).cautions
+        for caution in compare_rows(variants.TD, rows).cautions
     }
     assert (
         messages["cut-runs"]
         == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
     )
-    assert cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[
+    assert find_cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[
         0
     ].warnings == ("truncated-input",)
     assert "cut-runs" not in {
-        caution.code for caution in summarise(variants.TD, rows[:3]).cautions
+        caution.code for caution in compare_rows(variants.TD, rows[:3]).cautions
     }
 
 
@@ -225,7 +229,7 @@ def test_runs_agree_when_their_intervals_have_a_time_in_common(
         for b, w in intervals
         if (a, v) != (b, w)
     )
-    assert summarise(4.0, rows).agree == pairwise or close
+    assert compare_rows(4.0, rows).agree == pairwise or close
 
 
 def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_not() -> (
@@ -238,24 +242,26 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
         make_study_row("d", (8, 9)),
         make_study_row("e"),
     ]
-    common_tr = summarise(10.0, rows).common
+    common_tr = compare_rows(10.0, rows).common
     assert (common_tr.tr, common_tr.window) == (None, None)
     assert (
         common_tr.reason
         == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
     )
     assert (
-        summarise(10.0, [make_study_row("e")]).common.reason
+        compare_rows(10.0, [make_study_row("e")]).common.reason
         == "no tr is acceptable in the run that was judged"
     )
     assert (
-        summarise(10.0, [failed("f", OSError())]).common.reason
+        compare_rows(10.0, [make_failed_row("f", OSError())]).common.reason
         == "no run could be judged"
     )
 
 
 def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
-    answer = summarise(10.0, [make_study_row("a", (1, 2)), failed("bad", OSError())])
+    answer = compare_rows(
+        10.0, [make_study_row("a", (1, 2)), make_failed_row("bad", OSError())]
+    )
     assert answer.common.tr == 2.0
     assert list(answer.common.errors) == [pytest.approx(0.2), None]
     assert answer.objection
@@ -276,7 +282,7 @@ def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run(
         make_study_row("a", (1, 4), alike=make_equal_rows((1.2, 1.4), (1.5, 3))),
         make_study_row("b", (0, 6), tr=3.0, alike=make_equal_rows((1.45, 5))),
     ]
-    common_tr = summarise(10.0, rows).common
+    common_tr = compare_rows(10.0, rows).common
     assert (common_tr.tr, common_tr.window, common_tr.keeps_tolerance) == (
         1.5,
         (1.0, 4.0),
@@ -305,7 +311,7 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
             alike=make_equal_rows((1, 1.5)),
         ),
     ]
-    answer = summarise(10.0, rows)
+    answer = compare_rows(10.0, rows)
     assert (answer.common.tr, answer.common.window, answer.common.keeps_tolerance) == (
         2.0,
         (1.0, 3.0),
@@ -330,7 +336,7 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
     )
 )  # fmt: skip
 def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[StudyRow]) -> None:
-    common_tr = summarise(10.0, rows).common
+    common_tr = compare_rows(10.0, rows).common
     if common_tr.tr is None:
         assert max(run_row.acceptable[0, 0] for run_row in rows) > min(
             run_row.acceptable[0, 1] for run_row in rows
@@ -350,10 +356,12 @@ def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None
         ASKED,
         replace(ASKED, settings=Settings(replay=False, after=0.01)),
     ):
-        answer = summarise(variants.TD, [ask(question, name) for name in names])
+        answer = compare_rows(
+            variants.TD, [judge_run(question, name) for name in names]
+        )
         tr = require(answer.common.tr)
         for name, error in zip(names, answer.common.errors, strict=True):
-            verdict = verify(
+            verdict = verify_in_history(
                 read_history([name]), tr, variants.TD, question.settings
             ).candidate.error
             assert error == pytest.approx(verdict, abs=1e-3)
@@ -362,14 +370,14 @@ def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None
 def test_each_run_chooses_its_own_td_in_a_window(tmp_path: Path) -> None:
     names = variants.write_variants(tmp_path)
     window = (0.06, 0.07)
-    rows = [ask(Question(window, Settings()), name) for name in names]
-    answer = summarise(window, rows)
+    rows = [judge_run(Question(window, Settings()), name) for name in names]
+    answer = compare_rows(window, rows)
     assert (answer.td, answer.td_window) == (None, window)
     times = [run_row.td for run_row in rows if run_row.td is not None]
     assert len(set(times)) == len(names)
     assert all(window[0] <= td <= window[1] for td in times)
     for name, td in zip(names, times, strict=True):
-        assert verify(
+        assert verify_in_history(
             read_history([name]), require(answer.common.tr), td, Settings()
         ).verified
 
@@ -381,7 +389,7 @@ def test_different_bases_and_units_are_told() -> None:
         make_study_row("c", time_unit="ms"),
     ]
     messages = {
-        caution.code: caution.message for caution in summarise(10.0, rows).cautions
+        caution.code: caution.message for caution in compare_rows(10.0, rows).cautions
     }
     assert messages == {
         "mixed-units": "the times of the runs have different units, td has only one: not named in 2 runs, ms in 1 run",
@@ -393,7 +401,7 @@ def test_different_bases_and_units_are_told() -> None:
 @given(st.floats(1e-6, 1e3), st.floats(0, 1))
 def test_the_shortest_number_lies_between(low: float, share: float) -> None:
     high = low * (1 + share)
-    shortest = fewest_digits(low, high)
+    shortest = find_fewest_digits(low, high)
     assert low <= shortest <= high
     assert (
         len(repr(shortest)) <= len(repr(low))
@@ -409,15 +417,15 @@ def test_a_folder_of_folders_of_runs_says_how_to_name_them(tmp_path: Path) -> No
     for name in ("a", "b"):
         (tmp_path / "var" / name).mkdir(parents=True)
     asked_question = replace(ASKED, td=0.064)
-    assert require(ask(asked_question, str(tmp_path / "var")).message).endswith(
+    assert require(judge_run(asked_question, str(tmp_path / "var")).message).endswith(
         "give the file"
     )
     for name in ("a", "b"):
         (tmp_path / "var" / name / "glstat").write_bytes(Path(GLSTAT).read_bytes())
-    message = require(ask(asked_question, str(tmp_path / "var")).message)
+    message = require(judge_run(asked_question, str(tmp_path / "var")).message)
     assert message.endswith(f"or all to study as '{tmp_path / 'var'}/*'")
     names = find_runs([message.split("'")[1]])
-    assert [ask(asked_question, name).status for name in names] == [OK, OK]
+    assert [judge_run(asked_question, name).status for name in names] == [OK, OK]
 
 
 @pytest.mark.usefixtures("here")
@@ -445,8 +453,8 @@ def test_files_of_all_formats_are_rows_of_one_study() -> None:
             for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz")
         ),
     ]
-    rows = [ask(Question(0.05, Settings()), source) for source in sources]
-    answer = summarise(0.05, rows)
+    rows = [judge_run(Question(0.05, Settings()), source) for source in sources]
+    answer = compare_rows(0.05, rows)
     assert [result_row.source for result_row in answer.runs] == sources
     assert {"ok", "unreadable", "out-of-range"} <= {
         result_row.status for result_row in rows
@@ -467,11 +475,11 @@ def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
         make_chosen_row("none", None, NONE),
         make_chosen_row("x", None, UNREADABLE),
     )
-    assert outliers([far, *near, lost, none, farther]) == (none, farther, far)
-    assert outliers(near) == ()
-    assert outliers([none]) == (none,)
-    assert outliers([]) == ()
+    assert find_outliers([far, *near, lost, none, farther]) == (none, farther, far)
+    assert find_outliers(near) == ()
+    assert find_outliers([none]) == (none,)
+    assert find_outliers([]) == ()
     other_row = make_chosen_row("other", 2.1)  # equal times let any other stand out
-    assert outliers([*(make_chosen_row("same", 2.0) for _ in range(9)), other_row]) == (
-        other_row,
-    )
+    assert find_outliers(
+        [*(make_chosen_row("same", 2.0) for _ in range(9)), other_row]
+    ) == (other_row,)

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.aftermath import kept_mean_energy
-from d2rpick.choice.answers import suggest, suggest_at
-from d2rpick.choice.candidates import judge
-from d2rpick.choice.quality import candidates_at
+from d2rpick.choice.answers import suggest_at, suggest_in_history
+from d2rpick.choice.pair.aftermath import bound_mean_energy
+from d2rpick.choice.pair.candidates import judge_times
+from d2rpick.choice.pair.quality import rank_candidates
+from d2rpick.choice.pair.situation import Situation, examine_td
+from d2rpick.choice.pair.warnings import compute_shortfall, estimate_time_after
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Situation, examine
-from d2rpick.choice.suggest_td import longest_rigid_times
-from d2rpick.choice.warnings import expectation, shortfall
+from d2rpick.choice.td.suggest_td import bound_rigid_times
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import make_history, simulate
-from d2rpick.report.suggestion import outlook
+from d2rpick.report.suggestion import list_alternatives
 from tests import paper
 from tests.command import ENERGY, ROLLOVER, run, run_json
 from tests.computed import locate_results
@@ -61,7 +61,8 @@ def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
 def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
     suggestion = suggest_in_window(paper.make_history(), (0.0635, 0.066), PLAIN)
     ends = [
-        suggest(paper.make_history(), td, PLAIN).recommended for td in (0.0635, 0.066)
+        suggest_in_history(paper.make_history(), td, PLAIN).recommended
+        for td in (0.0635, 0.066)
     ]
     assert require(suggestion.recommended).td == 0.066
     assert require(suggestion.recommended).residual == min(
@@ -78,7 +79,7 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
     assert suggestion.longer is None
     situation = suggestion.situation
     falls = {
-        td: float(shortfall(np.array(history.energy_at(td)), mean))
+        td: float(compute_shortfall(np.array(history.energy_at(td)), mean))
         for td in situation.peaks(0.13, 0.38)
     }
     level = falls[require(suggestion.recommended).td]
@@ -113,7 +114,7 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
         require(suggestion.longer).rigid_time
         > 1.5 * require(suggestion.recommended).rigid_time
     )
-    lines = dict(outlook(suggestion))
+    lines = dict(list_alternatives(suggestion))
     assert "is given up for quality" in lines["longer"]
 
 
@@ -135,8 +136,8 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> N
     )  # no tr lies between the end of the load and these peaks
     history, fits = read_rollover_run(), CountedFits()
     for td in (0.30, 0.3175, 0.335):
-        suggest_at(examine(history, td, late, fits))
-        examine(history, td, late, fits, quick=True)
+        suggest_at(examine_td(history, td, late, fits))
+        examine_td(history, td, late, fits, quick=True)
     fits_made = fits.made
     assert fits_made > 0
     assert suggest_in_window(history, (0.30, 0.335), late, fits).recommended is None
@@ -159,7 +160,7 @@ def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
 
 
 def test_a_known_oscillator_expects_nothing_of_the_energy_alone() -> None:
-    assert suggest(paper.make_history(), paper.TD, PLAIN).expected is None
+    assert suggest_in_history(paper.make_history(), paper.TD, PLAIN).expected is None
 
 
 def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
@@ -197,11 +198,12 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
         dtype=None,
         encoding=None,
     )
-    situation = suggest(history, 0.37, PLAIN).situation
+    situation = suggest_in_history(history, 0.37, PLAIN).situation
     flying = table[table["tr_s"] > 0.0885]
     computed = flying["IEmean_td_to_380ms_J"] / flying["IEmean_ref_J"]
     expected_means = [
-        expectation(situation, history.energy_at(float(tr))) for tr in flying["tr_s"]
+        estimate_time_after(situation, history.energy_at(float(tr)))
+        for tr in flying["tr_s"]
     ]
     low = np.array(
         [expected_mean.ratio_low for expected_mean in expected_means if expected_mean]
@@ -216,7 +218,7 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
 def test_the_means_of_the_computed_car_are_expected() -> None:
     """Shells and beams until the landing; for all parts, springs included, 96 % was stated and 89 % computed."""
     history = read_solved("carT01.gz", "1-17").history
-    situation = examine(history, 0.1464, PLAIN)
+    situation = examine_td(history, 0.1464, PLAIN)
     with locate_results("car_runs.csv").open() as table:
         rows = [
             row
@@ -227,7 +229,7 @@ def test_the_means_of_the_computed_car_are_expected() -> None:
     assert len(flying) == 12
     for row in flying:
         expected = require(
-            expectation(situation, history.energy_at(float(row["tr_s"])))
+            estimate_time_after(situation, history.energy_at(float(row["tr_s"])))
         )
         computed = float(row["meanIEstruct_td_landing_ratio"])
         assert expected.ratio == pytest.approx(computed, abs=0.03)
@@ -269,16 +271,18 @@ def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
     switched = remaining_time + np.mean(
         np.sum(released**2, axis=0) * np.exp(-alpha * (time[after_td] - td))
     )
-    alone = suggest(history, td, Settings(replay=False)).situation
-    expected = require(expectation(alone, float(locked)))
+    alone = suggest_in_history(history, td, Settings(replay=False)).situation
+    expected = require(estimate_time_after(alone, float(locked)))
     assert (
         require(expected.ratio_low)
         < switched / energy[after_td].mean()
         < require(expected.ratio)
     )
     assert expected.resting_energy == pytest.approx(energy[time <= td].min())
-    for situation in (alone, suggest(history, td, PLAIN).situation):
-        kept_energy = require(kept_mean_energy(situation, judge(situation, [tr])[0]))
+    for situation in (alone, suggest_in_history(history, td, PLAIN).situation):
+        kept_energy = require(
+            bound_mean_energy(situation, judge_times(situation, [tr])[0])
+        )
         assert (
             kept_energy.low - 0.02
             < switched / energy[after_td].mean()
@@ -323,7 +327,7 @@ def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
 
 
 def find_rigid_time(situation: Situation) -> float:
-    best = next(candidates_at([situation])).chosen
+    best = next(rank_candidates([situation])).chosen
     return best.rigid_time if best and not best.same_swing else 0.0
 
 
@@ -345,13 +349,13 @@ def test_no_recommended_tr_lies_further_back_than_the_bound(
         np.sin(time[:, np.newaxis] * rates + phases) ** 2
     ).sum(axis=1)
     energy += noise * rng.standard_normal(time.size)
-    start = examine(
+    start = examine_td(
         make_energy_history(energy, time),
         0.8,
         Settings(tolerance=tolerance, after=load_end, replay=False),
     )
     tds = rng.choice(time[1:], 12)
-    bounds = longest_rigid_times(start, tds)
+    bounds = bound_rigid_times(start, tds)
     for td, bound in zip(tds.tolist(), bounds.tolist(), strict=True):
         assert find_rigid_time(start.at(td)) <= bound
 
@@ -359,12 +363,12 @@ def test_no_recommended_tr_lies_further_back_than_the_bound(
 def test_the_bound_is_near_where_the_energy_passes_the_level() -> None:
     time = np.linspace(0.0, 10.0, 4001)
     energy = np.exp(-time / 10) * np.sin(3 * time) ** 2
-    situation = examine(
+    situation = examine_td(
         make_energy_history(energy, time), 9.0, Settings(after=0.5, replay=False)
     )
     tds = time[(time > 3) & (energy > 0.05)][::50]
     rigid_times = np.array([find_rigid_time(situation.at(td)) for td in tds.tolist()])
-    bounds = longest_rigid_times(situation, tds)
+    bounds = bound_rigid_times(situation, tds)
     assert rigid_times.all()
     assert (bounds - rigid_times).max() < 0.1
     assert (bounds < tds - 0.5).mean() > 0.5
@@ -372,8 +376,8 @@ def test_the_bound_is_near_where_the_energy_passes_the_level() -> None:
 
 def test_where_a_model_decides_the_flight_alone_is_the_bound() -> None:
     history = paper.make_history()
-    situation = examine(history, 0.064, Settings(after=0.01))
-    assert longest_rigid_times(situation, np.array([0.05, 0.064])).tolist() == [
+    situation = examine_td(history, 0.064, Settings(after=0.01))
+    assert bound_rigid_times(situation, np.array([0.05, 0.064])).tolist() == [
         0.04,
         0.054,
     ]
@@ -381,8 +385,8 @@ def test_where_a_model_decides_the_flight_alone_is_the_bound() -> None:
 
 def test_without_a_start_of_the_flight_nothing_is_rigid() -> None:
     time = np.linspace(0.0, 1.0, 50)
-    situation = examine(
+    situation = examine_td(
         make_energy_history(1 + time, time), 0.5, Settings(replay=False)
     )
     assert situation.earliest_tr is None
-    assert longest_rigid_times(situation, time).tolist() == [0.0] * 50
+    assert bound_rigid_times(situation, time).tolist() == [0.0] * 50

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.choice.question import read
-from d2rpick.choice.switched_run import switched_history
+from d2rpick.choice.question import read_reference
+from d2rpick.choice.switched.switched_run import prepare_switched_history
 from d2rpick.histories.formats import glstat, matsum
 from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import Selection
@@ -56,8 +56,8 @@ def files(tmp_path: Path) -> list[str]:
 def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
     files: list[str], arguments: tuple[str, ...], done: bool | None
 ) -> None:
-    reference = read(files, Selection(parts=arguments))
-    history, windows, cautions = switched_history(reference, ())
+    reference = read_reference(files, Selection(parts=arguments))
+    history, windows, cautions = prepare_switched_history(reference, ())
     assert [time for window in windows for time in window] == pytest.approx(
         [0.3, 0.7] * bool(done)
     )

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, suggest_of
-from d2rpick.choice.quality import candidates_at
+from d2rpick.choice.answers import suggest_at, suggest_in_history, suggest_in_run
+from d2rpick.choice.pair.quality import rank_candidates
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
+from d2rpick.choice.td.trade_off import Offer, TradeOff, explore_run
 from d2rpick.histories.digits import round_as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
@@ -30,7 +30,7 @@ def check(
 ) -> None:
     """Compare offers with the answers of ``suggest`` for each single td."""
     for offer in offers:
-        alone = suggest_at(examine(history, offer.td, settings_asked, Fits()))
+        alone = suggest_at(examine_td(history, offer.td, settings_asked, Fits()))
         assert offer.best == alone.chosen
         assert (offer.basis, offer.energy_td, offer.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
@@ -71,7 +71,7 @@ def check_unbeaten(exploration: TradeOff) -> None:
 @pytest.mark.parametrize("name", SAMPLES)
 def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> None:
     run = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
-    exploration = explore_of(run, Settings(), steps=4)
+    exploration = explore_run(run, Settings(), steps=4)
     low, high = exploration.td_window
     cells = np.searchsorted(
         np.linspace(low, high, 5)[1:],
@@ -90,7 +90,7 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
 def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None:
     """An offer does not keep its candidates: they must be found again."""
     run = read(["sample_data/energy.csv"])
-    exploration = explore_of(run, Settings(), (0.001, 0.07), steps=10)
+    exploration = explore_run(run, Settings(), (0.001, 0.07), steps=10)
     without = [offer_row for offer_row in exploration.offers if offer_row.pair is None]
     assert any(
         "the nearest, tr = " in offer_row.answer.why_none for offer_row in without
@@ -130,7 +130,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> Non
         for cycles in rng.uniform(6, 30, 40)
     )
     energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
-    exploration = explore_of(
+    exploration = explore_run(
         make_reference(make_energy_history(energy, time)), Settings(), None, steps=40
     )
     assert (
@@ -142,7 +142,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> Non
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
     """From peak to peak of one oscillator the rigid time is the same, except for its last digits."""
-    exploration = explore_of(
+    exploration = explore_run(
         read(["sample_data/energy.csv"]), Settings(), None, steps=20
     )
     check_unbeaten(exploration)
@@ -172,7 +172,7 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, load_end: float | None
 ) -> None:
     settings_asked = Settings(after=load_end)
-    exploration = explore_of(
+    exploration = explore_run(
         make_reference(history), settings_asked, (td - 0.15, td + 0.15), td=td, steps=6
     )
     assert require(exploration.asked).td == td
@@ -190,9 +190,9 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
 def test_candidates_before_the_flight_never_change_what_is_best(
     history: History, td: float, load_end: float, replay: bool
 ) -> None:
-    situation = examine(history, td, Settings(after=load_end, replay=replay))
+    situation = examine_td(history, td, Settings(after=load_end, replay=replay))
     all_candidates, flying = (
-        next(candidates_at([situation], in_flight=in_flight))
+        next(rank_candidates([situation], in_flight=in_flight))
         for in_flight in (False, True)
     )
     assert flying.chosen == all_candidates.chosen
@@ -213,14 +213,14 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
         energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time
     )
     settings_asked = Settings(replay=False)
-    alone = suggest(history, 0.37, settings_asked).situation.flight
+    alone = suggest_in_history(history, 0.37, settings_asked).situation.flight
     assert alone.source == "energy"
-    exploration = explore_of(
+    exploration = explore_run(
         make_reference(history), settings_asked, (0.27, 1.0), td=0.37, steps=4
     )
     assert exploration.situation.flight == alone
     assert (
-        explore_of(
+        explore_run(
             make_reference(history), settings_asked, (0.27, 1.0), steps=4
         ).situation.flight
         != alone
@@ -231,7 +231,7 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
 def test_the_basis_is_that_of_the_recommended_pair() -> None:
     """The first td of the flight has only one state before it, which must not make a basis unusable."""
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
-    exploration = explore_of(reference, Settings(), steps=20)
+    exploration = explore_run(reference, Settings(), steps=20)
     refused = [
         answer_part.situation.vibration.unknown
         for answer_part in (exploration, exploration.suggestion)
@@ -252,13 +252,13 @@ def test_no_offer_beats_the_one_that_is_recommended(
     file: str, selection: Selection, window: tuple[float, float] | None, steps: int
 ) -> None:
     settings_asked = Settings(replay=file == "energy.csv")
-    exploration = explore_of(
+    exploration = explore_run(
         read([f"sample_data/{file}"], selection), settings_asked, window, steps=steps
     )
     assert exploration.recommended is not None
     assert exploration.recommended.unbeaten
     if file == "rollover.csv":
-        alone = suggest_of(
+        alone = suggest_in_run(
             read([f"sample_data/{file}"], selection), window, settings_asked
         )
         assert (exploration.recommended.tr, exploration.recommended.td) == require(
@@ -271,7 +271,7 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
     """Plastic energy with a vibration of 1e-4 of it: about half of the vibration is kinetic, on both sides of td."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
-    exploration = explore_of(
+    exploration = explore_run(
         make_reference(make_energy_history(energy, time)),
         Settings(after=0.1, replay=False),
     )

@@ -8,19 +8,24 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings, strategies as st
 
-from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
-from d2rpick.choice.flights import flights_of
-from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.windows import (
-    acceptable_windows,
-    alike_windows,
-    clear_of_td,
-    common_windows,
-    coverage,
-    error_at,
-    error_profile,
+from d2rpick.choice.answers import (
+    PairSuggestion,
+    suggest_in_history,
+    verify_at,
+    verify_in_history,
 )
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.windows import (
+    count_coverage,
+    cut_before_td,
+    find_acceptable_windows,
+    find_alike_windows,
+    find_common_windows,
+    interpolate_error,
+    make_error_profile,
+)
+from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
     SHARE,
@@ -202,7 +207,7 @@ def test_no_landing_of_the_computed_car_and_box_is_taken_for_a_grazing_one(
     history = read_solved(name).history
     landing = [
         flight
-        for flight in flights_of(history, Settings())
+        for flight in find_flights(history, Settings())
         if flight.end is not None and (flight.start or 0.0) >= since
     ]
     assert landing
@@ -215,7 +220,7 @@ def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() 
     history = read_solved("carT01.gz").history
     flight = next(
         flight
-        for flight in flights_of(history, Settings())
+        for flight in find_flights(history, Settings())
         if 0.01 < (flight.start or 0.0) < 0.03
     )
     assert changes_momentum_little(history, flight)
@@ -240,12 +245,14 @@ def test_where_no_force_is_known_no_contact_grazes() -> None:
 
 def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
     history, _ = make_touched_body(0.5)
-    answer = suggest(history, 0.59, Settings())
+    answer = suggest_in_history(history, 0.59, Settings())
     messages = {caution.code: caution.message for caution in answer.cautions}
     assert "stays below 1 % of the largest one" in messages["grazing-contact"]
     assert "grazing-contact" not in {
         caution.code
-        for caution in suggest(make_touched_body(3000.0)[0], 0.59, Settings()).cautions
+        for caution in suggest_in_history(
+            make_touched_body(3000.0)[0], 0.59, Settings()
+        ).cautions
     }
 
 
@@ -260,7 +267,7 @@ def read_landings(name: str, column: str) -> Iterator[tuple[str, float]]:
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     """For all runs that were switched in the flight and switched back before the contact."""
     history = read_solved("carT01.gz").history
-    flight = flights_of(history, Settings())[-1]
+    flight = find_flights(history, Settings())[-1]
     margin = compute_margin(history, flight)
     starts, ends = (
         dict(read_landings("car_runs.csv", "tr_s")),
@@ -293,7 +300,7 @@ def test_the_landings_of_the_switched_box_lie_within_the_margin(
     history = read_solved("drop2T01.gz").history
     (flight,) = (
         flight_row
-        for flight_row in flights_of(history, Settings())
+        for flight_row in find_flights(history, Settings())
         if flight_row.end == pytest.approx(end, abs=1e-3)
     )
     moved = abs(dict(read_landings("drop2_runs.csv", column))[run]) / 1e3
@@ -304,9 +311,9 @@ TD = 0.064
 PAPER = make_energy_history(ENERGY, TIME)
 
 
-def find_windows_of(answer: Suggestion) -> Samples:
+def find_windows_of(answer: PairSuggestion) -> Samples:
     best = answer.recommended
-    return acceptable_windows(
+    return find_acceptable_windows(
         answer.situation, answer.candidates, best.tr if best else None
     )
 
@@ -322,7 +329,7 @@ def are_in_windows(windows: Samples, times: Samples) -> Samples:
     )
 
 
-def check(answer: Suggestion, seed: int) -> None:
+def check(answer: PairSuggestion, seed: int) -> None:
     """Compare the windows with ``verify`` at their ends, inside, and at random times."""
     situation = answer.situation
     history = situation.history
@@ -348,10 +355,10 @@ def check(answer: Suggestion, seed: int) -> None:
         windows, clear
     ).tolist()
     # the errors in the windows are those of ``verify``; where nothing vibrates there are none
-    profile = error_profile(situation, answer.candidates, windows)
+    profile = make_error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
         error = 0.0 if situation.at_rest else verify_at(situation, t).candidate.error
-        assert error_at(profile, t) == pytest.approx(error, abs=1e-3)
+        assert interpolate_error(profile, t) == pytest.approx(error, abs=1e-3)
 
 
 @settings(max_examples=8)
@@ -368,7 +375,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
         omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload
     )
     history = make_energy_history(mode.energy(TIME[::3]), TIME[::3])
-    answer = suggest(
+    answer = suggest_in_history(
         history, td, Settings(tolerance=tolerance, after=load_end, max_residual=limit)
     )
     check(answer, seed)
@@ -407,7 +414,7 @@ def test_windows_of_any_energy_hold_what_verifies(
         replay=False,
     )
     assume(share > float(settings_asked.after or 0))
-    check(suggest(history, share, settings_asked), seed)
+    check(suggest_in_history(history, share, settings_asked), seed)
 
 
 @pytest.mark.slow
@@ -418,7 +425,7 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(
     record = make_energy_history(add_noise(ENERGY, 0.002, 5), TIME)
     rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
     for history, td in ((record, TD), (rollover, 0.37)):
-        answer = suggest(
+        answer = suggest_in_history(
             history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5)
         )
         assert len(find_windows_of(answer))
@@ -430,12 +437,12 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(
 def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
     two = (Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0))
     time = np.linspace(0.0, 0.3, 3001)
-    modes = suggest(
+    modes = suggest_in_history(
         make_energy_history(sum_energies(two, time), time), td, Settings(tolerance=0.4)
     )
     assert modes.situation.basis == "modal"
     check(modes, 1)
-    parts = suggest(chain.read_chain_history(), td, Settings())
+    parts = suggest_in_history(chain.read_chain_history(), td, Settings())
     assert parts.situation.basis == "parts"
     check(parts, 1)
     assert len(find_windows_of(parts))
@@ -444,7 +451,7 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
 def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> (
     None
 ):
-    answer = suggest(PAPER, TD, Settings())
+    answer = suggest_in_history(PAPER, TD, Settings())
     windows = find_windows_of(answer)
     acceptable = np.array(sorted(c.tr for c in answer.candidates if c.admissible))
     assert len(windows) == len(acceptable)
@@ -452,21 +459,21 @@ def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_s
 
 
 def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
-    answer = suggest(PAPER, TD, Settings())
+    answer = suggest_in_history(PAPER, TD, Settings())
     assert find_windows_of(answer)[-1, 1] < TD - 0.01
-    late = suggest(PAPER, 0.068, Settings(after=0.0655))
+    late = suggest_in_history(PAPER, 0.068, Settings(after=0.0655))
     assert late.recommended is None
     assert not find_windows_of(late).size
     flat = make_energy_history(
         1 + 1e-3 * np.cos(np.arange(50) * 2.0), np.linspace(0, 1, 50)
     )
-    quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
+    quiet = suggest_in_history(flat, 0.9, Settings(after=0.1, replay=False))
     assert quiet.recommended
     (window,) = find_windows_of(quiet)
     assert window.tolist() == [0.1, np.nextafter(0.9, 0)]
-    (clear_window,) = clear_of_td(quiet.situation, find_windows_of(quiet))
+    (clear_window,) = cut_before_td(quiet.situation, find_windows_of(quiet))
     assert clear_window == pytest.approx([0.1, 0.9 - 1 / 49])
-    assert not clear_of_td(quiet.situation, np.array([[0.881, 0.899]])).size
+    assert not cut_before_td(quiet.situation, np.array([[0.881, 0.899]])).size
 
 
 @pytest.mark.parametrize(
@@ -478,7 +485,7 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     ],
 )
 def test_where_nothing_verifies_there_is_no_window(settings_asked: Settings) -> None:
-    assert not find_windows_of(suggest(PAPER, TD, settings_asked)).size
+    assert not find_windows_of(suggest_in_history(PAPER, TD, settings_asked)).size
 
 
 def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> (
@@ -489,9 +496,9 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
         (PAPER, Settings()),
         (PAPER, Settings(replay=False, after=0.005)),
     ):
-        answer = suggest(history, TD, settings_asked)
+        answer = suggest_in_history(history, TD, settings_asked)
         best = require(answer.chosen)
-        windows = alike_windows(
+        windows = find_alike_windows(
             answer.situation, answer.candidates, best, find_windows_of(answer)
         )
         (around,) = (
@@ -504,7 +511,7 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
                 best.timing_tolerance, rel=1e-3
             )
         ends = [
-            verify(history, end, TD, settings_asked).candidate
+            verify_in_history(history, end, TD, settings_asked).candidate
             for end in windows.ravel()
         ]
         errors = [
@@ -520,14 +527,16 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:
     time = np.linspace(0, 0.15, 10_001)
-    answer = suggest(
+    answer = suggest_in_history(
         make_energy_history(MODE.energy(time), time), 0.0687534, Settings()
     )
     windows = find_windows_of(answer)
-    profile = error_profile(answer.situation, answer.candidates, windows)
+    profile = make_error_profile(answer.situation, answer.candidates, windows)
     assert profile.shape[1] < 20 * len(windows)
     assert np.all(np.diff(profile[0]) > 0)
-    assert error_profile(answer.situation, answer.candidates, windows[:0]).shape == (
+    assert make_error_profile(
+        answer.situation, answer.candidates, windows[:0]
+    ).shape == (
         2,
         0,
     )
@@ -537,14 +546,14 @@ def test_a_profile_is_short_where_the_error_is_smooth() -> None:
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     second_mode = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
     histories = [PAPER, make_energy_history(second_mode.energy(TIME), TIME)]
-    shared_windows = common_windows(
+    shared_windows = find_common_windows(
         [
-            find_windows_of(suggest(history, 0.0687534, Settings()))
+            find_windows_of(suggest_in_history(history, 0.0687534, Settings()))
             for history in histories
         ]
     )
     times = np.linspace(0.01, 0.06, 400)
-    situations = [examine(history, 0.0687534, Settings()) for history in histories]
+    situations = [examine_td(history, 0.0687534, Settings()) for history in histories]
     expected = [
         all(verify_at(situation, t).admissible for situation in situations)
         for t in times
@@ -562,7 +571,7 @@ WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
 def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
     runs: list[Samples],
 ) -> None:
-    stretches, counts = coverage(runs)
+    stretches, counts = count_coverage(runs)
     times = np.arange(0, 12.5, 0.25)
     expected = np.sum([are_in_windows(windows, times) for windows in runs], axis=0)
     held = (stretches[:, 0] <= times[:, np.newaxis]) & (
@@ -571,7 +580,7 @@ def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
     assert np.max(np.where(held, counts, 0), axis=1, initial=0).tolist() == list(
         expected
     )
-    shared = common_windows(runs)
+    shared = find_common_windows(runs)
     assert are_in_windows(shared, times).tolist() == [
         count == len(runs) for count in expected
     ]
@@ -580,7 +589,9 @@ def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
 
 def test_a_suggestion_gives_its_windows_on_any_basis() -> None:
     for replay in (True, False):
-        answer = suggest(PAPER, 0.0687534, Settings(replay=replay, after=0.005))
+        answer = suggest_in_history(
+            PAPER, 0.0687534, Settings(replay=replay, after=0.005)
+        )
         windows = answer.acceptable_windows
         assert any(
             start <= require(answer.recommended).tr <= end for start, end in windows

@@ -11,7 +11,7 @@ import pytest
 
 from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
-from d2rpick.cli.manual import manual
+from d2rpick.cli.manual import write_manual
 from d2rpick.rules import RULES
 from tests.command import (
     DECK,
@@ -271,12 +271,12 @@ def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
 
 
 def test_the_manual_leaves_the_short_name_of_help_as_it_is() -> None:
-    assert r"\-h, \-\-help" in manual()
+    assert r"\-h, \-\-help" in write_manual()
     assert run("rule", "-h").stdout == run("rule", "--help").stdout
 
 
 def test_the_manual_holds_every_command_and_option() -> None:
-    page = manual()
+    page = write_manual()
     for name in COMMANDS:
         assert f".SH d2rpick {name}\n" in page
     plain = page.replace(r"\-", "-")
@@ -289,7 +289,7 @@ def test_the_manual_holds_every_command_and_option() -> None:
 def test_the_manual_is_roff_without_warnings() -> None:
     manual_page = subprocess.run(
         ["groff", "-man", "-ww", "-Tutf8"],
-        input=manual(),
+        input=write_manual(),
         capture_output=True,
         text=True,
         check=True,

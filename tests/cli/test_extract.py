@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.report.history_files import format_of, write_table
+from d2rpick.report.history_files import choose_history_format, write_table
 from tests.command import (
     BOX as ROLLOVER_T01,
     ENERGY,
@@ -288,11 +288,11 @@ def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
 
 
 def test_format_of_takes_only_what_can_be_written() -> None:
-    assert format_of("run.H5", ["csv", "hdf5"]) == "hdf5"
+    assert choose_history_format("run.H5", ["csv", "hdf5"]) == "hdf5"
     with pytest.raises(
         FormatError, match=r"run\.h5: the suffix names no format; give `write_as`: csv"
     ):
-        format_of("run.h5", ["csv"])
+        choose_history_format("run.h5", ["csv"])
 
 
 # replay, written and read back.

@@ -450,10 +450,10 @@ def test_a_damaged_line_of_a_resume_file_is_passed_over(
 def test_no_changed_byte_of_a_resume_file_gives_another_row(tmp_path: Path) -> None:
     from d2rpick.api.studies import Ledger
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.study import Question, ask
+    from d2rpick.choice.runs.study import Question, judge_run
 
     file, question = tmp_path / "ledger", Question(0.064, Settings())
-    row = ask(question, ENERGY)
+    row = judge_run(question, ENERGY)
     Ledger(str(file), question).add(row)
     content = bytearray(file.read_bytes())
     for byte_index in range(11, len(content) - 1, 7):

@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import UNSEEN, make_printable
-from d2rpick.report.figures import with_unit
+from d2rpick.report.figures import add_unit
 from d2rpick.report.tables import (
     as_json,
     as_markdown,
-    in_markdown,
-    positional,
-    shell_line,
+    escape_markdown,
+    make_positional,
+    quote_shell_line,
 )
 from tests.command import DECK, ENERGY, ROOT, run
 from tests.sample_deck import DECK as SAMPLE_DECK
@@ -85,7 +85,7 @@ def test_a_shell_gives_back_the_words_of_a_command() -> None:
         "",
         *(os.fsdecode(bytes([byte, 48])) for byte in range(1, 256)),
     ]
-    line = shell_line(words)
+    line = quote_shell_line(words)
     assert line.isprintable()
     assert not re.search(
         r"(?<!\\)(\\\\)*\\x", line
@@ -94,8 +94,8 @@ def test_a_shell_gives_back_the_words_of_a_command() -> None:
 
 
 def test_files_that_begin_with_a_dash_are_typed_behind_two() -> None:
-    assert positional(["-", "run.csv"]) == ("-", "run.csv")
-    assert positional(["run.csv", "--td"]) == ("--", "run.csv", "--td")
+    assert make_positional(["-", "run.csv"]) == ("-", "run.csv")
+    assert make_positional(["run.csv", "--td"]) == ("--", "run.csv", "--td")
 
 
 @given(st.text(max_size=60))
@@ -114,7 +114,7 @@ def test_a_name_stays_in_its_cell_of_a_markdown_table(
     assert len(rows) == 1
     assert re.sub(r"\\.", "", rows[0]).count("|") == 3
     assert re.sub(
-        r"\\([\\|<*\[~&_])", r"\1", in_markdown(first_name)
+        r"\\([\\|<*\[~&_])", r"\1", escape_markdown(first_name)
     ) == make_printable(first_name)
 
 
@@ -152,7 +152,7 @@ def test_answers_name_a_file_without_control_codes(
             assert not re.search(r"(?<!\\)<script", result.stdout)
             assert (
                 command[0] not in ("info", "study")
-                or in_markdown(NAME) in result.stdout
+                or escape_markdown(NAME) in result.stdout
             )
 
 
@@ -327,4 +327,4 @@ def test_a_unit_is_no_formula_of_a_figure(here: Path) -> None:
         run("suggest", "--td", "0.064", "--plot", "plot.svg", "run.csv").exit_code == 0
     )
     assert ET.parse(here / "plot.svg") is not None
-    assert with_unit("time", "$x$") == r"time [\$x\$]"
+    assert add_unit("time", "$x$") == r"time [\$x\$]"

@@ -501,7 +501,7 @@ def show_progress(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
         patch.setenv("COLUMNS", "40")
-        with progress.reading(names, quiet=quiet, period=PERIOD):
+        with progress.show_reading(names, quiet=quiet, period=PERIOD):
             time.sleep(periods * PERIOD)
     return stream.getvalue()
 
@@ -541,7 +541,7 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys, "stderr", stream)
 
     def fail() -> None:
-        with progress.reading(["glstat"], quiet=False, period=PERIOD):
+        with progress.show_reading(["glstat"], quiet=False, period=PERIOD):
             time.sleep(5 * PERIOD)
             raise ValueError("broken")
 
@@ -598,7 +598,7 @@ def test_runs_are_counted_with_the_time_that_is_left(
 ) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    with progress.counting(9, quiet=False, period=PERIOD) as count:
+    with progress.show_counting(9, quiet=False, period=PERIOD) as count:
         count.done = count.taken = 3
         time.sleep(5 * PERIOD)
         count.done = 5

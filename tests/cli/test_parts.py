@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from tests.command import (
@@ -132,19 +132,20 @@ def test_an_oscillator_does_not_overrule_a_momentum_that_shows_no_flight() -> No
         evidence=Given(momenta),
     )
     messages = {
-        c.code: c.message for c in cautions_of(examine(history, 0.0687, Settings()))
+        c.code: c.message
+        for c in warn_about_td(examine_td(history, 0.0687, Settings()))
     }
     assert (
         messages["no-free-flight"] == "the momentum shows no free flight at td = 0.0687"
     )
-    assert not examine(history, 0.0687, Settings()).in_flight
+    assert not examine_td(history, 0.0687, Settings()).in_flight
     plain = History(TIME, ENERGY, source=("run",), format="matsum", channel="E")
     assert "no-free-flight" not in {
-        c.code for c in cautions_of(examine(plain, 0.0687, Settings()))
+        c.code for c in warn_about_td(examine_td(plain, 0.0687, Settings()))
     }
-    situation = examine(history, 0.0687, Settings(after=0.001))
+    situation = examine_td(history, 0.0687, Settings(after=0.001))
     assert situation.in_flight
-    assert "flight-sources-disagree" in {c.code for c in cautions_of(situation)}
+    assert "flight-sources-disagree" in {c.code for c in warn_about_td(situation)}
 
 
 def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from d2rpick.report.formats import Shown
+from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
 from tests.command import ENERGY, MATSUM, put, read_refusal, run, run_json
@@ -32,7 +32,7 @@ def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
 def test_all_forms_hold_the_same() -> None:
     parts = d2.parts(d2.read(MATSUM), deck=DECK)
     document = parts.to_dict()
-    rows = list(csv.DictReader(io.StringIO(parts.text("csv", Shown()))))
+    rows = list(csv.DictReader(io.StringIO(parts.text("csv", DisplayOptions()))))
     assert (
         [row["verdict"] for row in rows]
         == [row["verdict"] for row in document["parts"]]
@@ -41,7 +41,7 @@ def test_all_forms_hold_the_same() -> None:
     assert rows[0]["elements"] == "94 shell"
     assert run("parts", "-q", "-f", "value", *WITH_DECK).stdout == "1,2\n"
     for form in ("table", "markdown"):
-        text = parts.text(form, Shown())
+        text = parts.text(form, DisplayOptions())
         assert all(
             words in text
             for words in (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from d2rpick.report.formats import Shown
+from d2rpick.report.formats import DisplayOptions
 from tests.command import ENERGY, put, read_refusal, run, run_json
 from tests.computed import locate_stored, read_starter
 from tests.drops import drop, write_run_files
@@ -44,18 +44,18 @@ def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     assert 1 < len(supported) < len(all_windows)
     values = run("plan", "-q", "-f", "value", "--all", *PART, *history).stdout
     for text, wanted in (
-        (plan.text("value", Shown()), supported),
+        (plan.text("value", DisplayOptions()), supported),
         (values, all_windows),
     ):
         assert [
             tuple(map(float, line.split(" "))) for line in text.splitlines()
         ] == wanted
-    table = plan.text("csv", Shown())
+    table = plan.text("csv", DisplayOptions())
     assert [row["td"] for row in read_csv_rows(table)] == [
         row["td"] for row in document["windows"]
     ]
     for form in ("table", "markdown"):
-        text = plan.text(form, Shown())
+        text = plan.text(form, DisplayOptions())
         assert all(
             f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in all_windows
         )
@@ -95,7 +95,7 @@ def test_a_poor_window_is_called_poor() -> None:
             box,
         )
         assert alone["quality"] == row["quality"]
-    text = plan.text("table", Shown())
+    text = plan.text("table", DisplayOptions())
     assert (
         f"flight {rows[1]['flight']}   poor: how the deformations at tr and td lie"
         in text

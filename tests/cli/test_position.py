@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 import d2rpick as d2
-from d2rpick.api.asked import model_of, selected
+from d2rpick.api.asked import complete_selection, read_cost_model
 from d2rpick.api.request import Request
 from d2rpick.choice.question import Settings
 from d2rpick.histories.names import Selection
-from d2rpick.report.formats import Shown
+from d2rpick.report.formats import DisplayOptions
 from tests.command import join_wrapped_lines, put, run, run_json
 from tests.computed import locate_stored, read_starter
 from tests.json_schemas import check_by_schema, run_json_checked
@@ -30,10 +30,12 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(
     tmp_path: Path,
 ) -> None:
     deck = put(tmp_path / "CAR_0000.rad", read_starter("CAR"))
-    model = model_of(Request(deck=str(deck)))
+    model = read_cost_model(Request(deck=str(deck)))
     silent: Any = SimpleNamespace(springs=(), parts=())
     assert model is not None
-    assert selected(silent, Selection(parts=("1",)), Settings(), model).springs == (
+    assert complete_selection(
+        silent, Selection(parts=("1",)), Settings(), model
+    ).springs == (
         "15",
         "16",
         "17",
@@ -76,7 +78,7 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
         candidate_row["position_error"] is None for candidate_row in early
     )  # in the load
     assert "out-of-place" not in {warning["code"] for warning in document["warnings"]}
-    table = chosen.text("table", Shown(limit=1))
+    table = chosen.text("table", DisplayOptions(limit=1))
     assert "off by 0.00" in table
     assert (
         "at td if the parts become one rigid body (`deck` tells which do): engine is frozen elsewhere"
@@ -90,7 +92,7 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     assert {candidate_row["position_error_assumes"] for candidate_row in early} == {
         None
     }
-    head, first, *_ = chosen.text("csv", Shown()).splitlines()
+    head, first, *_ = chosen.text("csv", DisplayOptions()).splitlines()
     assert (
         "position_error,position_error_part,position_error_body,position_error_assumes"
         in head

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Outcome, RigidWindow, make_history, simulate
 from d2rpick.report import figures_models
-from d2rpick.report.formats import Shown, write
+from d2rpick.report.formats import DisplayOptions, write
 from d2rpick.report.rollover import Scan
 from tests.command import list_warning_codes, run
 from tests.json_schemas import check_by_schema
@@ -177,7 +177,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert document["recommended"] in [one_run["tr"] for one_run in document["runs"]]
     reference = simulate(Parameters(mesh=4), 0.11, interval=1e-3)
-    chosen = suggest(make_history(reference), 0.1, Settings())
+    chosen = suggest_in_history(make_history(reference), 0.1, Settings())
     scanned = Scan(
         reference,
         [Outcome(**one_run) for one_run in document["runs"]],
@@ -185,15 +185,17 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
         chosen.cautions,
     )
     assert (
-        json.loads(write("rollover", "json", scanned, Shown()))["runs"]
+        json.loads(write("rollover", "json", scanned, DisplayOptions()))["runs"]
         == document["runs"]
     )
-    rows = csv.DictReader(io.StringIO(write("rollover", "csv", scanned, Shown())))
+    rows = csv.DictReader(
+        io.StringIO(write("rollover", "csv", scanned, DisplayOptions()))
+    )
     assert [
         {name: float(cell) for name, cell in row.items()} for row in rows
     ] == document["runs"]
-    assert write("rollover", "markdown", scanned, Shown()).startswith("| tr |")
-    text = write("rollover", "table", scanned, Shown())
+    assert write("rollover", "markdown", scanned, DisplayOptions()).startswith("| tr |")
+    text = write("rollover", "table", scanned, DisplayOptions())
     assert "\n* " in text
     assert f"recommended  tr = {document['recommended']:.6g}" in text
 

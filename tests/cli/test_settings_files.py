@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.cli import COMMANDS, d2rpick
-from d2rpick.cli.values import spelled
+from d2rpick.cli.values import spell_option
 from tests.command import ENERGY, put, read_refusal, run
 
 ASKED: Final = ("suggest", "--td", "0.0687534", ENERGY)
@@ -83,7 +83,7 @@ def list_options(command: str) -> list[str]:
     command_object = d2rpick.get_command(click.Context(d2rpick), command)
     assert command_object
     return [
-        spelled(option)
+        spell_option(option)
         for option in command_object.params
         if isinstance(option, click.Option)
     ]

@@ -339,11 +339,11 @@ def test_a_run_that_kills_its_process_is_a_row(
 ) -> None:
     # as the system does when memory runs out
     (tmp_path / "sitecustomize.py").write_text(
-        "import os, d2rpick.choice.study as study\n"
+        "import os, d2rpick.choice.runs.study as study\n"
         "ask = study.ask\n"
         "def kill(question, source):\n"
         "    return os.abort() if source.endswith('deadly.csv') else ask(question, source)\n"
-        "kill.__module__, kill.__qualname__ = 'd2rpick.choice.study', 'ask'\n"
+        "kill.__module__, kill.__qualname__ = 'd2rpick.choice.runs.study', 'ask'\n"
         "study.ask = kill\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from d2rpick.cli import COMMANDS
-from d2rpick.cli.output import ARGUMENTS, option_of, with_options
+from d2rpick.cli.output import ARGUMENTS, find_option, replace_arguments
 from tests.command import ENERGY, ROLLOVER, ROOT, join_wrapped_lines, run
 
 # Layers whose messages name no options.
@@ -37,7 +37,7 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
         name
         for text in texts
         for name in re.findall(r"`(\w+)`", text)
-        if not option_of(name)
+        if not find_option(name)
     ] == []
 
 
@@ -45,12 +45,12 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
 def test_every_argument_has_an_option_that_exists() -> None:
     help_text = "".join(run(command, "--help").stdout for command in COMMANDS)
     assert {
-        name for name in ARGUMENTS if f"{option_of(name)} " not in help_text
+        name for name in ARGUMENTS if f"{find_option(name)} " not in help_text
     } == set()
 
 
 def test_the_command_line_names_the_option_that_cures() -> None:
-    assert with_options("`after` and `unknown`") == "--after and `unknown`"
+    assert replace_arguments("`after` and `unknown`") == "--after and `unknown`"
     assert (
         "--after 9 lies outside the record"
         in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr

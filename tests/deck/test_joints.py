@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.choice.deck_of_run import bodies_of
+from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
 from d2rpick.deck.model import Inventory
 from d2rpick.flight.position_error import RigidBody
 from tests.deck import test_radioss_inventory as rad
@@ -122,8 +122,8 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
     (tie,) = inventory.ties
     assert told in tie
     assert "main.k:" in tie
-    assert bodies_of(inventory, [7, 9]) == ()
-    assert bodies_of(inventory, [7]) == (RigidBody((7,)),)
+    assert find_rigid_bodies(inventory, [7, 9]) == ()
+    assert find_rigid_bodies(inventory, [7]) == (RigidBody((7,)),)
     assert inventory.complete  # its cost is known
 
 
@@ -153,7 +153,7 @@ def test_tied_interfaces_of_radioss(
     assert {
         part: {*joined_parts} for part, joined_parts in inventory.joined.items()
     } == (joined or {})
-    assert bool(bodies_of(inventory, [1, 2])) == bool(joined)
+    assert bool(find_rigid_bodies(inventory, [1, 2])) == bool(joined)
 
 
 @pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
@@ -163,5 +163,5 @@ def test_other_ties_of_radioss_leave_the_bodies_open(
     tie = f"/{keyword}/1\ntie\n{pad(4, 0, 0, 5)}"
     inventory = rad.read_text(tmp_path, rad.write_nodes(12) + RADIOSS + rad.PROPS + tie)
     assert [tie.split()[0] for tie in inventory.ties] == [f"/{keyword}/1"]
-    assert bodies_of(inventory, [1, 2]) == ()
+    assert find_rigid_bodies(inventory, [1, 2]) == ()
     assert inventory.complete

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.choice.deck_of_run import in_deck
+from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import find_supports
 from d2rpick.histories.opening import open_run
-from d2rpick.histories.run import Run
+from d2rpick.histories.run import OpenedRun
 from d2rpick.histories.surroundings import Surroundings
 from tests import made_car
 from tests.decks import pad
@@ -180,7 +180,7 @@ def write_gravity(
 
 def find_surroundings(inventory: Inventory) -> Surroundings:
     """Return the surroundings that a deck defines, for a run without other information."""
-    return in_deck(Run((), ()), inventory).surroundings
+    return add_surroundings(OpenedRun((), ()), inventory).surroundings
 
 
 RAMP = "/FUNCT/1\nramp\n" + "".join(
@@ -279,6 +279,10 @@ def test_the_deck_of_another_model_tells_nothing(tmp_path: Path) -> None:
     deck = made_car.write_starter(
         tmp_path, write_group(1, 1) + write_support("111 000", 1)
     )
-    assert in_deck(open_run([history]), read_inventory(deck)).surroundings.supports[1]
+    assert add_surroundings(
+        open_run([history]), read_inventory(deck)
+    ).surroundings.supports[1]
     other_inventory = read_inventory("sample_data/rollover_box.k")
-    assert not in_deck(open_run([history]), other_inventory).surroundings.supports
+    assert not add_surroundings(
+        open_run([history]), other_inventory
+    ).surroundings.supports

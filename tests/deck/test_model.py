@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.choice.deck_of_run import bodies_of
+from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import count_pieces
@@ -62,7 +62,7 @@ def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
         (3,),
     )  # each may have a body of its own
     assert count_pieces(inventory, [1, 2]) == 1
-    assert bodies_of(inventory, [1, 2]) == (RigidBody((1, 2)),)
+    assert find_rigid_bodies(inventory, [1, 2]) == (RigidBody((1, 2)),)
 
 
 def test_springs_of_ls_dyna_hold_parts_too(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
         tmp_path, write_body(1, *FIRST, *THIRD), engine="/RBODY/OFF\n49\n"
     )
     assert inventory.bodies([1, 2, 3]) == ((1, 3), (2,))
-    assert bodies_of(inventory, [1, 3]) == (RigidBody((1, 3)),)
+    assert find_rigid_bodies(inventory, [1, 3]) == (RigidBody((1, 3)),)
     assert inventory.bodies([2, 3]) == (
         (2,),
         (3,),
@@ -129,7 +129,7 @@ def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_t
         engine="/PRINT/-100\n",
     )
     assert [tie.split()[0] for tie in inventory.ties] == ["/RBODY/1"]
-    assert bodies_of(inventory, [1, 2]) == ()
+    assert find_rigid_bodies(inventory, [1, 2]) == ()
 
 
 def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) ->
         (made_car.write_keywords(tmp_path), False),
     ):
         inventory = read_inventory(deck)
-        assert bodies_of(inventory, [*made_car.BODY, *made_car.WHEELS]) == (
+        assert find_rigid_bodies(inventory, [*made_car.BODY, *made_car.WHEELS]) == (
             RigidBody(made_car.BODY), RigidBody(made_car.WHEELS, whole=False)
         )  # fmt: skip
         assert (
@@ -147,7 +147,7 @@ def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) ->
             == count_pieces(inventory, [7])
             == 2
         )
-        assert bodies_of(inventory, [7]) == (
+        assert find_rigid_bodies(inventory, [7]) == (
             RigidBody((7,), whole),
         )  # Radioss switches each piece by itself
     welded = read_inventory(

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.flights import flights_of, longest_flight
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import cautions_of
+from d2rpick.choice.td.flights import find_flights, find_longest_flight
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
 from tests.records import make_table
 
@@ -26,16 +26,16 @@ def make_braked_block(until: float = 1.0) -> History:
 def find_warnings(history: History, td: float, **options: float) -> dict[str, str]:
     return {
         caution.code: caution.message
-        for caution in cautions_of(examine(history, td, Settings(**options)))  # type: ignore[arg-type]
+        for caution in warn_about_td(examine_td(history, td, Settings(**options)))  # type: ignore[arg-type]
     }
 
 
 def test_an_end_of_the_load_that_is_given_overrules_the_evidence_and_the_warning_names_it() -> (
     None
 ):
-    refused = suggest(make_braked_block(), 0.8, Settings())
+    refused = suggest_in_history(make_braked_block(), 0.8, Settings())
     assert refused.recommended is None
-    answer = suggest(make_braked_block(), 0.8, Settings(after=0.3))
+    answer = suggest_in_history(make_braked_block(), 0.8, Settings(after=0.3))
     assert (answer.flight.start, answer.flight.source) == (0.3, "given")
     assert answer.recommended
     assert answer.quality
@@ -52,11 +52,11 @@ def test_an_end_of_the_load_before_that_of_the_evidence_is_used_with_a_warning()
     None
 ):
     history = make_braked_block(until=0.4)
-    assert examine(history, 0.8, Settings()).flight.start == pytest.approx(
+    assert examine_td(history, 0.8, Settings()).flight.start == pytest.approx(
         0.4, abs=0.005
     )
     for load_end, contradicted in ((0.2, True), (0.398, False), (0.5, False)):
-        flight = examine(history, 0.8, Settings(after=load_end)).flight
+        flight = examine_td(history, 0.8, Settings(after=load_end)).flight
         assert (flight.start, flight.source) == (load_end, "given")
         assert flight.certain is not contradicted
         assert bool(flight.doubts) is contradicted
@@ -74,25 +74,27 @@ def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warni
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
     history = make_table(TIME, 5 + 5 * np.sin(30 * TIME) ** 2, whole)
     for td in (0.5, 0.7):
-        flight = examine(history, td, Settings(landing=0.8)).flight
+        flight = examine_td(history, td, Settings(landing=0.8)).flight
         assert flight.end == 0.8
         assert flight.refusal is None
         assert flight.doubts
-    assert examine(history, 0.85, Settings(landing=0.8)).flight.refusal
-    (flight,) = flights_of(history, Settings(landing=0.8))
+    assert examine_td(history, 0.85, Settings(landing=0.8)).flight.refusal
+    (flight,) = find_flights(history, Settings(landing=0.8))
     assert (flight.end, bool(flight.doubts)) == (0.8, True)
 
 
 def test_flights_that_are_given_are_listed_and_td_is_chosen_in_them() -> None:
-    assert not flights_of(make_braked_block(), Settings())
-    (flight,) = flights_of(make_braked_block(), Settings(after=0.3, landing=0.9))
+    assert not find_flights(make_braked_block(), Settings())
+    (flight,) = find_flights(make_braked_block(), Settings(after=0.3, landing=0.9))
     assert (flight.start, flight.end, flight.source) == (0.3, 0.9, "given")
-    assert longest_flight(make_braked_block(), Settings(after=0.3, landing=0.9)) == (
+    assert find_longest_flight(
+        make_braked_block(), Settings(after=0.3, landing=0.9)
+    ) == (
         0.3,
         0.9,
     )
     with pytest.raises(RangeError, match="give the end of the load as `after`"):
-        longest_flight(make_braked_block(), Settings())
+        find_longest_flight(make_braked_block(), Settings())
 
 
 def test_a_message_advises_nothing_that_was_given() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from d2rpick.choice.answers import suggest, verify_at
-from d2rpick.choice.flights import flights_of
+from d2rpick.choice.answers import suggest_in_history, verify_at
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import find_seen_flight
 from d2rpick.flight.internal_energy import find_quiet_time
 from d2rpick.histories.digits import format_window
@@ -175,7 +175,7 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
     history = make_table(
         whole.time, whole.energy, balance=Balance(whole.time, **written)
     )
-    flight = examine(history, rolled.end - 0.01, Settings()).flight
+    flight = examine_td(history, rolled.end - 0.01, Settings()).flight
     assert flight.source == "contact-energy"
     assert (flight.start, flight.end) == pytest.approx(
         (rolled.start, rolled.end), abs=MILLISECOND
@@ -197,7 +197,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
         energy,
         balance=Balance(time, **written, precision=require(whole.balance).precision),
     )
-    flight = examine(
+    flight = examine_td(
         history, (rolled.start + rolled.end) / 2, Settings(replay=False)
     ).flight
     assert flight.source == "energy-balance"
@@ -213,11 +213,14 @@ def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
     whole = read_history_of_parts(rolled.file("csv"))
     history = make_table(whole.time, whole.energy)
     td = rolled.end - 0.01
-    suggestion = suggest(history, td, Settings(replay=False))
+    suggestion = suggest_in_history(history, td, Settings(replay=False))
     if suggestion.recommended:
         assert suggestion.recommended.tr >= rolled.start
         assert not suggestion.situation.flight.certain
-    assert suggest(history, td, Settings(replay=False, strict=True)).recommended is None
+    assert (
+        suggest_in_history(history, td, Settings(replay=False, strict=True)).recommended
+        is None
+    )
 
 
 @cache
@@ -242,7 +245,7 @@ def test_all_flights_of_runs_of_a_solver_are_found(
 ) -> None:
     flight_times = [
         (f.start, f.end)
-        for f in flights_of(read_history_of_parts(source, *parts), Settings())
+        for f in find_flights(read_history_of_parts(source, *parts), Settings())
         if f.start is not None
     ]
     for start, end in flights:
@@ -258,7 +261,7 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
     history = read_history_of_parts(CAR)
     assert (
         0.0385
-        <= require(examine(history, 0.146, Settings(replay=False)).flight.start)
+        <= require(examine_td(history, 0.146, Settings(replay=False)).flight.start)
         <= 0.0390
     )
 
@@ -266,7 +269,7 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
 @pytest.mark.slow
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     history = read_history_of_parts(DROP)
-    suggestion = suggest(history, 0.2838, Settings())
+    suggestion = suggest_in_history(history, 0.2838, Settings())
     assert (require(suggestion.recommended).tr, suggestion.candidates[0].kind) == (
         0.0,
         "start",
@@ -274,7 +277,9 @@ def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     assert "at-rest" in {caution.code for caution in suggestion.cautions}
     assert require(suggestion.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
     assert all(verify_at(suggestion.situation, tr).verified for tr in (0.0, 0.1, 0.28))
-    alone = suggest(make_table(history.time, history.energy), 0.2838, Settings())
+    alone = suggest_in_history(
+        make_table(history.time, history.energy), 0.2838, Settings()
+    )
     assert require(alone.recommended).tr == 0.0
 
 
@@ -333,7 +338,7 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
             time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0)
         )
         history = make_table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
-        assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
+        assert examine_td(history, 0.9, Settings(replay=False)).in_flight is flies
 
 
 def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> (
@@ -370,7 +375,7 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
             parts=own_history.parts,
             evidence=evidence,
         )
-        flight = examine(history, 0.37, Settings(replay=False)).flight
+        flight = examine_td(history, 0.37, Settings(replay=False)).flight
         assert flight.start == pytest.approx(start, abs=MILLISECOND)
         assert bool(flight.doubts) is (momenta is whole)
     (doubt,) = flight.doubts

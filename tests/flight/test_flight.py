@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import find_end_of_load
 from d2rpick.histories.history import History
@@ -90,7 +90,7 @@ def begins_after_load(flight: Flight) -> bool:
 def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(
     alpha: float, td: float
 ) -> None:
-    flight = examine(push_with_noise(alpha=alpha), td, Settings()).flight
+    flight = examine_td(push_with_noise(alpha=alpha), td, Settings()).flight
     assert begins_after_load(flight)
     assert flight.end is None
 
@@ -98,13 +98,13 @@ def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(
 @pytest.mark.parametrize("seed", range(2))
 def test_the_end_of_the_load_is_found_under_noise(seed: int) -> None:
     assert begins_after_load(
-        examine(push_with_noise(noise=0.01, seed=seed), 0.064, Settings()).flight
+        examine_td(push_with_noise(noise=0.01, seed=seed), 0.064, Settings()).flight
     )
 
 
 @pytest.mark.parametrize("td", [0.05, 0.075, 0.085])
 def test_the_next_contact_ends_the_flight(td: float) -> None:
-    flight = examine(push_with_noise(alpha=5.0, contact=0.09), td, Settings()).flight
+    flight = examine_td(push_with_noise(alpha=5.0, contact=0.09), td, Settings()).flight
     assert begins_after_load(flight)
     assert flight.end == pytest.approx(0.09, abs=PERIOD / 10)
 
@@ -114,7 +114,7 @@ def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown
 ):
     span, fit = find_described_span(paper.make_history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
-    assert examine(paper.make_history(), paper.TD, Settings()).flight == Flight(
+    assert examine_td(paper.make_history(), paper.TD, Settings()).flight == Flight(
         0.0, None, "oscillator", described=True
     )
     assert fit.mode is not None
@@ -126,7 +126,7 @@ def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown
 )
 @pytest.mark.parametrize("td", [0.064, 0.08])
 def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) -> None:
-    flight = examine(
+    flight = examine_td(
         make_table(*read_columns(locate_stored(f"{name}.csv.gz"), "IE_J")),
         td,
         Settings(),
@@ -141,7 +141,7 @@ def test_an_energy_that_never_was_above_its_band_shows_no_end_of_a_load() -> Non
 
 
 def test_a_start_that_is_given_replaces_the_start_only() -> None:
-    situation = examine(
+    situation = examine_td(
         push_with_noise(alpha=5.0, contact=0.09), 0.075, Settings(after=0.03)
     )
     assert (situation.flight.start, situation.flight.source) == (0.03, "given")
@@ -150,7 +150,7 @@ def test_a_start_that_is_given_replaces_the_start_only() -> None:
 
 
 def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
-    situation = examine(push_with_noise(), 0.064, Settings(after=0.005))
+    situation = examine_td(push_with_noise(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
     assert require(situation.evidence.span).start == pytest.approx(
         0.020, abs=PERIOD / 10
@@ -176,14 +176,14 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
 def test_where_no_oscillator_tells_the_sign_it_is_said_why(
     channels: dict[str, float], td: float, settings: Settings, why: str
 ) -> None:
-    situation = examine(push_with_noise(**channels), td, settings)  # type: ignore[arg-type]
+    situation = examine_td(push_with_noise(**channels), td, settings)  # type: ignore[arg-type]
     assert situation.basis == "energy"
     assert why in (situation.vibration.unknown or "")
     assert settings.replay or situation.evidence.fit is None
 
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
-    situation = examine(push_with_noise(), 0.064, Settings(fit_window=(0.03, 0.12)))
+    situation = examine_td(push_with_noise(), 0.064, Settings(fit_window=(0.03, 0.12)))
     assert (
         require(situation.evidence.fit).start,
         require(situation.evidence.fit).end,
@@ -208,7 +208,7 @@ def push_twice() -> History:
 
 @pytest.mark.parametrize("td", [0.028, 0.034, 0.044, 0.1])
 def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
-    situation = examine(push_twice(), td, Settings())
+    situation = examine_td(push_twice(), td, Settings())
     assert situation.basis == "oscillator"
     assert situation.flight.start == pytest.approx(0.020 + PERIOD / 4, abs=PERIOD / 10)
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
@@ -220,7 +220,7 @@ def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
 def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
     td: float, first_td: float | None
 ) -> None:
-    answer = suggest(push_twice(), td, Settings(after=first_td))
+    answer = suggest_in_history(push_twice(), td, Settings(after=first_td))
     assert answer.recommended is None
     assert answer.situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
     assert "td-after-contact" in {caution.code for caution in answer.cautions}
@@ -228,7 +228,7 @@ def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
 
 @pytest.mark.parametrize("td", [0.1, 0.149])
 def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
-    situation = examine(push_twice(), td, Settings())
+    situation = examine_td(push_twice(), td, Settings())
     fitted = situation.vibration.whole.mode
     assert fitted is not None
     assert fitted.alpha == pytest.approx(10, abs=0.05)
@@ -255,7 +255,7 @@ def test_a_small_second_mode_makes_no_short_flights() -> None:
         + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2
     )
     for td in np.linspace(0.03, 0.12, 10).tolist():
-        span = examine(make_table(time, energy), td, Settings()).evidence.span
+        span = examine_td(make_table(time, energy), td, Settings()).evidence.span
         assert span is None or span.end - span.start > 1.25 * PERIOD
 
 
@@ -270,7 +270,7 @@ def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
         ** 2
     )
     energy = np.where(time < 0.15, free, push_twice().energy)
-    situation = examine(
+    situation = examine_td(
         make_table(time, energy),
         0.064,
         Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0)),
@@ -284,7 +284,7 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
     None
 ):
     record = paper.make_history()
-    answer = suggest(
+    answer = suggest_in_history(
         make_table(record.time, add_noise(record.energy, 0.01, 3)), 0.1, Settings()
     )
     assert answer.recommended is None

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.flights import flights_of
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
+from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import cautions_of
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import (
     find_settled_time,
@@ -208,10 +208,10 @@ def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
     acceleration: float, falling: bool
 ) -> None:
     """Kinetic energy follows any constant force (friction, other planets), so only the acceleration decides."""
-    assert not flights_of(
+    assert not find_flights(
         make_accelerated_model(acceleration if falling else -acceleration), PLAIN
     )
-    assert flights_of(make_accelerated_model(9.81), PLAIN)
+    assert find_flights(make_accelerated_model(9.81), PLAIN)
 
 
 def make_accelerated_model(acceleration: float) -> History:
@@ -242,7 +242,7 @@ def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
         200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,)
     )
     whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
-    answer = suggest(
+    answer = suggest_in_history(
         make_table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings()
     )
     assert require(answer.quality).grade == "poor"
@@ -290,8 +290,8 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
     ringing = 3 * np.sin(300 * TIME) ** 2
     history = make_energy_table(900 - pushed + ringing, 100 + pushed - ringing)
     for td in (0.4, 0.6):
-        assert not examine(history, td, PLAIN).in_flight
-    flights = flights_of(history, PLAIN)
+        assert not examine_td(history, td, PLAIN).in_flight
+    flights = find_flights(history, PLAIN)
     assert [flight for flight in flights if flight.start and flight.start > 0.75]
     assert not [flight for flight in flights if flight.certain]
 
@@ -305,7 +305,7 @@ def test_a_spring_to_ground_does_not_fly(spring_share: float) -> None:
     )
     balance = require(history.balance)
     assert has_whole_motion(balance, 0.1, 1.0) is (spring_share > 0)
-    assert bool(flights_of(history, PLAIN)) is (spring_share > 0)
+    assert bool(find_flights(history, PLAIN)) is (spring_share > 0)
 
 
 def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> (
@@ -358,7 +358,7 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
-    flights = flights_of(
+    flights = find_flights(
         make_energy_table(
             pushed * (150 + rung),
             pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME),
@@ -386,7 +386,7 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
 def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
     internal: Samples, kinetic: Samples
 ) -> None:
-    suggestion = suggest(make_energy_table(internal, kinetic), 0.8, PLAIN)
+    suggestion = suggest_in_history(make_energy_table(internal, kinetic), 0.8, PLAIN)
     assert require(suggestion.quality).grade == "poor"
     assert "by gravity or by another load" in require(suggestion.decision).reason
     assert suggestion.situation.flight.unknown_load
@@ -399,10 +399,14 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     values[0] = 0.0
     energies = Balance(TIME, 8e3 * wound, np.full(TIME.size, 3.75))
     whole = Momenta(TIME, values, None, Precision(7), (0,))
-    assert not flights_of(make_table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
+    assert not find_flights(
+        make_table(TIME, 8e3 * wound, whole, balance=energies), PLAIN
+    )
     stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
-    (flight,) = flights_of(make_table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
+    (flight,) = find_flights(
+        make_table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN
+    )
     assert require(flight.start) == pytest.approx(
         0.4, abs=0.02
     )  # two bodies have hit each other
@@ -417,8 +421,8 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
     )
     whole = 80 - 2 * alpha * integrate_by_trapezia(TIME, kinetic)
     record = make_energy_table(whole - kinetic, kinetic)
-    assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
-    flight = suggest(
+    assert suggest_in_history(record, 0.8, PLAIN).situation.flight.unknown_load
+    flight = suggest_in_history(
         record, 0.8, Settings()
     ).situation.flight  # the oscillator is damped at the same rate
     assert flight.certain
@@ -435,7 +439,7 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     )  # damping within the body, which the energies show as well
     ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
     internal = 20 * decay - ringing
-    flight = suggest(
+    flight = suggest_in_history(
         make_energy_table(internal, moving + ringing), 0.8, Settings()
     ).situation.flight
     assert flight.described
@@ -449,13 +453,13 @@ def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
         0.1, 0.9, "energy-balance", gravity=np.inf, described=True
     ).certain
     assert Flight(0.1, 0.9, "energy-balance", described=True).certain
-    suggestion = suggest(
+    suggestion = suggest_in_history(
         make_energy_table(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN
     )
     assert suggestion.situation.flight.unknown_load
     assert not any(
         "any tr there is right" in caution.message
-        for caution in cautions_of(suggestion.situation)
+        for caution in warn_about_td(suggestion.situation)
     )
 
 
@@ -463,9 +467,12 @@ def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
     ringing = 2 + np.sin(300 * TIME) ** 2
     history = make_table(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0))
     for td in (0.5, 0.8):
-        flight = examine(history, td, Settings(after=0.1, replay=False)).flight
+        flight = examine_td(history, td, Settings(after=0.1, replay=False)).flight
         assert flight.end == pytest.approx(0.6, abs=0.01)
-    assert suggest(history, 0.8, Settings(after=0.1, replay=False)).recommended is None
+    assert (
+        suggest_in_history(history, 0.8, Settings(after=0.1, replay=False)).recommended
+        is None
+    )
 
 
 def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_it_begins() -> (
@@ -476,7 +483,7 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
         np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5
     )
     history = make_table(TIME, 1 + np.sin(300 * TIME) ** 2, two_bodies)
-    flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
+    flight = examine_td(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal
 
@@ -527,7 +534,7 @@ def make_falling_damped_body(
 def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(
     left_out: tuple[str, ...],
 ) -> None:
-    flight = examine(make_falling_damped_body(*left_out), 0.5, PLAIN).flight
+    flight = examine_td(make_falling_damped_body(*left_out), 0.5, PLAIN).flight
     assert flight.source == "momentum"
     assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
     assert flight.end is None
@@ -556,7 +563,7 @@ def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_e
 def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:
     """Its two bodies hit each other; their total momentum is that of free fall."""
     history = make_falling_damped_body(internal=200 * TIME)
-    assert not examine(history, 0.5, PLAIN).in_flight
+    assert not examine_td(history, 0.5, PLAIN).in_flight
 
 
 def make_body_deformed_in_flight(load_start: float, *left_out: str) -> History:
@@ -576,7 +583,7 @@ def make_body_deformed_in_flight(load_start: float, *left_out: str) -> History:
 def test_a_body_that_yields_as_the_load_ends_flies_from_there(
     left_out: tuple[str, ...],
 ) -> None:
-    flight = examine(make_body_deformed_in_flight(0.1, *left_out), 0.5, PLAIN).flight
+    flight = examine_td(make_body_deformed_in_flight(0.1, *left_out), 0.5, PLAIN).flight
     assert flight.source == "momentum"
     assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
 
@@ -586,7 +593,7 @@ def test_a_body_that_yields_as_the_load_ends_flies_from_there(
 def test_two_bodies_that_hit_each_other_in_a_fall_do_not_fly_together_before(
     contact_time: float, left_out: tuple[str, ...]
 ) -> None:
-    flight = examine(
+    flight = examine_td(
         make_body_deformed_in_flight(contact_time, *left_out), 0.6, PLAIN
     ).flight
     assert flight.start is None or flight.start > contact_time

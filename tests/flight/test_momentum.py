@@ -13,7 +13,7 @@ from hypothesis import example, given, strategies as st
 
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.answers import suggest_of
+from d2rpick.choice.answers import suggest_in_run
 from d2rpick.choice.question import Settings
 from d2rpick.flight.momentum import (
     _refine_attached_parts,
@@ -27,7 +27,7 @@ from d2rpick.flight.momentum import (
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Run, Selection, open_run
+from d2rpick.histories.opening import OpenedRun, Selection, open_run
 from tests.command import BOX, ENERGY, GLSTAT, read_refusal, run, run_json
 from tests.computed import locate_stored
 from tests.energies import require
@@ -452,7 +452,7 @@ def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
     assert not flight.end_seen
 
 
-def list_titles(run_with_momenta: Run, *, flying: bool) -> set[str]:
+def list_titles(run_with_momenta: OpenedRun, *, flying: bool) -> set[str]:
     return {
         part.title
         for part in (
@@ -582,4 +582,4 @@ def test_the_momentum_of_body_and_wheels_together_shows_no_flight_while_wheels_a
         else:  # without mass and kinetic energy gravity is not known from a push
             assert flight is None or np.isnan(flight.gravity)
         for td in np.linspace(0.15, 0.95, 9).tolist():
-            assert flies or not suggest_of(reference, td, Settings()).recommended
+            assert flies or not suggest_in_run(reference, td, Settings()).recommended

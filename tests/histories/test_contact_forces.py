@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.overview import survey
+from d2rpick.choice.overview import describe_run
 from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.report import overview
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 TIMES = np.arange(40) / 8
 ACTS = (TIMES >= 1) & (TIMES <= 2)  # forces at the states
@@ -32,7 +32,7 @@ SEEN = ((0.875, 2.125),)  # to within one output interval
 ENERGY = make_glstat_text(TIMES, 1 + TIMES)
 
 
-def only(run: Run) -> ContactForce:
+def only(run: OpenedRun) -> ContactForce:
     (force,) = run.contact_forces
     return force
 
@@ -305,10 +305,10 @@ def test_round_off_is_no_force() -> None:
 
 def test_info_lists_them(tmp_path: Path) -> None:
     names = put(tmp_path, glstat=ENERGY, rwforc=rwforc())
-    survey_of_run = survey(open_run(names), Selection())
+    survey_of_run = describe_run(open_run(names), Selection())
     lines_on_forces = [
         value
-        for name, value in overview.facts(survey_of_run)
+        for name, value in overview.list_facts(survey_of_run)
         if name == "contact force"
     ]
     assert lines_on_forces == [

@@ -18,10 +18,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ChangedError, D2RPickError
-from d2rpick.choice.overview import survey
+from d2rpick.choice.overview import describe_run
 from d2rpick.histories.content import Content
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.opening import Run, Selection
+from d2rpick.histories.opening import OpenedRun, Selection
 from tests.command import put
 from tests.hdf5_files import ENERGY, plain, write_hdf5
 from tests.histories.test_source import CONTENTS, TIMES
@@ -223,7 +223,7 @@ def test_a_write_under_way_is_no_file_written_anew(
 )  # if a file looks old, half of a write cannot be detected
 @OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    opened: Callable[[Path], Run],
+    opened: Callable[[Path], OpenedRun],
     contents: Sequence[bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -263,7 +263,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 @OPENERS
 @pytest.mark.parametrize("share", [0.001, 0.5, 0.999])
 def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_stands(
-    opened: Callable[[Path], Run],
+    opened: Callable[[Path], OpenedRun],
     share: float,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -324,7 +324,7 @@ def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(
     assert run.databases[0].span
     file.write_bytes(ANEW[kind])
     with pytest.raises(ChangedError, match="rewritten"):
-        survey(run, Selection())
+        describe_run(run, Selection())
 
 
 def fixed_times(
@@ -360,7 +360,7 @@ HOUR = 3_600_000_000_001
 )
 @OPENERS
 def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
-    opened: Callable[[Path], Run],
+    opened: Callable[[Path], OpenedRun],
     modified: int,
     changed: int,
     tmp_path: Path,

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from d2rpick.choice.overview import survey
+from d2rpick.choice.overview import describe_run
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import Samples
 from d2rpick.histories.meaning import (
@@ -188,7 +188,7 @@ def notes_of(text: str, *energy: str) -> str:
     selection = Selection(energy=energy)
     run = open_contents(csv_table, text, selection=selection)
     notes = run.history(selection).notes
-    assert {*notes} == {*survey(run, selection).notes}
+    assert {*notes} == {*describe_run(run, selection).notes}
     return " ".join(notes)
 
 
@@ -309,7 +309,9 @@ def abaqus(artificial: float | None) -> str:
 def test_the_artificial_energy_of_abaqus_is_a_part_of_its_internal_energy() -> None:
     flights, shares = [], []
     for artificial in (None, 0.05, 0.2):
-        overview = survey(open_contents(csv_table, abaqus(artificial)), Selection())
+        overview = describe_run(
+            open_contents(csv_table, abaqus(artificial)), Selection()
+        )
         flights.append(overview.flights)
         shares.append(overview.health.hourglass_share if overview.health else None)
     assert flights[0]

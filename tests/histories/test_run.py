@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.overview import survey
+from d2rpick.choice.overview import describe_run
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import (
     READERS,
@@ -22,7 +22,7 @@ from d2rpick.histories.formats import (
 )
 from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import (
-    Run,
+    OpenedRun,
     Selection,
     check_companions,
     load_reader,
@@ -50,7 +50,7 @@ MATSUM = make_matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 
 def open_companions(
     files: Mapping[str, bytes], selection: Selection | None = None
-) -> Run:
+) -> OpenedRun:
     """Open files of different formats; the files of one format are legs."""
     legs = {
         kind: [
@@ -64,7 +64,7 @@ def open_companions(
         for kind, sources in legs.items()
     )
     check_companions(databases)
-    return Run(tuple(files), databases)
+    return OpenedRun(tuple(files), databases)
 
 
 # Families of binouts.
@@ -79,7 +79,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         "b/binout0000": bytes(made_binout(range(1, 4), shift=4).data),
         "a/binout0000": globals_only,
     }
-    run = Run(
+    run = OpenedRun(
         tuple(files),
         (
             Legs(
@@ -375,21 +375,23 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     """A file without states, and curves of which none is meant."""
-    empty = survey(open_contents(glstat, HEAD), Selection())
+    empty = describe_run(open_contents(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
         0,
         None,
         None,
         (),
     )
-    begun = survey(open_contents(radioss_th, bytes(make_t01(0).data)), Selection())
+    begun = describe_run(
+        open_contents(radioss_th, bytes(make_t01(0).data)), Selection()
+    )
     assert (begun.states, begun.time_start, begun.flights, begun.health) == (
         0,
         None,
         (),
         None,
     )
-    curves = survey(
+    curves = describe_run(
         open_contents(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"),
         Selection(),
     )
@@ -404,7 +406,7 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
             "matsum": make_matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2))),
         }
     )
-    assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
+    assert "are they from the same run?" in describe_run(doubtful, Selection()).notes[0]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.999])

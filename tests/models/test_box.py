@@ -15,7 +15,7 @@ from d2rpick.models.box_model import (
     build_structure,
     compute_stiffest_rate,
 )
-from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
+from d2rpick.models.box_motion import SLIP, BoxMotion, Contact, RigidPoints
 from d2rpick.models.box_run import (
     BOX,
     Record,
@@ -36,7 +36,7 @@ ANGLES = st.floats(-np.pi, np.pi)
 TIMES = st.integers(0, 12).map(lambda count: count / 100)
 
 
-def momenta(motion: Motion) -> tuple[complex, float]:
+def momenta(motion: BoxMotion) -> tuple[complex, float]:
     """Return momentum and angular momentum about the origin of the whole model."""
     point_momenta = motion.structure.masses * motion.velocities
     return complex(point_momenta.sum()), float(
@@ -45,18 +45,18 @@ def momenta(motion: Motion) -> tuple[complex, float]:
 
 
 @cache
-def advance_to(time: float) -> Motion:
+def advance_to(time: float) -> BoxMotion:
     """Return a motion advanced to ``time``; it is cached and must not be changed."""
     motion = (
         advance_to(round(time - 0.01, 2)).copy()
         if time > 0
-        else Motion(COARSE, INTERVAL)
+        else BoxMotion(COARSE, INTERVAL)
     )
     run_to(motion, time)
     return motion
 
 
-def copy_at(time: float) -> Motion:
+def copy_at(time: float) -> BoxMotion:
     """Return a copy of a motion advanced to ``time``, a multiple of 0.01 s."""
     return advance_to(time).copy()
 
@@ -131,7 +131,7 @@ def test_a_free_fall_locks_in_nothing_and_moves_no_landing() -> None:
 def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
     window: tuple[float, float] | None, parameters: Parameters
 ) -> None:
-    motion = Motion(parameters, INTERVAL)
+    motion = BoxMotion(parameters, INTERVAL)
     linear, angular = momenta(motion)
     scale = motion.structure.masses.sum() * 7.0
     for count in range(motion.step_at(0.42)):
@@ -206,7 +206,7 @@ def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_els
         abs(np.vdot(motion.places[of_box], (masses * lost)[of_box]).imag)
         < 1e-9 * masses.sum()
     )
-    rigid = RigidBody(
+    rigid = RigidPoints(
         masses[of_box], motion.places[of_box], untouched.velocities[of_box]
     )
     np.testing.assert_allclose(motion.velocities[of_box], rigid.velocities)
@@ -314,7 +314,7 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
 
 def test_a_body_without_forces_moves_and_turns_evenly() -> None:
     masses, points = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
-    body = RigidBody(
+    body = RigidPoints(
         masses, points, np.asarray(2.0 + 1j * 3.0 * (points - 0.5), dtype=np.complex128)
     )
     spin, velocity, centre = body.spin, body.velocity, body.centre

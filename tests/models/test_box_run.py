@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_run import make_history
 from tests.energies import require
@@ -27,7 +27,9 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     assert rehearsal.roll_share < 0.1
     assert abs(rehearsal.energy_off) < 0.25
     pair = require(
-        suggest(make_history(rehearsal.reference), rehearsal.td, Settings()).recommended
+        suggest_in_history(
+            make_history(rehearsal.reference), rehearsal.td, Settings()
+        ).recommended
     )
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
     released = require(rehearsal.reference.released)

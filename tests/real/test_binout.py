@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
+from d2rpick.choice.parts.sets_of_parts import compare_sets_of_parts
 from d2rpick.choice.question import Settings
-from d2rpick.choice.sets_of_parts import parts_of
 from d2rpick.histories.opening import Selection, open_run
 from tests.histories.formats.test_binout import open_binout
 from tests.real.files import content, real, rows_of
@@ -86,6 +86,8 @@ def test_masses_come_from_the_velocities_of_parts() -> None:
 
 
 def test_parts_of_a_run_in_which_nothing_deforms_are_kept() -> None:
-    found = parts_of(open_run([real(f"histories/{PLADE}")]), Settings(), None)
+    found = compare_sets_of_parts(
+        open_run([real(f"histories/{PLADE}")]), Settings(), None
+    )
     assert [row.verdict for row in found.rows] == ["keep"] * 3
     assert found.facts.reason

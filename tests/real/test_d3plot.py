@@ -14,7 +14,7 @@ from d2rpick.histories.opening import Selection, open_run
 from tests.real.files import real
 
 if TYPE_CHECKING:
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 FAMILIES = (
     "one_shell",
@@ -26,7 +26,7 @@ FAMILIES = (
 
 
 @cache
-def opened(folder: str) -> Run:
+def opened(folder: str) -> OpenedRun:
     return open_run([real(f"d3plot/{folder}/d3plot")])
 
 

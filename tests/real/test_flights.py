@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.answers import suggest, suggest_of, verify
-from d2rpick.choice.flights import flights_of
+from d2rpick.choice.answers import suggest_in_history, suggest_in_run, verify_in_history
 from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.opening import Selection, open_run
 from tests.real.files import real
 from tests.real.test_files import MORE, PAIRS, READABLE, REFUSED
@@ -44,7 +44,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(
         reference.history.time[0], reference.history.time[-1], _TIMES
     ).tolist():
         try:
-            answer = suggest_of(reference, td, PLAIN)
+            answer = suggest_in_run(reference, td, PLAIN)
         except D2RPickError:
             assert reference.history.time.size < 3 or not reference.history.energy.any()
             continue
@@ -57,9 +57,11 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(
 @pytest.mark.parametrize("name", DRIVEN)
 def test_a_driven_model_does_not_fly(name: str) -> None:
     history = open_run([real(name)]).history(Selection())
-    assert flights_of(history, Settings(replay=False)) == ()
+    assert find_flights(history, Settings(replay=False)) == ()
     for share in (0.25, 0.5, 0.75):
         td = float(history.time[0] + share * np.ptp(history.time))
-        found = suggest(history, td, Settings(replay=False))
+        found = suggest_in_history(history, td, Settings(replay=False))
         assert found.recommended is None
-        assert not verify(history, td / 2, td, Settings(replay=False)).verified
+        assert not verify_in_history(
+            history, td / 2, td, Settings(replay=False)
+        ).verified

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice.health import assess, cautions_of_health
+from d2rpick.choice.health import assess_health, warn_about_health
 from d2rpick.histories.balance import read_balance
 from d2rpick.histories.history import Balance
 from d2rpick.histories.opening import open_run
@@ -58,7 +58,9 @@ def test_each_solver_s_names_are_found(
     name: str, known: dict[str, float | None], expected: set[str]
 ) -> None:
     run_of = open_run([real(f"histories/{name}")])
-    health = assess(read_balance(run_of.databases, run_of.parts) or Balance(TIME))
+    health = assess_health(
+        read_balance(run_of.databases, run_of.parts) or Balance(TIME)
+    )
     for key, value in known.items():
         assert getattr(health, key) == (value and pytest.approx(value, rel=1e-4))
-    assert {caution.code for caution in cautions_of_health(health)} == expected
+    assert {caution.code for caution in warn_about_health(health)} == expected

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pytest
 
-from d2rpick.choice.suggest_td import STEPS
+from d2rpick.choice.td.suggest_td import STEPS
 from d2rpick.histories.digits import format_window
-from d2rpick.report.page import resource
-from d2rpick.report.tables import measure, short
+from d2rpick.report.page import read_resource
+from d2rpick.report.tables import format_measure, format_short
 from tests.command import ENERGY, ROLLOVER, run
 
 pytest.importorskip("selenium", reason="selenium is not installed")
@@ -255,15 +255,15 @@ def check(browser: Browser) -> float:
         None,
     )
     expected = {
-        "td": short(suggestion["td"]),
-        "tr": short(best["tr"]) if best else "none",
+        "td": format_short(suggestion["td"]),
+        "tr": format_short(best["tr"]) if best else "none",
         "exact_td": repr(suggestion["td"]),
     }
     if best:
-        expected["residual"] = measure(best["residual"])
-        expected["kinetic"] = measure(suggestion["kinetic_share"])
+        expected["residual"] = format_measure(best["residual"])
+        expected["kinetic"] = format_measure(suggestion["kinetic_share"])
         expected["tolerance"] = f"{best['timing_tolerance']:.1e}"
-    expected["level"] = short(suggestion["energy_td"])
+    expected["level"] = format_short(suggestion["energy_td"])
     assert {name: said_by_page[name] for name in expected} == expected
     assert said_by_page["typed"] == expected["td"]
     assert said_by_page["spoken"].startswith(
@@ -389,8 +389,8 @@ def describe_td(suggestion: dict[str, Any]) -> str:
     (best,) = (
         candidate for candidate in suggestion["candidates"] if candidate["recommended"]
     )
-    times = f"td {short(suggestion['td'])}, tr {short(best['tr'])}"
-    return f"{times}, residual {measure(best['residual'])}"
+    times = f"td {format_short(suggestion['td'])}, tr {format_short(best['tr'])}"
+    return f"{times}, residual {format_measure(best['residual'])}"
 
 
 @mark_for_browser
@@ -567,7 +567,7 @@ def compute_contrast(first_colour: str, second_colour: str) -> float:
 def test_letters_and_marks_stand_out_in_light_and_dark() -> None:
     themes = [
         dict(re.findall(r"--(\w+): (#\w{6})", block))
-        for block in re.findall(r":root {(.*?)}", resource("style.css"), re.DOTALL)
+        for block in re.findall(r":root {(.*?)}", read_resource("style.css"), re.DOTALL)
     ]
     assert len(themes) == 2
     for colours in themes:

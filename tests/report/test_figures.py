@@ -9,12 +9,12 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Bbox
 
 import d2rpick as d2
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import Common, Study, StudyRow
+from d2rpick.choice.runs.study import Common, StudyOfRuns, StudyRow
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
-from d2rpick.report.study import short_names
+from d2rpick.report.study import shorten_names
 from tests.command import BOX, ENERGY, ROOT
 from tests.energies import require
 
@@ -122,7 +122,9 @@ def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(
     history = History(
         time * scale, (energy + energy.max()) * scale, ("made",), "made", "E"
     )
-    figure = draw_suggestion(suggest(history, 0.064 * scale, Settings()), page=True)
+    figure = draw_suggestion(
+        suggest_in_history(history, 0.064 * scale, Settings()), page=True
+    )
     box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
     assert box.x0 >= -0.01
     assert box.y0 >= -0.01
@@ -134,7 +136,7 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
     """Round-off of 1e-21 J is flat beside a landing of 40 J, or beside the scale of the energy if nothing lands."""
     time = np.linspace(0, 1, 501)
     energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
-    answer = suggest(
+    answer = suggest_in_history(
         History(time, energy, ("made",), "made", "E"), 0.8, Settings(after=0.01)
     )
     assert answer.situation.at_rest
@@ -172,8 +174,8 @@ def make_row(name: str, tr: float, level: float = 1.0) -> StudyRow:
     return StudyRow(name, "ok", tr=tr, energy_td=level, curve=np.stack([time, energy]))
 
 
-def make_study(*rows: StudyRow) -> Study:
-    return Study(0.8, None, rows, None, None, Common(None, None, "made"), ())
+def make_study(*rows: StudyRow) -> StudyOfRuns:
+    return StudyOfRuns(0.8, None, rows, None, None, Common(None, None, "made"), ())
 
 
 def test_up_to_ten_runs_have_a_name_and_a_look_of_their_own() -> None:
@@ -211,14 +213,17 @@ def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
 
 
 def test_short_names_tell_runs_apart() -> None:
-    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == (
+    assert shorten_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == (
         "soft",
         "hard",
     )
-    assert short_names(["one.csv"]) == ("one.csv",)
-    assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
-    assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
-    assert short_names([]) == ()
+    assert shorten_names(["one.csv"]) == ("one.csv",)
+    assert shorten_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
+    assert shorten_names(["one.csv", "deep/er/one.csv"]) == (
+        "one.csv",
+        "deep/er/one.csv",
+    )
+    assert shorten_names([]) == ()
 
 
 def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:

@@ -41,7 +41,7 @@ def write_findings(
         "findings",
         form,
         report.Checks(results, str(root), fail_on=fail_on),
-        formats.Shown(),
+        formats.DisplayOptions(),
     )
 
 
@@ -149,7 +149,7 @@ def test_only_a_deck_of_another_name_is_named() -> None:
         name
         for rule in RULES.values()
         for name in re.findall(
-            r"^\w+, as (\S+):$", report.as_text(rule, 100), re.MULTILINE
+            r"^\w+, as (\S+):$", report.explain_rule(rule, 100), re.MULTILINE
         )
     ]
     assert deck_names

@@ -5,7 +5,7 @@ import io
 
 from hypothesis import given, strategies as st
 
-from d2rpick.report.tables import Cell, as_csv, as_text, wrapped
+from d2rpick.report.tables import Cell, as_csv, as_text, wrap_lines
 
 WORDS = st.lists(st.text("abc-1", min_size=1, max_size=9), max_size=6).map(" ".join)
 
@@ -74,7 +74,7 @@ def test_a_long_word_breaks_behind_what_joins_its_parts() -> None:
 def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(
     width: int, text: str
 ) -> None:
-    lines = wrapped(text, width).split("\n")
+    lines = wrap_lines(text, width).split("\n")
     assert " ".join(lines).split() == text.split()
     assert max(map(len, lines)) <= width
     assert text.count("\n") or len(text) > width or lines == [text]

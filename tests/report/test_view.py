@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
-from d2rpick.report.view import replayed_motion, view
+from d2rpick.report.view import make_view, replay_motion
 from tests.command import ENERGY
 from tests.energies import require
 from tests.reading import read_history
@@ -25,27 +25,27 @@ def make_record(
 
 
 def test_the_flight_is_shown_and_what_stands_above_it_is_named() -> None:
-    shown_view = view(make_record(), Flight(2.0, 8.0, "given"), [7.0])
+    shown_view = make_view(make_record(), Flight(2.0, 8.0, "given"), [7.0])
     assert (shown_view.start, shown_view.end) == pytest.approx((1.64, 8.36))
     assert (shown_view.low, shown_view.high) == pytest.approx((0.9, 1.1), abs=1e-3)
     assert shown_view.above == (("load", 50), ("landing", 500))
 
 
 def test_what_does_not_stand_above_the_flight_is_not_named() -> None:
-    assert view(
+    assert make_view(
         make_record(np.where(TIME < 2, 1, RECORD)), Flight(2.0, 8.0, "given"), [7.0]
     ).above == (("landing", 500),)
 
 
 def test_times_beyond_the_flight_are_shown_too() -> None:
-    shown_view = view(make_record(), Flight(2.0, 8.0, "given"), [1.0, 9.0])
+    shown_view = make_view(make_record(), Flight(2.0, 8.0, "given"), [1.0, 9.0])
     assert shown_view.start < 1
     assert shown_view.end > 9
     assert shown_view.high < 2
 
 
 def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None:
-    assert view(make_record(), Flight(None, None, None), [5.0]) == (
+    assert make_view(make_record(), Flight(None, None, None), [5.0]) == (
         0.0,
         10.0,
         RECORD.min(),
@@ -55,10 +55,10 @@ def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None
 
 
 def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
-    assert view(
+    assert make_view(
         make_record(), Flight(2.0, None, "oscillator"), [3.0], last_known=6.0
     ).end == pytest.approx(6.24)
-    assert view(make_record(), Flight(2.0, None, "momentum"), [3.0]).end == 10
+    assert make_view(make_record(), Flight(2.0, None, "momentum"), [3.0]).end == 10
 
 
 @given(
@@ -73,7 +73,7 @@ def test_any_flight_of_any_record_can_be_shown(
     time = np.sort(times) + np.arange(float(len(times)))
     start, end = sorted((first_share * time[-1], second_share * time[-1]))
     history = History(time, np.cos(time), ("made",), "made", "energy")
-    shown_view = view(
+    shown_view = make_view(
         history,
         Flight(start, end, "given"),
         [float(time[0] + td * (time[-1] - time[0]))],
@@ -90,12 +90,12 @@ def test_any_flight_of_any_record_can_be_shown(
 
 
 def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -> None:
-    situation = examine(read_history([ENERGY]), 0.064, Settings())
+    situation = examine_td(read_history([ENERGY]), 0.064, Settings())
     tr = 0.0128853
     time = np.linspace(0.0, 0.1, 4001)
-    motion = require(replayed_motion(situation, tr, time))
+    motion = require(replay_motion(situation, tr, time))
     states = np.linspace(0.0, 0.1, 1001)  # those of the record
-    whole = require(replayed_motion(situation, tr, states))
+    whole = require(replay_motion(situation, tr, states))
     np.testing.assert_allclose(
         whole.reference**2, situation.history.energies_at(states), rtol=1e-5, atol=1e-6
     )
@@ -106,8 +106,8 @@ def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -
     assert np.ptp(motion.switched[rigid]) < 1e-9
     assert np.abs(np.diff(motion.switched)).max() < 0.1
     assert (
-        replayed_motion(
-            examine(read_history([ENERGY]), 0.064, Settings(replay=False)), tr
+        replay_motion(
+            examine_td(read_history([ENERGY]), 0.064, Settings(replay=False)), tr
         )
         is None
     )

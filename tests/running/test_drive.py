@@ -26,8 +26,8 @@ from d2rpick.running.sequence import (
     LOAD,
     PROBE,
     RIGID,
-    Findings,
     Leg,
+    LegFindings,
     Limits,
     Order,
     choose_next_leg,
@@ -381,8 +381,8 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
 
 
 IDLE, SWINGS = (
-    Findings(0.0, 0.02, flies=True, idle=True),
-    Findings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
+    LegFindings(0.0, 0.02, flies=True, idle=True),
+    LegFindings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
 )
 WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
@@ -392,10 +392,10 @@ FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
     ("swing_seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)]
 )
 def test_the_margin_is_the_least_one_where_nothing_vibrates(
-    swing_seen: Findings, margin: float
+    swing_seen: LegFindings, margin: float
 ) -> None:
     flown = Leg(Order(LOAD, 1, 0.0, 0.1), swing_seen, 1000)
-    probe = Leg(Order(PROBE, 2, 0.1, 1.0), Findings(contact=0.4), 100)
+    probe = Leg(Order(PROBE, 2, 0.1, 1.0), LegFindings(contact=0.4), 100)
     assert find_window([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
         0.4 - margin
     )
@@ -415,7 +415,7 @@ def make_probes(*ends: float, contact: float) -> list[Leg]:
         *(
             Leg(
                 order,
-                Findings(contact=contact if order.until > contact else None),
+                LegFindings(contact=contact if order.until > contact else None),
                 100,
                 0.1,
             )
@@ -442,7 +442,7 @@ def test_a_probe_goes_on_from_its_own_restarts_to_the_end_of_the_run() -> None:
     while order := choose_next_leg(legs, WITHIN):
         assert order.kind == PROBE
         assert order.start == legs[-1].order.until
-        legs.append(Leg(order, Findings(), 100, 0.1))
+        legs.append(Leg(order, LegFindings(), 100, 0.1))
     assert legs[-1].order.until == WITHIN.end
     assert len(legs) < 12
     assert [
@@ -494,14 +494,14 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
         legs.append(
             Leg(
                 order,
-                Findings(free, wait, flies=flies, tr=tr, contact=contact),
+                LegFindings(free, wait, flies=flies, tr=tr, contact=contact),
                 100,
                 1.0,
             )
         )
         if order.kind == RIGID:
             legs[-1] = legs[-1]._replace(
-                findings=Findings()
+                findings=LegFindings()
             )  # it flies the same way as the probe did
 
 

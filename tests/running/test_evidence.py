@@ -11,12 +11,12 @@ from hypothesis.strategies import floats, integers, lists, sampled_from
 from numpy.typing import NDArray
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.evidence import Evidence, highest_energy, quiet_times
+from d2rpick.running.evidence import GrowingEvidence, highest_energy, quiet_times
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.witness import Quiet
 from tests.command import ROOT
@@ -136,7 +136,7 @@ def test_the_highest_energy_is_that_of_a_state_in_the_span() -> None:
 def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     history = record(BOX)
     listed = np.array(
-        [flight.within(history.time) for flight in flights_of(history, Settings())]
+        [flight.within(history.time) for flight in find_flights(history, Settings())]
     )
     for flight in quiet_times(history, InnerMotion.of(history).needed):
         flight_times = (
@@ -224,7 +224,7 @@ def test_what_is_seen_does_not_depend_on_when_somebody_looked(
 ) -> None:
     history = cut_history(record(name), 0.35)
     whole, motion = take_whole_record(history)
-    evidence, grown, begin = Evidence(), InnerMotion(), 0
+    evidence, grown, begin = GrowingEvidence(), InnerMotion(), 0
     for size in [*sizes, history.time.size]:
         states = np.zeros(history.time.size, np.bool_)
         states[begin : begin + size] = True

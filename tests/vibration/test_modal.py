@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, verify
+from d2rpick.choice.answers import suggest_in_history, verify_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.measures import Profile, kinetic_share, lock_in_error, residual
@@ -205,14 +205,14 @@ def compute_true_residual(tr: float, td: float) -> float:
 
 @pytest.mark.parametrize("td", [5.0, 6.3, 7.7, 8.6])
 def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
-    answer = suggest(LOADED, td, Settings(after=1.0))
+    answer = suggest_in_history(LOADED, td, Settings(after=1.0))
     best = require(answer.chosen)
     assert answer.situation.basis == "modal"
     assert best.residual == pytest.approx(compute_true_residual(best.tr, td), abs=0.02)
     early = np.linspace(1.0, td - 0.25 * (td - 1.0), 2000)
     oracle = float(STRUCTURE.residual(early, np.full(early.size, td)).min())
     assert compute_true_residual(best.tr, td) < oracle + 0.03
-    verdict = verify(LOADED, best.tr, td, Settings(after=1.0))
+    verdict = verify_in_history(LOADED, best.tr, td, Settings(after=1.0))
     assert verdict.candidate.residual == pytest.approx(best.residual, abs=1e-9)
     assert require(verdict.quality).grade == require(answer.quality).grade
 
@@ -220,7 +220,7 @@ def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
 def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> (
     None
 ):
-    answer = suggest(LOADED, 7.7, Settings(after=1.0))
+    answer = suggest_in_history(LOADED, 7.7, Settings(after=1.0))
     assert min(require(candidate.residual) for candidate in answer.candidates) < 1
     assert all(
         require(candidate.residual) <= 1.01
@@ -231,7 +231,7 @@ def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there
         np.linspace(1.1, 6.0, 500).tolist(),
         key=lambda tr: compute_true_residual(tr, 7.7),
     )
-    verdict = verify(LOADED, worst, 7.7, Settings(after=1.0))
+    verdict = verify_in_history(LOADED, worst, 7.7, Settings(after=1.0))
     assert not verdict.verified
     assert any(
         "which a release without any vibration has" in reason
@@ -246,7 +246,7 @@ def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> 
         STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds)
     )
     td = float(tds[np.argmax(share)])
-    situation = suggest(LOADED, td, Settings(after=1.0)).situation
+    situation = suggest_in_history(LOADED, td, Settings(after=1.0)).situation
     vibration = situation.vibration
     raised = replace(
         vibration, compared=require(vibration.compared)._replace(first=float(td - 0.4))
@@ -269,7 +269,7 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
         require(best.residual), abs=0.02
     )
     for td in (5.0, 6.3, 7.7, 8.6):
-        suggestion = suggest(LOADED, td, Settings(after=1.0)).recommended
+        suggestion = suggest_in_history(LOADED, td, Settings(after=1.0)).recommended
         assert (
             require(best.residual) <= require(require(suggestion).residual) + 0.02
             or require(suggestion).rigid_time < 3.9

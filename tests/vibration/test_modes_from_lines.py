@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
@@ -216,7 +216,7 @@ def test_records_without_lines_have_no_modes(time: Samples, energy: Samples) -> 
 
 @pytest.mark.slow
 def test_several_modes_are_chosen_by_and_replayed() -> None:
-    answer = suggest(
+    answer = suggest_in_history(
         make_table(TIME, sum_energies(TWO, TIME)), 4.6, Settings(tolerance=0.5)
     )
     situation = answer.situation
@@ -243,10 +243,10 @@ def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
     main, root = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0), float(np.sqrt(share))
     modes = [main, Mode(2 * np.pi * 2.3, 0.2, 0.5 * root, 0.8 * root, 0.0)]
     history = make_table(TIME, sum_energies(modes, TIME))
-    situation = examine(history, 5.3, Settings(after=0.0))
+    situation = examine_td(history, 5.3, Settings(after=0.0))
     assert require(situation.evidence.fit).describes_record
     assert situation.basis == "modal"
-    answer = suggest(history, 5.3, Settings(after=0.0))
+    answer = suggest_in_history(history, 5.3, Settings(after=0.0))
     for candidate in answer.candidates:
         true = float(compute_replayed_residual(modes, np.array([candidate.tr]), 5.3)[0])
         assert (
@@ -259,14 +259,14 @@ def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
 def test_given_the_end_of_the_load_modes_tell_the_end_of_the_flight() -> None:
     """After the flight the energy jumps, as in a landing; only the flight can be described by modes."""
     energy = sum_energies(TWO, TIME) + 5.0 * np.maximum(TIME - 5.0, 0.0)
-    situation = examine(make_table(TIME, energy), 4.0, Settings(after=0.2))
+    situation = examine_td(make_table(TIME, energy), 4.0, Settings(after=0.2))
     assert situation.basis == "modal"
     assert require(situation.flight.end) == pytest.approx(5.0, abs=0.05)
 
 
 @pytest.mark.slow
 def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
-    situation = examine(
+    situation = examine_td(
         chain.read_chain_history("IE_total_J"), chain.TD_PEAK, Settings()
     )
     modes = require(situation.vibration.modal).modes_at(situation.td)

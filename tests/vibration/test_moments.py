@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
@@ -216,7 +216,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(
         both_modes = (main, second_mode)
         time = np.arange(0, 6, 1 / samples_per_period)
         history = make_table(time, sum_energies(both_modes, time))
-        suggestion = suggest(history, 4.3, Settings(after=0.0))
+        suggestion = suggest_in_history(history, 4.3, Settings(after=0.0))
         true = find_level_crossings(both_modes, 4.3, 0.0)
         sharp = [
             c

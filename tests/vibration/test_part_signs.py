@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.candidates import judge
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.candidates import judge_times
+from d2rpick.choice.pair.situation import Situation, examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Situation, examine
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
@@ -62,7 +62,7 @@ def make_part_history(deformation: np.ndarray, time: np.ndarray) -> History:
 @cache
 def examine_chain_at(td: float) -> Situation:
     """Return the situation of the chain at a td."""
-    return examine(chain.read_chain_history(), td, PLAIN)
+    return examine_td(chain.read_chain_history(), td, PLAIN)
 
 
 # ---- signs
@@ -142,7 +142,7 @@ def test_a_part_that_does_not_swing_about_zero_has_no_sign(
 def test_a_part_without_sign_and_almost_no_energy_is_left_out_and_named() -> None:
     time = np.arange(0, 12, 0.02)
     small = np.full(time.shape, 0.1 * np.sqrt(MOST_UNSIGNED))
-    answer = suggest(
+    answer = suggest_in_history(
         make_part_history(np.column_stack([move_two_springs(time), small]), time),
         10.0,
         PLAIN,
@@ -162,10 +162,10 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
     deformation = move_two_springs(time)
     noise = np.random.default_rng(3).normal(size=(40, 2))
     deformation[300:340] = 0.02 * noise  # the signal is lost for a while
-    situation = examine(
+    situation = examine_td(
         make_part_history(deformation, time), 10.0, replace(PLAIN, after=0.0)
     )
-    early, late = judge(situation, [2.0, 8.0])
+    early, late = judge_times(situation, [2.0, 8.0])
     assert (early.sign_match, early.residual) == (None, None)
     assert any("cannot be followed" in note for note in early.notes)
     assert late.sign_match is not None
@@ -175,7 +175,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 
 
 def predict_residual(situation: Situation, tr: float) -> float:
-    (candidate,) = judge(situation, [tr])
+    (candidate,) = judge_times(situation, [tr])
     return require(candidate.residual)
 
 
@@ -223,7 +223,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
         None,
         (SUNK,),
     )
-    (candidate,) = judge(situation, [0.18])
+    (candidate,) = judge_times(situation, [0.18])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (
         False,
         None,
@@ -252,7 +252,7 @@ def read_t01() -> History:
 def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
     source: str,
 ) -> None:
-    answer = suggest(
+    answer = suggest_in_history(
         chain.read_chain_history() if source == "csv" else read_t01(),
         chain.TD_PEAK,
         PLAIN,
@@ -269,7 +269,7 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
 @pytest.mark.slow
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
-    answer = suggest(
+    answer = suggest_in_history(
         chain.read_chain_history() if source == "csv" else read_t01(),
         chain.TD_LATE,
         PLAIN,
@@ -282,7 +282,7 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 
 def test_the_parts_that_contribute_most_are_named() -> None:
     situation = examine_chain_at(chain.TD_PEAK)
-    (candidate,) = judge(situation, [0.1])
+    (candidate,) = judge_times(situation, [0.1])
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)
     assert shares == sorted(shares, key=lambda share: -(share or 0))
@@ -299,7 +299,7 @@ def test_the_parts_that_contribute_most_are_named() -> None:
 def test_the_rollover_has_no_signs_and_says_why() -> None:
     selection = Selection(parts=("box,step",))
     run = open_run([BOX], selection)
-    answer = suggest(run.history(selection), 0.37, PLAIN)
+    answer = suggest_in_history(run.history(selection), 0.37, PLAIN)
     assert answer.situation.basis == "modal"
     best = answer.candidates[0]
     assert (best.sign_match, best.part_mismatch, best.parts) == (True, None, ())
@@ -392,7 +392,9 @@ def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
 ) -> None:
     """A part vibrating in both planes has no sign; the modes of the whole structure have."""
     truth, td = make_motion_in_planes(share), 0.31
-    answer = suggest(make_history_of_motion(truth, noise), td, Settings(after=0.0))
+    answer = suggest_in_history(
+        make_history_of_motion(truth, noise), td, Settings(after=0.0)
+    )
     assert answer.situation.basis == basis
     for candidate in answer.candidates[:6]:
         assert (
@@ -434,7 +436,7 @@ def test_parts_of_several_springs_in_which_modes_mix_have_no_sign() -> None:
     assert parts.names == ("B",)
     assert [part_id.name for part_id in parts.unsigned] == ["A"]
     assert (
-        examine(
+        examine_td(
             make_history_of_motion(make_grouped_springs()), 0.3, Settings(after=0.0)
         ).basis
         != "parts"

@@ -5,9 +5,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode
@@ -127,7 +127,7 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
     fits = Fits()
     for td in (0.05, paper.TD, 0.1):
         anew, again = (
-            examine(paper.make_history(), td, Settings(), fits_before)
+            examine_td(paper.make_history(), td, Settings(), fits_before)
             for fits_before in (None, fits)
         )
         assert again.evidence.span == anew.evidence.span
@@ -203,7 +203,7 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:
     energy = add_noise(MAIN.energy(TIMES), 0.03, seed=3)
-    suggestion = suggest(make_table(TIMES, energy), 5.3, Settings(after=0.0))
+    suggestion = suggest_in_history(make_table(TIMES, energy), 5.3, Settings(after=0.0))
     assert suggestion.candidates
     for candidate in suggestion.candidates:
         assert require(candidate.residual_high) >= require(candidate.residual)

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import example, given, strategies as st
 from scipy.integrate import solve_ivp
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.together import VibratingTogether
 from d2rpick.choice.question import Settings
-from d2rpick.choice.together import Together
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import Memory, Samples
-from d2rpick.report.situation import heading
+from d2rpick.report.situation import list_situation_heading
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.model import Evidence, find_energy_at, model_at
@@ -102,9 +102,9 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
     x, energy = integrate_stiffening_spring(1.0, 0.02)
     record = make_table(TIME, energy + lifted)
     for td in (20.0, 27.5):
-        answer = suggest(record, td, Settings(after=2.0))
+        answer = suggest_in_history(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
-        assert ("basis", "swings of the energy, counted") in heading(
+        assert ("basis", "swings of the energy, counted") in list_situation_heading(
             answer.situation
         )  # no word of parts
         at_tr, at_td = np.interp([require(answer.chosen).tr, td], TIME, x)
@@ -123,7 +123,7 @@ def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doub
         Memory(),
     )
     around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
-    together = Together(record, Flight())
+    together = VibratingTogether(record, Flight())
 
     def find(flight: Span | None, *, doubtful: bool) -> Mapping[str, Any]:
         return find_models(

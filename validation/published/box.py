@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.choice.study import common_tr, row_of
+from d2rpick.choice.runs.study import choose_common_tr, make_row
 from d2rpick.models.box_run import (
     BOX,
     RigidWindow,
@@ -23,7 +23,7 @@ from validation.published.exhibits import Curve, Exhibit, Panel, Shape
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from d2rpick.choice.study import StudyRow
+    from d2rpick.choice.runs.study import StudyRow
     from d2rpick.histories.history import Samples
     from d2rpick.models.box_model import Parameters, Plane
     from d2rpick.models.box_run import Record
@@ -234,13 +234,15 @@ def try_variants(variants: Sequence[Variant]) -> Trial:
     ]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     rows = [
-        row_of(
+        make_row(
             trial_result.name,
-            suggest(make_history(_run(trial_result.parameters)), td, Settings()),
+            suggest_in_history(
+                make_history(_run(trial_result.parameters)), td, Settings()
+            ),
         )
         for trial_result in variants
     ]
-    common = common_tr(rows)
+    common = choose_common_tr(rows)
     assert common.tr is not None
     window = RigidWindow(common.tr, td)
     common_results = zip(variants, rows, common.errors, strict=True)
@@ -253,7 +255,7 @@ def try_variants(variants: Sequence[Variant]) -> Trial:
         for row in rows
         if row.source in ("base", "stiffness -15%", "stiffness +15%")
     ]
-    alone = common_tr(named_rows)
+    alone = choose_common_tr(named_rows)
     three = (
         None
         if alone.tr is None
@@ -416,7 +418,9 @@ def _describe_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
 
 
 def _find_own_tr(reference: Record, td: float) -> float | None:
-    recommended = suggest(make_history(reference), td, Settings()).recommended
+    recommended = suggest_in_history(
+        make_history(reference), td, Settings()
+    ).recommended
     return recommended.tr if recommended else None
 
 

@@ -11,7 +11,7 @@ from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.report import figures
-from d2rpick.report.formats import Shown, written_by
+from d2rpick.report.formats import DisplayOptions, write_by_module
 from validation.published import box, exhibits, reproduction, saving
 from validation.published.drawing import draw_exhibit
 from validation.published.values import make_values_table
@@ -51,11 +51,12 @@ def reproduce(
     files = _write(output, folder, answer)
     if output.report:
         output.write(
-            output.report, reproduction.as_page(answer, options.repeat()).encode()
+            output.report,
+            reproduction.as_page(answer, options.repeat_command()).encode(),
         )
     answer = answer._replace(files=files)
     output.result(
-        written_by(reproduction, output.output_format, answer, output.shown())
+        write_by_module(reproduction, output.output_format, answer, output.shown())
     )
     output.notes([f"{len(files)} files in {output_dir}"], ())
     output.finish(objection=not all(row.agrees for row in answer.rows))
@@ -118,8 +119,8 @@ def _make_folder(folder: str) -> Path:
 def _write(output: Output, folder: Path, answer: Reproduction) -> list[str]:
     """Write all files, or none where one may not be written; give their names."""
     index, values = (
-        reproduction.as_markdown(answer, Shown(), pictures=True),
-        reproduction.as_csv(answer, Shown()),
+        reproduction.as_markdown(answer, DisplayOptions(), pictures=True),
+        reproduction.as_csv(answer, DisplayOptions()),
     )
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{values}\n".encode()}
     for exhibit in answer.exhibits:

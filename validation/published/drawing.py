@@ -15,7 +15,7 @@ from d2rpick.report.figures import (
     GOOD,
     REFERENCE,
     SWITCHED,
-    finish,
+    format_axes,
     make_logarithmic,
 )
 from d2rpick.report.figures_models import draw_sled
@@ -91,7 +91,7 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
         _show(axes, panel, columns)
     axes.set_title(panel.title, fontsize="small")
     axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
-    finish(axes, legend=False)
+    format_axes(axes, legend=False)
     if panel.curves and all(
         curve.x and curve.style == "dots" for curve in panel.curves
     ):

@@ -6,9 +6,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
-from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
-from d2rpick.report.figures import svg_element
-from d2rpick.report.page import Markup, document, section, table, tag
+from d2rpick.report.fields import Document, Field, Kind, get_kind, many, row
+from d2rpick.report.figures import render_svg_element
+from d2rpick.report.page import (
+    Markup,
+    build_document,
+    build_scrolling_table,
+    build_section,
+    make_element,
+)
 from validation.published.drawing import draw_exhibit
 from validation.published.values import (
     MISPRINTS,
@@ -21,7 +27,7 @@ from validation.published.values import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.report.formats import Shown
+    from d2rpick.report.formats import DisplayOptions
     from validation.published.exhibits import Exhibit
     from validation.published.values import PublishedValue
 
@@ -58,12 +64,12 @@ _ROW: Final = row(
     Field("reference", "number?", "computed in another way, see source"),
     Field("here", "number"),
     Field("difference", "number", "here less published, or less reference where nothing is published"),
-    Field("tolerance", kind_of("number", minimum=0)),
+    Field("tolerance", get_kind("number", minimum=0)),
     Field("source", "text", "where the published number or the reference value is from"),
     Field("agrees", "flag", "the difference is within the tolerance"),
 )  # fmt: skip
 _FIGURE: Final = row(
-    Field("name", "text"), Field("title", "text"), Field("section", kind_of("integer", minimum=1, maximum=5)),
+    Field("name", "text"), Field("title", "text"), Field("section", get_kind("integer", minimum=1, maximum=5)),
     Field("figure", "text", "number in the paper"),
     Field("paper", "text", "what the paper shows"),
     Field("found", "text", "what is found here"),
@@ -74,7 +80,7 @@ DOCUMENT: Final = Document(
     "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
-        Field("rows", kind_of(many(_ROW), minItems=1)),
+        Field("rows", get_kind(many(_ROW), minItems=1)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
         Field("better", _PAIR, get=lambda _: find_pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
@@ -84,7 +90,7 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction, is_shown: Shown) -> str:
+def as_table(answer: Reproduction, is_shown: DisplayOptions) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
     lines = [
@@ -104,10 +110,12 @@ def as_table(answer: Reproduction, is_shown: Shown) -> str:
         "misprints in the paper",
         *(f"  {misprint}" for misprint in MISPRINTS),
     ]
-    return tables.wrapped("\n".join(lines), is_shown.width)
+    return tables.wrap_lines("\n".join(lines), is_shown.width)
 
 
-def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
+def as_markdown(
+    answer: Reproduction, _: DisplayOptions, *, pictures: bool = False
+) -> str:
     """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
     rows, exhibits = answer[:2]
     blocks = [
@@ -135,7 +143,7 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
     return "\n\n".join(blocks)
 
 
-def as_csv(answer: Reproduction, _: Shown) -> str:
+def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
     """Give the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
@@ -203,34 +211,40 @@ def describe_pairs() -> list[str]:
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     """Write the page: every figure with what the paper shows and what is found, then the table."""
-    published = table(
+    published = build_scrolling_table(
         "Published and here", HEAD, [list_cells(row) for row in answer.rows]
     )
-    return document(
+    return build_document(
         "Analysis of switched-rigid floating oscillator, reproduced",
-        tag(
+        make_element(
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
         *(_write_exhibit(exhibit) for exhibit in answer.exhibits),
-        section("Published and here", published),
-        tag("ul", *(tag("li", text) for text in describe_pairs())),
-        section(
+        build_section("Published and here", published),
+        make_element("ul", *(make_element("li", text) for text in describe_pairs())),
+        build_section(
             "Misprints in the paper",
-            tag("ul", *(tag("li", misprint) for misprint in MISPRINTS)),
+            make_element(
+                "ul", *(make_element("li", misprint) for misprint in MISPRINTS)
+            ),
         ),
-        page.repeated(command),
+        page.build_command(command),
         signed=page.CHECKED,
     )
 
 
 def _write_exhibit(exhibit: Exhibit) -> Markup:
-    drawing = Markup(svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
+    drawing = Markup(render_svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
     class_ = {True: "good", False: "bad", None: "soft"}[exhibit.agrees]
-    return section(
+    return build_section(
         write_heading(exhibit),
-        tag("figure", tag("div", drawing, role="img", aria_label=exhibit.title)),
-        tag("p", tag("b", "Paper: "), exhibit.paper),
-        tag("p", tag("b", "Here: "), exhibit.found),
-        tag("p", "Agrees: ", tag("span", write_verdict(exhibit), class_=class_)),
+        make_element(
+            "figure", make_element("div", drawing, role="img", aria_label=exhibit.title)
+        ),
+        make_element("p", make_element("b", "Paper: "), exhibit.paper),
+        make_element("p", make_element("b", "Here: "), exhibit.found),
+        make_element(
+            "p", "Agrees: ", make_element("span", write_verdict(exhibit), class_=class_)
+        ),
     )

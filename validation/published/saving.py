@@ -1,6 +1,6 @@
 """What switching saves: the one cost model, held against the published saving and against runs that were measured.
 
-The formulas stand in `d2rpick.choice.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
+The formulas stand in `d2rpick.choice.parts.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.cost import POINT, Weights, saved_share
+from d2rpick.choice.parts.cost import POINT, Weights, compute_saved_share
 from d2rpick.vibration.measures import run_time_share
 from validation.published.exhibits import Curve, Exhibit, Panel
 
@@ -47,7 +47,7 @@ class Run(NamedTuple):
     @property
     def cost_share(self) -> float:
         """Share of a step that is saved, by the cost model [-]."""
-        return saved_share(
+        return compute_saved_share(
             _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
         )
 

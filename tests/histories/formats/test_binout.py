@@ -9,7 +9,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout
 from d2rpick.histories.formats.binout import Binout, recognises
-from d2rpick.histories.opening import Run, Selection
+from d2rpick.histories.opening import OpenedRun, Selection
 from d2rpick.histories.source import Source
 from tests.made_binout import (
     GLSTAT,
@@ -133,7 +133,7 @@ def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> N
         ],
         Selection(),
     )
-    run = Run(("binout*",), (Legs([leg]),))
+    run = OpenedRun(("binout*",), (Legs([leg]),))
     assert run.databases[0].complete
     assert run.history(Selection()).time.tolist() == expected(
         "time", range(1, again + 3)

@@ -19,7 +19,7 @@ from tests.text_files import make_glstat_text, make_matsum_text
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 TIMES = [0.0, 0.5, 1.0, 1.5, 2.0]
 STATES = make_states(TIMES)
@@ -32,12 +32,12 @@ def put(folder: Path, files: Mapping[str, bytes]) -> Path:
     return folder / next(iter(files))
 
 
-def open_family(folder: Path, files: Mapping[str, bytes]) -> Run:
+def open_family(folder: Path, files: Mapping[str, bytes]) -> OpenedRun:
     return open_run([str(put(folder, files))])
 
 
 def assert_holds(
-    run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)
+    run: OpenedRun, expected: list[State], ids: tuple[int, ...] = (7, 3)
 ) -> None:
     """Assert that a run has these states, in the precision of the file."""
     (database,) = run.databases

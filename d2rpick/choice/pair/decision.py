@@ -8,18 +8,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import kept_mean_energy
-from d2rpick.choice.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.quality import quality_of
+from d2rpick.choice.pair.aftermath import bound_mean_energy
+from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.pair.quality import grade_pair
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.aftermath import Kept
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.quality import Quality
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.quality import Quality
+    from d2rpick.choice.pair.situation import Situation
 
 # A worst case within this difference of the expected residual is shown as the same [-].
 _ALIKE: Final = 5e-3
@@ -75,7 +75,7 @@ class Decision(NamedTuple):
             return "; ".join(self.quality.reasons)
         if self.at_rest:
             return "nothing vibrates in the flight up to td"
-        return _why_good(self.quality, self.residual)
+        return _explain_why_good(self.quality, self.residual)
 
     @property
     def expected(self) -> str:
@@ -87,7 +87,7 @@ class Decision(NamedTuple):
         parts = []
         if self.kept is not None:
             parts.append(
-                f"{span_of(self.kept)} of the reference's mean energy after td"
+                f"{format_bounds(self.kept)} of the reference's mean energy after td"
             )
         if self.residual is not None:
             parts.append(f"vibration wrong by {self.residual:.1%}")
@@ -115,7 +115,7 @@ class Decision(NamedTuple):
             cures = {"choose another pair, as d2rpick suggest names it": None}
         if self.better is None:
             return "; ".join(cures)
-        return f"use {_named(self.better)}"
+        return f"use {_describe_pair(self.better)}"
 
 
 def decide(
@@ -126,20 +126,20 @@ def decide(
     better: Pair | None = None,
 ) -> Decision:
     """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair."""
-    quality = quality_of(situation, candidate)
+    quality = grade_pair(situation, candidate)
     return Decision(
         grade=POOR if objections else quality.grade,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,
-        kept=kept_mean_energy(situation, candidate),
+        kept=bound_mean_energy(situation, candidate),
         residual=candidate.residual,
-        worst_residual=_worst_residual(situation, candidate),
+        worst_residual=_find_worst_residual(situation, candidate),
         better=better,
     )
 
 
-def _worst_residual(situation: Situation, candidate: Candidate) -> float:
+def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
     """Return the largest residual that the record allows [-].
 
     If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
@@ -151,7 +151,7 @@ def _worst_residual(situation: Situation, candidate: Candidate) -> float:
     return max(candidate.residual, candidate.residual_high or 0.0)
 
 
-def _why_good(quality: Quality, residual: float | None) -> str:
+def _explain_why_good(quality: Quality, residual: float | None) -> str:
     """Explain why a pair is good: its vibration is kept, or hardly matters."""
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f": it is wrong by {residual:.1%}"
@@ -163,13 +163,13 @@ def _why_good(quality: Quality, residual: float | None) -> str:
     )
 
 
-def span_of(kept: Kept) -> str:
+def format_bounds(kept: Kept) -> str:
     """Write the bounds of the mean energy, as one number if both look alike."""
     low, high = f"{kept.low:.0%}", f"{kept.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 
-def _named(pair: Pair) -> str:
+def _describe_pair(pair: Pair) -> str:
     """Describe a pair, with its residual if that is known."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, list_names, name_units
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.few_states import cautions_of_few_states
+from d2rpick.choice.pair.few_states import warn_about_few_states
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
 from d2rpick.histories.digits import (
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Part
@@ -46,20 +46,20 @@ POOR_RESIDUAL = 0.5
 _NOTABLE_PLASTIC = 0.05
 
 
-def cautions_of(situation: Situation) -> Iterator[Caution]:
+def warn_about_td(situation: Situation) -> Iterator[Caution]:
     """Yield all warnings about a situation, those about the input first."""
     if not situation.history.complete:
         yield Caution(
             "truncated-input",
             "the input ends within a state; only complete states were used",
         )
-    yield from _of_energy(situation)
-    yield from cautions_of_few_states(situation)
-    yield from _of_parts(situation)
-    yield from _of_flight(situation)
+    yield from _warn_about_energy(situation)
+    yield from warn_about_few_states(situation)
+    yield from _warn_about_parts(situation)
+    yield from _warn_about_flight(situation)
 
 
-def _of_energy(situation: Situation) -> Iterator[Caution]:
+def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
     """Yield the warnings about the energy at td."""
     td = situation.td
     mode = situation.vibration.whole.mode
@@ -89,7 +89,7 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
         )
 
 
-def _of_parts(situation: Situation) -> Iterator[Caution]:
+def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
     """Yield the warnings about the states and the signs of parts."""
     vibration = situation.vibration
     states = situation.evidence.states_per_period
@@ -108,16 +108,18 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
 
-def _of_flight(situation: Situation) -> Iterator[Caution]:
+def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
     """Yield the warnings about the flight and the place of td in it."""
     flight = situation.flight
     td = situation.td
     earliest = situation.earliest_tr
     if flight.refusal:
-        yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(situation)}")
+        yield Caution(
+            "no-free-flight", f"{flight.refusal}{_describe_nearest_flight(situation)}"
+        )
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
-    yield from _of_evidence(situation)
+    yield from _warn_about_evidence(situation)
     if flight.source == "energy":
         text = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
         if (
@@ -138,16 +140,17 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     elif td <= earliest:
         yield Caution(
             "td-in-load",
-            f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}",
+            f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
-    yield from _of_grazing(situation)
+    yield from _warn_about_grazing(situation)
     if td > situation.latest_td:
         yield Caution(
-            "td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}"
+            "td-after-contact",
+            f"td = {td:.6g} lies after {describe_end_of_flight(situation)}",
         )
 
 
-def _of_grazing(situation: Situation) -> Iterator[Caution]:
+def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
     """Yield a warning if the body only grazes the contact that ends the flight, with its earliest time."""
     flight = situation.flight
     margin = situation.expected_margin
@@ -170,7 +173,7 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
     yield Caution("grazing-contact", f"{grazed}: {moved}; {advice}")
 
 
-def _of_evidence(situation: Situation) -> Iterator[Caution]:
+def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
     """Yield a warning if a flight shown by more than the energy of the parts is not certain, with a cure."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
@@ -197,15 +200,17 @@ def _of_evidence(situation: Situation) -> Iterator[Caution]:
     )
 
 
-def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
+def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or if that is unknown."""
     bodies = situation.bodies
     if bodies is None:
         return
     if len(bodies.told) > 1 and bodies.unknown:
-        yield Caution("several-bodies", _not_predicted(bodies.told, bodies.unknown))
+        yield Caution(
+            "several-bodies", _describe_not_predicted(bodies.told, bodies.unknown)
+        )
     if bodies.apart:
-        yield Caution("moves-apart", _moves_apart(bodies.apart))
+        yield Caution("moves-apart", _describe_moving_apart(bodies.apart))
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
@@ -233,7 +238,7 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     )
 
 
-def _moves_apart(parts: Sequence[Part]) -> str:
+def _describe_moving_apart(parts: Sequence[Part]) -> str:
     """Describe parts that are not connected to the others and fly away from them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
@@ -242,7 +247,9 @@ def _moves_apart(parts: Sequence[Part]) -> str:
     return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
 
 
-def _not_predicted(bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
+def _describe_not_predicted(
+    bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]
+) -> str:
     """Describe the first body whose position error is unknown, and the reason."""
     first = unknown[0]
     others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
@@ -251,29 +258,29 @@ def _not_predicted(bodies: Sequence[RigidBody], unknown: Sequence[RigidBody]) ->
     return f"{len(bodies)} rigid bodies: how far {which} is out of place is not predicted{why}"
 
 
-def end_of_load(situation: Situation) -> str:
+def describe_end_of_load(situation: Situation) -> str:
     """Describe ``earliest_tr``: the start of the flight, and the margin if there is one."""
-    return f"the end of the load at {situation.flight.start:.6g}{_margin(situation.settings.margin)}"
+    return f"the end of the load at {situation.flight.start:.6g}{_describe_margin(situation.settings.margin)}"
 
 
-def end_of_flight(situation: Situation) -> str:
+def describe_end_of_flight(situation: Situation) -> str:
     """Describe ``latest_td``: the end of the flight, and the margin if there is one."""
-    return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation.margin)}"
+    return f"the end of the flight at {situation.flight.end:.6g}{_describe_margin(situation.margin)}"
 
 
-def _margin(margin: float | None) -> str:
+def _describe_margin(margin: float | None) -> str:
     """Describe a margin; empty without one."""
     return f" with the margin {margin:.6g}" if margin else ""
 
 
-def _nearest_flight(situation: Situation) -> str:
+def _describe_nearest_flight(situation: Situation) -> str:
     """Describe the flight nearest to td, and the last td in it that keeps the margin."""
     flight = situation.flight
     if flight.start is None or flight.source == "given":
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
-    margin = _margin(situation.margin)
+    margin = _describe_margin(situation.margin)
     if margin:
         last = f",{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
     else:
@@ -351,14 +358,14 @@ class Means(NamedTuple):
         return self.resting + 2 * (MOST_KEPT * self.after - self.resting)
 
 
-def means_of(situation: Situation) -> Means | None:
+def compute_means(situation: Situation) -> Means | None:
     """Compute the means of the flight; None on another basis than "energy", without a flight or energy, and at rest."""
     if situation.basis != "energy":
         return None
-    mean = mean_in_flight(situation)
+    mean = compute_mean_in_flight(situation)
     if mean is None or not situation.energy_td > 0 or situation.at_rest:
         return None
-    time, energy = _flight(situation)
+    time, energy = _select_flight(situation)
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
     # the remaining decay is 0 if its exponential has no floating-point number
@@ -371,18 +378,20 @@ def means_of(situation: Situation) -> Means | None:
     return None
 
 
-def most_energy(situation: Situation) -> float:
+def find_largest_energy(situation: Situation) -> float:
     """Return the largest energy that may be locked in at a td [energy]; infinite if the energy does not limit it."""
-    means = means_of(situation)
+    means = compute_means(situation)
     return means.most if means else np.inf
 
 
-def expectation(situation: Situation, energy_tr: float | None) -> Expectation | None:
+def estimate_time_after(
+    situation: Situation, energy_tr: float | None
+) -> Expectation | None:
     """Estimate the time after td; None on another basis than "energy", without a flight or energy.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
     """
-    means = means_of(situation)
+    means = compute_means(situation)
     if means is None:
         return None
     return Expectation(
@@ -395,14 +404,14 @@ def expectation(situation: Situation, energy_tr: float | None) -> Expectation | 
     )
 
 
-def mean_in_flight(situation: Situation) -> float | None:
+def compute_mean_in_flight(situation: Situation) -> float | None:
     """Return the mean energy of the flight, up to td if its end is unknown [energy]; None unless it is positive."""
-    energy = _flight(situation)[1]
+    energy = _select_flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
     return mean if mean > round_off(situation.history) else None
 
 
-def _flight(situation: Situation) -> tuple[Samples, Samples]:
+def _select_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
     start = situation.flight.start
     end = situation.flight.end
@@ -411,14 +420,14 @@ def _flight(situation: Situation) -> tuple[Samples, Samples]:
     )
 
 
-def shortfall(energy: Samples, mean: float) -> Samples:
+def compute_shortfall(energy: Samples, mean: float) -> Samples:
     """Return the shortfall of a locked-in amplitude from that of the largest vibration energy, 1 - sqrt(E/(2 <E>)) [-].
 
     It is infinite for larger energies, which must not be locked in.
 
     Examples
     --------
-    >>> shortfall(np.array([0.5, 2.0, 3.0]), 1.0)
+    >>> compute_shortfall(np.array([0.5, 2.0, 3.0]), 1.0)
     array([0.5, 0. , inf])
     """
     return np.where(
@@ -437,7 +446,7 @@ class Objection(NamedTuple):
     told: Callable[[int], Iterable[str]]
 
 
-def objections(
+def list_objections(
     situations: Sequence[Situation],
     situation_of: NDArray[np.int32],
     tr: Samples,
@@ -456,10 +465,12 @@ def objections(
     columns : mapping of arrays of shape (n,)
         Measures by name, with ``energy`` and ``level_error``.
     """
-    starts = np.array([_first_tr_as_read(situation) for situation in situations])
+    starts = np.array([_get_first_tr(situation) for situation in situations])
     is_early = ~(tr >= starts[situation_of])
     yield Objection(is_early, partial(_tell_in_load, situations, situation_of))
-    refused = np.array([bool([*against_td(situation)]) for situation in situations])
+    refused = np.array(
+        [bool([*list_objections_to_td(situation)]) for situation in situations]
+    )
     yield Objection(
         refused[situation_of], partial(_tell_against_td, situations, situation_of)
     )
@@ -494,7 +505,7 @@ def objections(
     )
     # beyond its end the flight shows nothing about the time after td
     means = [
-        means_of(situation) if situation.td <= situation.latest_td else None
+        compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
     ]
     if any(means):
@@ -510,7 +521,7 @@ def objections(
         )
 
 
-def _first_tr_as_read(situation: Situation) -> float:
+def _get_first_tr(situation: Situation) -> float:
     """Return the earliest tr, rounded to printed digits [time]; NaN if it is unknown."""
     if situation.earliest_tr is None:
         return np.nan
@@ -521,14 +532,14 @@ def _tell_in_load(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
     """Return the objection that a candidate lies before the flight."""
-    return [_in_load(situations[situation_of[candidate]])]
+    return [_describe_in_load(situations[situation_of[candidate]])]
 
 
 def _tell_against_td(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> Iterator[str]:
     """Return the objections to the td of a candidate."""
-    return against_td(situations[situation_of[candidate]])
+    return list_objections_to_td(situations[situation_of[candidate]])
 
 
 def _tell_undescribed(
@@ -558,7 +569,11 @@ def _tell_keeps_nothing(
     candidate: int,
 ) -> list[str]:
     """Return the objection that a candidate keeps less of the vibration than a release without any."""
-    return [_keeps_nothing(situations[situation_of[candidate]], residual[candidate])]
+    return [
+        _describe_keeps_nothing(
+            situations[situation_of[candidate]], residual[candidate]
+        )
+    ]
 
 
 def _tell_above_the_reference(
@@ -568,19 +583,19 @@ def _tell_above_the_reference(
     candidate: int,
 ) -> Iterator[str]:
     """Return the objection that a candidate locks in too much energy."""
-    return _above_the_reference(means[situation_of[candidate]], energy[candidate])
+    return _describe_above_reference(means[situation_of[candidate]], energy[candidate])
 
 
-def _in_load(situation: Situation) -> str:
+def _describe_in_load(situation: Situation) -> str:
     """Describe that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return (
             situation.flight.refusal or "unknown: nothing shows when the load is over"
         )
-    return f"before {end_of_load(situation)}"
+    return f"before {describe_end_of_load(situation)}"
 
 
-def _keeps_nothing(situation: Situation, residual: float) -> str:
+def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
     """Describe that a switch is worse than a release without any vibration, or than the best one at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, which a release without any vibration has"
@@ -589,7 +604,7 @@ def _keeps_nothing(situation: Situation, residual: float) -> str:
     return f"residual {residual:.2g} above {better}"
 
 
-def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
+def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_above_limit(means.ratio(energy), MOST_KEPT)
@@ -597,10 +612,10 @@ def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
         yield f"{text}, more than {MOST_KEPT:g} times"
 
 
-def against_td(situation: Situation) -> Iterator[str]:
+def list_objections_to_td(situation: Situation) -> Iterator[str]:
     """Yield the reasons why no tr is acceptable at this td."""
     if situation.td > situation.latest_td:
-        yield f"td after {end_of_flight(situation)}"
+        yield f"td after {describe_end_of_flight(situation)}"
     if situation.settings.strict and not situation.flight.certain:
         yield "the flight was found from the energy alone, which is not certain"
     yield from situation.vibration.doubts

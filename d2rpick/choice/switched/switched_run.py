@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
 # Evidence that shows the start of a flight to within some states; the energy alone is less exact.
@@ -49,7 +49,7 @@ SAME: Final = 1e-6
 _SAME_STATES: Final = 3
 
 
-class Done(NamedTuple):
+class DoneWindow(NamedTuple):
     """A window in which a run was switched, with the flight around it, its landing and the planned landing.
 
     ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
@@ -112,7 +112,7 @@ class Done(NamedTuple):
         return f"{landed}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
 
 
-def switched_history(
+def prepare_switched_history(
     reference: Reference, done: Sequence[Times]
 ) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
     """Prepare the history of a run whose parts were rigid for some time, so that it can serve as a reference run.
@@ -142,8 +142,8 @@ def switched_history(
     for tr, td in done:
         for time in (tr, td):
             history.energy_at(time)
-        cautions += _partly_rigid(reference, tr, td)
-    absent = _absent_times(reference)
+        cautions += _warn_about_deforming(reference, tr, td)
+    absent = _find_absent_windows(reference)
     new = []
     for absent_window in absent:
         start, end = absent_window.start, absent_window.end
@@ -156,13 +156,13 @@ def switched_history(
         if absent_window.whole
     )
     return (
-        by_the_model(history) if absent else history,
+        select_model_momenta(history) if absent else history,
         tuple(sorted((*done, *whole_windows))),
         tuple(cautions),
     )
 
 
-def by_the_model(history: History) -> History:
+def select_model_momenta(history: History) -> History:
     """Return a history without the momenta of parts, some of which were replaced by rigid bodies.
 
     Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
@@ -175,13 +175,13 @@ def by_the_model(history: History) -> History:
     return replace(history, evidence=Given(whole, history.balance))
 
 
-def rigid_times(reference: Reference) -> tuple[Times, ...]:
+def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
     """Return the windows in which parts are rigid, as far as quantities of parts show them [time].
 
     If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
     windows = tuple(
-        (momenta.start, momenta.end) for momenta in _absent_times(reference)
+        (momenta.start, momenta.end) for momenta in _find_absent_windows(reference)
     )
     history = reference.history
     run = reference.run
@@ -213,19 +213,19 @@ def rigid_times(reference: Reference) -> tuple[Times, ...]:
     return ((float(history.time[0]), float(history.time[-1])),) if rigid else ()
 
 
-def done_windows(
+def find_done_windows(
     history: History,
     flights: Sequence[Flight],
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
-) -> tuple[Done, ...]:
+) -> tuple[DoneWindow, ...]:
     """Find when the flights of done windows landed, and when they were planned to land."""
     done = []
     for tr, td in windows:
-        flight = _around(history, flights, tr, td)
-        planned_flight = _around(history, planned or (), tr, td)
+        flight = _find_flight_around(history, flights, tr, td)
+        planned_flight = _find_flight_around(history, planned or (), tr, td)
         done.append(
-            Done(
+            DoneWindow(
                 tr,
                 td,
                 flight,
@@ -237,7 +237,7 @@ def done_windows(
     return tuple(done)
 
 
-def _around(
+def _find_flight_around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
     """Return the flight that shares most time with a window; None if no flight overlaps it."""
@@ -250,7 +250,9 @@ def _around(
     return best if best and shared(best) > 0 else None
 
 
-def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Caution]:
+def _warn_about_deforming(
+    reference: Reference, tr: float, td: float
+) -> Iterator[Caution]:
     """Yield a warning with the requested parts that deform in a window.
 
     Raises
@@ -258,8 +260,8 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     RangeError
         If no part was rigid, as far as the files show.
     """
-    run, history, parts = *reference, _deformable(reference)
-    rigid = rigid_parts(run, parts, history.time, tr, td)
+    run, history, parts = *reference, _select_deformable(reference)
+    rigid = detect_rigid_parts(run, parts, history.time, tr, td)
     if rigid is None:
         return
     if rigid.any():
@@ -282,7 +284,7 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     )
 
 
-class _Absent(NamedTuple):
+class _AbsentWindow(NamedTuple):
     """A window in which some of the parts were ``rigid`` [time]; ``whole`` if no other part deforms."""
 
     start: float
@@ -301,9 +303,9 @@ class _Absent(NamedTuple):
         return Caution("partly-rigid", window_text)
 
 
-def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
+def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
     """Return the windows in which parts have no kinetic energy while the model moves: a rigid body has it."""
-    parts = _deformable(reference)
+    parts = _select_deformable(reference)
     balance = reference.history.balance
     if parts:
         kinetic = give_if_written(lambda: reference.run.part_kinetic_energies(parts))
@@ -319,7 +321,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     windows = []
     for states in find_stretches(gone, FEWEST):
         start, end = time[states][[0, -1]].tolist()
-        rigid = rigid_parts(reference.run, parts, time, start, end)
+        rigid = detect_rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
         names = [
             part.title or f"part {part.id}"
@@ -327,11 +329,11 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
             if is_rigid
         ]
         deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
-        windows.append(_Absent(start, end, list_names(names), not deform.any()))
+        windows.append(_AbsentWindow(start, end, list_names(names), not deform.any()))
     return tuple(windows)
 
 
-def _deformable(
+def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
     """Return the chosen parts, or all, ``among`` others that have internal energy at the times of the history."""
@@ -350,8 +352,8 @@ def _deformable(
     )
 
 
-def rigid_parts(
-    run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float
+def detect_rigid_parts(
+    run: OpenedRun, parts: Sequence[Part], time: Samples, tr: float, td: float
 ) -> NDArray[np.bool_] | None:
     """Return True for each part that was rigid from tr to td, shape (parts,); None if there are too few states.
 
@@ -385,7 +387,9 @@ class SameParts(NamedTuple):
     is_reported: bool = True
 
 
-def same_parts(without: Reference, switched: Reference, pair: Times) -> SameParts:
+def choose_same_parts(
+    without: Reference, switched: Reference, pair: Times
+) -> SameParts:
     """Choose the parts by which a finished switched run is compared with its reference run.
 
     Parameters
@@ -402,18 +406,20 @@ def same_parts(without: Reference, switched: Reference, pair: Times) -> SamePart
     """
     as_read = SameParts(without.history, switched.history)
     try:
-        parts = _deformable(without, switched.run.parts)
-        return _judged(without, switched, pair, parts) if parts else as_read
+        parts = _select_deformable(without, switched.run.parts)
+        return (
+            _choose_compared_parts(without, switched, pair, parts) if parts else as_read
+        )
     except FormatError:  # a quantity of the parts is missing in some states
         return as_read
 
 
-def _judged(
+def _choose_compared_parts(
     without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
 ) -> SameParts:
     """Choose the parts to compare among ``parts``, with objections and notes."""
     history = without.history
-    rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
+    rigid = detect_rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     only_some_rigid = rigid is not None and bool(rigid.any()) and not rigid.all()
     objections = list[str]()
     notes = list[str]()
@@ -426,23 +432,25 @@ def _judged(
         )
         if history.parts is None:
             chosen = still
-            notes.append(f"judged by the parts that were rigid: {_names(still)}")
+            notes.append(
+                f"judged by the parts that were rigid: {_list_part_names(still)}"
+            )
         else:
             deforming = (part for part in parts if part not in still)
             objections.append(
-                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(deforming)}"
+                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_list_part_names(deforming)}"
             )
-    misreported = _reported_wrong(without, switched.run, chosen, pair)
+    misreported = _find_misreported(without, switched.run, chosen, pair)
     if not misreported and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
     comparable = tuple(part for part in chosen if part not in misreported)
     if not comparable:
-        energies_text = f"the energies of {_names(misreported)}"
+        energies_text = f"the energies of {_list_part_names(misreported)}"
         objections.append(
             f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
         )
     elif misreported:
-        left_out = f"left out of the comparison: {_names(misreported)}"
+        left_out = f"left out of the comparison: {_list_part_names(misreported)}"
         notes.append(
             f"{left_out}, whose energy is reported wrongly after td; some solvers do so with solids that were rigid"
         )
@@ -456,8 +464,8 @@ def _judged(
     )
 
 
-def _reported_wrong(
-    without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
+def _find_misreported(
+    without: Reference, switched: OpenedRun, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
     """Return the parts whose energy after td differs from that at tr by more than their largest energy without D2R."""
     time = switched.part_time
@@ -478,6 +486,6 @@ def _reported_wrong(
     )
 
 
-def _names(parts: Iterable[Part]) -> str:
+def _list_part_names(parts: Iterable[Part]) -> str:
     """Return a list of part names for a sentence."""
     return list_names([part.name for part in parts])

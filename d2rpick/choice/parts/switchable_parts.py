@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import FormatError, give_if_written, name_units
-from d2rpick.choice.flights import flights_of
+from d2rpick.choice.td.flights import find_flights
 from d2rpick.deck.geometry import compute_masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import count_pieces
@@ -21,12 +21,12 @@ from d2rpick.histories.samples import find_window
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.parts.cost import CostModel
     from d2rpick.choice.question import Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 
 # A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-]: most of the
@@ -81,7 +81,7 @@ class RunFacts(NamedTuple):
     reason: str | None = None
 
 
-def facts_of(run: Run, settings: Settings) -> RunFacts:
+def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     """Collect the data of parts from the files of a run.
 
     Parameters
@@ -102,16 +102,16 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         return RunFacts({}, reason=str(error))
     if not energies.size:
         return RunFacts({}, reason=f"{run.name}: {NO_STATES}")
-    masses = _masses(run)
+    masses = _read_masses(run)
     try:
-        history, members = _history(run)
+        history, members = _read_energy_of_flight(run)
     except FormatError as error:  # no part ever deforms
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
         }
         return RunFacts(still, reason=str(error))
-    flights = flights_of(history, settings)
+    flights = find_flights(history, settings)
     spans = tuple(flight.within(history.time) for flight in flights)
     longest = max(
         range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
@@ -120,7 +120,9 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     facts = {}
     for part, energy in zip(run.parts, energies.T, strict=True):
         in_flights = [
-            _in_flight(history.time, energy, span, _flies(part, flight, members))
+            _measure_in_flight(
+                history.time, energy, span, _is_flying(part, flight, members)
+            )
             for span, flight in zip(spans, flights, strict=True)
         ]
         facts[part.id] = PartFacts(
@@ -135,14 +137,16 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     )
 
 
-def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
+def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
     """Return the energy of the parts that fly together, or of all that deform without momenta, and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
 
 
-def _flies(part: Part, flight: Flight, members: Sequence[Part] | None) -> bool | None:
+def _is_flying(
+    part: Part, flight: Flight, members: Sequence[Part] | None
+) -> bool | None:
     """Return True if a part flies with the rest; None if no momenta of parts show it."""
     if members is None:
         return None
@@ -150,7 +154,7 @@ def _flies(part: Part, flight: Flight, members: Sequence[Part] | None) -> bool |
     return part.id in {member.id for member in together}
 
 
-def _in_flight(
+def _measure_in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
     """Return the mean, change and scatter of a part's energy in a flight, and its energy in the landing."""
@@ -164,11 +168,13 @@ def _in_flight(
         mean,
         float(inside[-1] - inside[0]),
         scatter,
-        _landing(time, energy, span),
+        _measure_landing(time, energy, span),
     )
 
 
-def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float | None:
+def _measure_landing(
+    time: Samples, energy: Samples, span: tuple[float, float]
+) -> float | None:
     """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
     start, end = span
     energies = energy[find_window(time, end, end + _LANDING * (end - start))]
@@ -177,7 +183,7 @@ def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float
     return None
 
 
-def _masses(run: Run) -> dict[int, float]:
+def _read_masses(run: OpenedRun) -> dict[int, float]:
     """Return the known masses by part id [mass]."""
     masses = run.masses
     if masses is None:
@@ -228,7 +234,7 @@ class PartRow(NamedTuple):
         return self.verdict in (SWITCH, MERGE)
 
 
-def rows_of(
+def judge_parts(
     facts: RunFacts,
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
@@ -248,15 +254,15 @@ def rows_of(
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
     sizes = compute_masses_and_steps(inventory) if inventory else {}
     rows = [
-        _described(part, facts, model, sizes.get(part, (None, None)), printed)
+        _describe_part(part, facts, model, sizes.get(part, (None, None)), printed)
         for part in ids
     ]
-    alone = landing_alone(rows)
-    judged = [_judged(row, facts, inventory, alone) for row in rows]
-    return tuple(_merged(judged, inventory)) if inventory else tuple(judged)
+    alone = find_landing_alone(rows)
+    judged = [_judge_part(row, facts, inventory, alone) for row in rows]
+    return tuple(_merge_rows(judged, inventory)) if inventory else tuple(judged)
 
 
-def _described(
+def _describe_part(
     part: int,
     facts: RunFacts,
     model: CostModel | None,
@@ -297,7 +303,7 @@ def _described(
         elements=counts,
         formulations=formulations,
         material=data.material.name if data and data.material else None,
-        kind=_kind(data, counts),
+        kind=_find_kind(data, counts),
         mass=mass,
         mass_source=mass_source,
         flights=fact.flights if fact else (),
@@ -309,7 +315,7 @@ def _described(
     )
 
 
-def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
+def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
     """Return the kind of a part: that of its material, or "spring" or "particles" by its elements."""
     if data is None:
         return None
@@ -320,26 +326,30 @@ def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None
     return data.material.kind if data.material else None
 
 
-def _judged(
+def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
     """Return the row of a part with its verdict and reasons; ``alone`` is the part that drives the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
-    reasons_to_keep = tuple(_to_keep(row, fact, data, alone)) or tuple(
-        _in_pieces(row, inventory)
+    reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(
+        _describe_pieces(row, inventory)
     )
     if reasons_to_keep:
         return row._replace(verdict=KEEP, reasons=reasons_to_keep)
-    unknowns = tuple(_not_known(row, facts, inventory, data))
+    unknowns = tuple(_list_unknowns(row, facts, inventory, data))
     if unknowns:
         return row._replace(verdict=UNKNOWN, reasons=unknowns)
     return row._replace(
-        verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory))
+        verdict=SWITCH,
+        reasons=(
+            *_list_remarks_on_switch(row, fact, data),
+            *_describe_joined(row, inventory),
+        ),
     )
 
 
-def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
+def _describe_joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     """Yield the parts that welds and ties connect to a part; they are inactive while it is rigid."""
     joined = inventory.joined.get(row.id, {}) if inventory else {}
     if joined:
@@ -347,7 +357,7 @@ def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
         yield f"joined to {name_units(joined)} ({kinds})"
 
 
-def _to_keep(
+def _list_reasons_to_keep(
     row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None
 ) -> Iterator[str]:
     """Yield the reasons not to switch a part."""
@@ -383,7 +393,7 @@ def _to_keep(
         yield "drives the landing alone, at little cost"
 
 
-def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
+def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     """Yield a reason if LS-DYNA would make one rigid body of the disconnected pieces of a part."""
     if (
         inventory is None
@@ -397,7 +407,7 @@ def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
         yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
 
 
-def _not_known(
+def _list_unknowns(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
     """Yield the data that are missing to judge a part without objections."""
@@ -417,7 +427,7 @@ def _not_known(
         yield "no momenta of parts show whether it flies with the rest"
 
 
-def _to_switch(
+def _list_remarks_on_switch(
     row: PartRow, fact: PartFacts | None, data: PartData | None
 ) -> Iterator[str]:
     """Yield remarks on a part that may be switched."""
@@ -440,7 +450,9 @@ def _to_switch(
         yield "its energy is not written"
 
 
-def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | None:
+def compute_step_growth(
+    rows: Sequence[PartRow], switched: Collection[int]
+) -> float | None:
     """Return the smallest factor by which the time step may grow while ``switched`` parts are rigid, at least 1 [-].
 
     The result is None if the time step of a part that stays deformable is unknown, infinite if no part stays
@@ -457,7 +469,7 @@ def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | N
     return min(known_steps) / min(steps) if known_steps else float("inf")
 
 
-def landing_alone(rows: Sequence[PartRow]) -> int | None:
+def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
     """Find the cheap part that takes up nearly all energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
@@ -473,7 +485,7 @@ def landing_alone(rows: Sequence[PartRow]) -> int | None:
     return None
 
 
-def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
+def _merge_rows(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
     """Merge parts that share nodes or are joined into one rigid body: the first id leads, the others merge with it."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}

@@ -11,8 +11,8 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.margins import bodies_of, margin_of
-from d2rpick.choice.together import Together
+from d2rpick.choice.pair.together import VibratingTogether
+from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
@@ -62,7 +62,7 @@ _QUANTA: Final = 2
 _BEFORE_CONTACT: Final = 0.03
 
 
-def nothing_vibrates(
+def is_at_rest(
     history: History, flight: tuple[float, float | None], td: float, *, deformed: bool
 ) -> bool:
     """Return True if the energy in ``flight`` is round-off, or fluctuates by no more than solver noise.
@@ -83,10 +83,10 @@ def nothing_vibrates(
         return True
     if deformed or float(inside.min()) < 0 or history.energy_at(td) <= 0:
         return False
-    return float(np.ptp(inside)) <= _faint(history, start)
+    return float(np.ptp(inside)) <= _find_faint_fluctuation(history, start)
 
 
-def _faint(history: History, start: float) -> float:
+def _find_faint_fluctuation(history: History, start: float) -> float:
     """Return the largest fluctuation of the energy that counts as no vibration [energy].
 
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
@@ -99,7 +99,7 @@ def _faint(history: History, start: float) -> float:
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
 
-class OfTd:
+class AnswerAtTd:
     """Base class of answers about one td; ``situation`` describes that td."""
 
     situation: Situation
@@ -194,14 +194,14 @@ class Situation:
         return self.settings.margin or 0.0
 
     @cached_property
-    def together(self) -> Together:
+    def together(self) -> VibratingTogether:
         """Parts that vibrate together in the flight."""
-        return Together(self.history, self.flight)
+        return VibratingTogether(self.history, self.flight)
 
     @cached_property
     def expected_margin(self) -> Margin:
         """Margin that a chosen td keeps: the given one, or the time by which the next contact may come earlier."""
-        return margin_of(self.history, self.flight, self.settings, self.fits)
+        return find_margin(self.history, self.flight, self.settings, self.fits)
 
     @cached_property
     def at_rest(self) -> bool:
@@ -211,12 +211,12 @@ class Situation:
             return False
         window = (start, self.flight.end)
         deformed = self.vibration.unknown is None
-        return nothing_vibrates(self.history, window, self.td, deformed=deformed)
+        return is_at_rest(self.history, window, self.td, deformed=deformed)
 
     @cached_property
     def bodies(self) -> Bodies | None:
         """Drift in flight of the rigid bodies that the parts become; None without data of parts."""
-        return bodies_of(self.history, self.flight, self.settings, self.fits)
+        return find_drift_of_bodies(self.history, self.flight, self.settings, self.fits)
 
     def position_errors(self, times: Samples) -> Samples:
         """Return the position error at td of a body frozen at each of ``times`` [length]; NaN if unknown."""
@@ -260,7 +260,7 @@ class Situation:
         return self if td == self.td else replace(self, td=td)
 
 
-def examine(
+def examine_td(
     history: History,
     td: float,
     settings: Settings,
@@ -300,11 +300,13 @@ def examine(
     else:
         at = td
     fits = Fits() if fits is None else fits
-    fit, span = _oscillator(history, at, settings, seen_evidence, fits, quick=quick)
-    described = _settled(history, fit, span) or _described_by_modes(
+    fit, span = _find_oscillator(
+        history, at, settings, seen_evidence, fits, quick=quick
+    )
+    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
         history, td, settings, seen_evidence, fits
     )
-    flight = _flight_at(history, td, settings, seen_evidence, described)
+    flight = _find_flight_at(history, td, settings, seen_evidence, described)
     is_given = settings.oscillator is not None
     evidence = Evidence(
         fit, span, is_given, prescribed=is_given or settings.fit_window is not None
@@ -346,7 +348,7 @@ def examine(
     return situation
 
 
-def looking(
+def make_look(
     history: History,
     settings: Settings,
     fits: Fits | None = None,
@@ -360,12 +362,12 @@ def looking(
     [time].  ``quick`` has the same meaning as in the examination of one td.
     """
     look = partial(
-        examine, history, settings=settings, fits=fits or Fits(), quick=quick
+        examine_td, history, settings=settings, fits=fits or Fits(), quick=quick
     )
-    return cache(look if since is None else lambda td: _beginning(look(td), since))
+    return cache(look if since is None else lambda td: _limit_start(look(td), since))
 
 
-def _beginning(situation: Situation, since: float) -> Situation:
+def _limit_start(situation: Situation, since: float) -> Situation:
     """Return the situation with a flight that does not begin before ``since`` [time]."""
     flight = situation.flight
     if flight.start is None or flight.start >= since:
@@ -373,7 +375,7 @@ def _beginning(situation: Situation, since: float) -> Situation:
     return replace(situation, flight=flight._replace(start=since))
 
 
-def _flight_at(
+def _find_flight_at(
     history: History,
     td: float,
     settings: Settings,
@@ -388,10 +390,10 @@ def _flight_at(
         flight = start_flight_at(history, flight, td, settings.after, described)
     if settings.landing is not None:
         flight = end_flight_at(history, flight, td, settings.landing)
-    return _between_supports(history, flight, td)
+    return _limit_by_supports(history, flight, td)
 
 
-def _between_supports(history: History, flight: Flight, td: float) -> Flight:
+def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
     """Limit a flight to the time in which no support acts on the parts.
 
     A flight found by the momenta of the parts is limited already.
@@ -405,7 +407,7 @@ def _between_supports(history: History, flight: Flight, td: float) -> Flight:
     )
 
 
-def _oscillator(
+def _find_oscillator(
     history: History,
     td: float,
     settings: Settings,
@@ -430,7 +432,7 @@ def _oscillator(
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return _with_hidden_share(history, fit, fits), span
+        return _add_hidden_share(history, fit, fits), span
     if settings.oscillator:
         judge = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = find_described_span(
@@ -450,10 +452,10 @@ def _oscillator(
         span, fit = find_described_span(
             history, td, bounds, fitter, whole=whole, memory=fits
         )
-    return _with_hidden_share(history, fit, fits), span
+    return _add_hidden_share(history, fit, fits), span
 
 
-def _described_by_modes(
+def _find_window_of_modes(
     history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
 ) -> Described | None:
     """Return a window that modes describe, if only the energy can show a flight; else None."""
@@ -476,7 +478,7 @@ def _described_by_modes(
     return Described(*described.span, described.vibration.vibration_energy)
 
 
-def _with_hidden_share(
+def _add_hidden_share(
     history: History, fit: Identification, fits: Fits
 ) -> Identification:
     """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
@@ -492,7 +494,7 @@ def _with_hidden_share(
     return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)
 
 
-def _settled(
+def _skip_first_quarter(
     history: History, fit: Identification | None, span: Span | None
 ) -> Described | None:
     """Return the window of an oscillator without its first quarter period, unless the record begins with it.

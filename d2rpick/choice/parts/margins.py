@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _TIMES: Final = 100
 
 
-def bodies_of(
+def find_drift_of_bodies(
     history: History, flight: Flight, settings: Settings, fits: Fits | None = None
 ) -> Bodies | None:
     """Return the drift of the rigid bodies of the parts in a flight, computed once; None without data of parts."""
@@ -39,20 +39,24 @@ def bodies_of(
     )
 
 
-def margin_of(
+def find_margin(
     history: History, flight: Flight, settings: Settings, fits: Fits | None = None
 ) -> Margin:
     """Return the given margin, or the time by which switching in the flight may make the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
-    bodies = bodies_of(history, flight, settings, fits)
+    bodies = find_drift_of_bodies(history, flight, settings, fits)
     position_error = (
-        None if bodies is None else _largest_error(bodies, flight.start, flight.end)
+        None
+        if bodies is None
+        else _find_largest_position_error(bodies, flight.start, flight.end)
     )
     return compute_margin(history, flight, place=position_error)
 
 
-def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:
+def _find_largest_position_error(
+    bodies: Bodies, start: float, end: float
+) -> float | None:
     """Return the largest position error of a body at the end of a flight [length]; None if it is unknown."""
     errors = bodies.errors(np.linspace(start, end, _TIMES)[:-1], end)
     known_errors = errors[np.isfinite(errors)]

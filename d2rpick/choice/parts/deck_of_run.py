@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.base.errors import Caution, choose_verb, give_if_written, name_units
-from d2rpick.choice.cost import ByDeck, CostModel, Share
+from d2rpick.choice.parts.cost import ByDeck, CostModel, Share
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import count_pieces, find_supports
 from d2rpick.deck.radioss_files import LEFT_RIGID, RUINS
@@ -25,10 +25,12 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.names import Part
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 
-def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:
+def find_rigid_bodies(
+    inventory: Inventory, parts: Collection[int]
+) -> tuple[RigidBody, ...]:
     """Return the rigid bodies that ``parts`` become; empty if elements, or ties between bodies, are unknown.
 
     In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
@@ -39,10 +41,10 @@ def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, 
     bodies = inventory.bodies(parts)
     if len(bodies) > 1 and inventory.ties:
         return ()
-    return tuple(RigidBody(body, _whole(inventory, body)) for body in bodies)
+    return tuple(RigidBody(body, _is_whole(inventory, body)) for body in bodies)
 
 
-def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
+def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
     """Return True if a rigid body is one connected piece, or Radioss can treat its pieces separately."""
     alone = len(body) == 1 and inventory.solver == "radioss"
     return (
@@ -52,14 +54,16 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
     )
 
 
-def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
+def merge_into_one_body(
+    parts: Collection[int], bodies: Iterable[RigidBody]
+) -> RigidBody:
     """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
     # a single part may consist of pieces
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
-def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
+def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
     """Return a warning if a deck is not that of a run, else None.
 
     It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
@@ -68,13 +72,19 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     titled = [
         part
         for part in run.parts
-        if part.id in inventory.parts and part.title and _title(part, inventory)
+        if part.id in inventory.parts
+        and part.title
+        and _get_title_in_deck(part, inventory)
     ]
     differing = [
-        part for part in titled if _differ(part.title, _title(part, inventory))
+        part
+        for part in titled
+        if _is_different_title(part.title, _get_title_in_deck(part, inventory))
     ]
     difference = (
-        _named(differing, inventory) if 2 * len(differing) > len(titled) else ""
+        _describe_differing(differing, inventory)
+        if 2 * len(differing) > len(titled)
+        else ""
     )
     ids_in_deck = inventory.parts.keys() | inventory.history_groups
     absent = [part for part in run.parts if part.id not in ids_in_deck]
@@ -84,26 +94,29 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     return Caution("deck-of-another-model", text) if difference else None
 
 
-def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
+def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
     """Return True if the history contains energy of any of the parts."""
     return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 
-def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
+def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if some parts have other titles in the deck than in the history."""
     differing = [
         part
         for part in parts
-        if part.id in inventory.parts and _differ(part.title, _title(part, inventory))
+        if part.id in inventory.parts
+        and _is_different_title(part.title, _get_title_in_deck(part, inventory))
     ]
     if differing:
         yield Caution(
             "deck-of-another-model",
-            f"{_named(differing, inventory)}: is this the deck of the run?",
+            f"{_describe_differing(differing, inventory)}: is this the deck of the run?",
         )
 
 
-def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
+def warn_about_bodies(
+    parts: Collection[int], inventory: Inventory
+) -> Iterator[Caution]:
     """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
@@ -118,7 +131,7 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
     if inventory.solver != "ls-dyna":
         cure = "each of them needs a rigid body of its own"
-    for body in bodies_of(inventory, parts):
+    for body in find_rigid_bodies(inventory, parts):
         if not (body.whole or inventory.ties):
             lies = (
                 f"{name_units(body.parts)} {'lies' if len(body.parts) == 1 else 'lie'}"
@@ -129,7 +142,9 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
             )
 
 
-def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
+def warn_about_solver(
+    parts: Collection[int], inventory: Inventory
+) -> Iterator[Caution]:
     """Yield warnings about what ruins a run, unknown supports, and parts whose stresses do not rotate with them."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
@@ -154,7 +169,7 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
         )
 
 
-def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
+def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caution]:
     """Yield a warning if a deck keeps parts rigid that deform in the history."""
     left_rigid = inventory.left_rigid
     if left_rigid and _has_energy(
@@ -167,7 +182,7 @@ def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
         )
 
 
-def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
+def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
     """Yield warnings about what was not followed in a deck and, if its cost is ``used``, about weights not measured."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
@@ -176,20 +191,20 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
         yield Caution("weights-by-analogy", taken)
 
 
-def _named(differing: Sequence[Part], inventory: Inventory) -> str:
+def _describe_differing(differing: Sequence[Part], inventory: Inventory) -> str:
     """Describe the first of the parts whose titles differ."""
     first = differing[0]
     more_parts = f", and {len(differing) - 1} more" if len(differing) > 1 else ""
-    title_in_deck = _title(first, inventory)
+    title_in_deck = _get_title_in_deck(first, inventory)
     return f"part {first.id} is {first.title!r} in the history and {title_in_deck!r} in the deck{more_parts}"
 
 
-def _title(part: Part, inventory: Inventory) -> str:
+def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
     """Return the title of a part in the deck."""
     return inventory.parts[part.id].title
 
 
-def _differ(first_title: str, second_title: str) -> bool:
+def _is_different_title(first_title: str, second_title: str) -> bool:
     """Return True if two titles differ, except in spaces, case, and length if one is cut off.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
@@ -202,7 +217,7 @@ def _differ(first_title: str, second_title: str) -> bool:
     return first[:shorter] != second[:shorter]
 
 
-def with_deck(
+def add_deck_to_settings(
     settings: Settings, reference: Reference, model: CostModel
 ) -> tuple[Settings, tuple[Caution, ...]]:
     """Return settings with the cost share and the rigid bodies that the deck defines for the parts of a history.
@@ -210,13 +225,13 @@ def with_deck(
     A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
     """
     inventory = model.inventory
-    foreign = of_another_model(reference.run, inventory)
+    foreign = check_model_of_deck(reference.run, inventory)
     if foreign:
         return replace(settings, bodies=()), (foreign,)
     ids = [part.id for part in reference.history.parts or ()]
     doubts_of_parts = (
-        *doubts_of_solver(ids, inventory),
-        *left_rigid_in(reference.run, inventory),
+        *warn_about_solver(ids, inventory),
+        *warn_about_left_rigid(reference.run, inventory),
     )
     ruined = tuple(
         RUINS[code]
@@ -237,14 +252,14 @@ def with_deck(
     with_cost = replace(
         settings,
         cost_share=share.value,
-        bodies=bodies_of(inventory, ids),
+        bodies=find_rigid_bodies(inventory, ids),
         placement=Placement(inventory),
         by_deck=ByDeck(inventory.files, model.weights if is_computed else None),
     )
     doubts = [
-        *doubts_of(history.parts, inventory),
-        *doubts_of_cost(model, used=is_computed and share.value is not None),
-        *doubts_of_bodies(ids, inventory),
+        *warn_about_titles(history.parts, inventory),
+        *warn_about_cost(model, used=is_computed and share.value is not None),
+        *warn_about_bodies(ids, inventory),
         *doubts_of_parts,
     ]
     if share.reason:
@@ -254,21 +269,21 @@ def with_deck(
     return with_cost, tuple(doubts)
 
 
-def in_deck(run: Run, inventory: Inventory | None) -> Run:
+def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:
     """Return a run with the surroundings that its deck defines; unchanged without a deck of the model."""
-    if inventory is None or of_another_model(run, inventory):
+    if inventory is None or check_model_of_deck(run, inventory):
         return run
-    return run.within(_surroundings(inventory))
+    return run.within(_find_surroundings(inventory))
 
 
-def _surroundings(inventory: Inventory) -> Surroundings:
+def _find_surroundings(inventory: Inventory) -> Surroundings:
     """Return gravity, supports and connected parts according to the deck."""
     by_part, whole = find_supports(inventory)
     supports: dict[int | None, tuple[Support, ...]] = {
-        part: _supports(holds) for part, holds in by_part.items()
+        part: _make_supports(holds) for part, holds in by_part.items()
     }
-    supports[None] = _supports(whole)
-    gravity: dict[int | None, tuple[float, ...]] = dict(_gravity(inventory))
+    supports[None] = _make_supports(whole)
+    gravity: dict[int | None, tuple[float, ...]] = dict(_find_gravity(inventory))
     on_free = {
         gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()
     }
@@ -276,34 +291,34 @@ def _surroundings(inventory: Inventory) -> Surroundings:
         (common,) = on_free
         if common is not None:
             gravity[None] = common
-    return Surroundings(gravity, supports, partial(_bodies, inventory))
+    return Surroundings(gravity, supports, partial(_group_connected_parts, inventory))
 
 
-def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
+def _group_connected_parts(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
     """Return the groups of connected parts; empty if parts may be missing, or ties may join the groups."""
     is_complete = inventory.complete and not inventory.ties
     return inventory.bodies(inventory.nodes_by_part.keys()) if is_complete else ()
 
 
-def _supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
+def _make_supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
     """Return the supports with their names and times, each once."""
     return tuple(
         dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
     )
 
 
-def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
+def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Yield the possible accelerations of gravity for each part for which they are known."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
-        acting = [(load, _acts(load, part, nodes)) for load in loads or ()]
+        acting = [(load, _is_gravity_on(load, part, nodes)) for load in loads or ()]
         if all(acts is not None for _, acts in acting):
-            together = _together([load for load, acts in acting if acts])
+            together = _sum_gravity([load for load, acts in acting if acts])
             if together is not None:
                 yield part, together
 
 
-def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
+def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
     """Return True if gravity acts on a part with these nodes; None if it acts on some nodes only."""
     if load.nodes is None or part in load.parts:
         return True
@@ -311,7 +326,7 @@ def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
     return bool(inside.any()) if inside.all() or not inside.any() else None
 
 
-def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
+def _sum_gravity(loads: list[Gravity]) -> tuple[float, ...] | None:
     """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
         values = loads[0].values if loads else ()

@@ -15,27 +15,27 @@ from d2rpick.base.errors import (
     choose_verb,
     name_units,
 )
-from d2rpick.choice.answers import suggest_of, verify_of
-from d2rpick.choice.candidates import ONE_BODY
-from d2rpick.choice.deck_of_run import (
-    bodies_of,
-    doubts_of,
-    doubts_of_bodies,
-    doubts_of_cost,
-    doubts_of_solver,
-    in_deck,
-    left_rigid_in,
-    of_another_model,
+from d2rpick.choice.answers import suggest_in_run, verify_run
+from d2rpick.choice.pair.candidates import ONE_BODY
+from d2rpick.choice.pair.warnings import warn_about_place
+from d2rpick.choice.parts.deck_of_run import (
+    add_surroundings,
+    check_model_of_deck,
+    find_rigid_bodies,
+    warn_about_bodies,
+    warn_about_cost,
+    warn_about_left_rigid,
+    warn_about_solver,
+    warn_about_titles,
 )
-from d2rpick.choice.question import Reference
-from d2rpick.choice.switchable_parts import (
+from d2rpick.choice.parts.switchable_parts import (
     PartRow,
     RunFacts,
-    facts_of,
-    rows_of,
-    step_growth,
+    collect_facts,
+    compute_step_growth,
+    judge_parts,
 )
-from d2rpick.choice.warnings import out_of_place
+from d2rpick.choice.question import Reference
 from d2rpick.deck.geometry import Placement
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.histories.listings import find_printed_steps
@@ -45,12 +45,12 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.cost import CostModel, Share, Weights
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.model import Inventory
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 # Savings that differ by less are equal: the cost model is right to within a few percent of the run time [-].
 _LIKE: Final = 0.01
@@ -114,7 +114,7 @@ class Parts:
     ``inventory`` is None without a deck.
     """
 
-    files: Run
+    files: OpenedRun
     inventory: Inventory | None
     weights: Weights | None
     settings: Settings
@@ -129,8 +129,8 @@ class Parts:
         return next((part_set for part_set in self.sets if part_set.recommended), None)
 
 
-def parts_of(
-    run: Run,
+def compare_sets_of_parts(
+    run: OpenedRun,
     settings: Settings,
     model: CostModel | None,
     *,
@@ -160,16 +160,16 @@ def parts_of(
     -------
     Parts
     """
-    foreign = of_another_model(run, model.inventory) if model else None
+    foreign = check_model_of_deck(run, model.inventory) if model else None
     model = None if foreign else model
-    run = in_deck(run, model.inventory if model else None)
-    facts = facts_of(run, settings)
-    rows = rows_of(
+    run = add_surroundings(run, model.inventory if model else None)
+    facts = collect_facts(run, settings)
+    rows = judge_parts(
         facts, model, find_printed_steps(run, *(deck_files if model else ()))
     )
-    comparison = _Comparison(run, settings, model, rows)
+    comparison = _SetComparison(run, settings, model, rows)
     sets: list[PartSet] = []
-    for part_set in _sets(rows, given_ids):
+    for part_set in _list_sets(rows, given_ids):
         # the same td for all sets, so that they can be compared
         td = next((earlier.window[1] for earlier in sets if earlier.window), None)
         sets.append(comparison.of(part_set, times or td))
@@ -182,10 +182,10 @@ def parts_of(
         # the other parts may fly longer than the moving ones
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
-    recommended_sets = tuple(_with_recommendation(_distinct(sets)))
+    recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))
     cautions = (
         *((foreign,) if foreign else ()),
-        *_cautions(run, facts, model, rows, recommended_sets),
+        *_warn_about_sets(run, facts, model, rows, recommended_sets),
     )
     inventory, weights = (model.inventory, model.weights) if model else (None, None)
     return Parts(
@@ -193,7 +193,7 @@ def parts_of(
     )
 
 
-def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
+def find_given_parts(run: OpenedRun, names: Sequence[str]) -> tuple[int, ...]:
     """Return the part ids of a further set to compare.
 
     Raises
@@ -212,8 +212,8 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
 
 
-def recommended_parts(
-    run: Run, settings: Settings, model: CostModel
+def recommend_parts(
+    run: OpenedRun, settings: Settings, model: CostModel
 ) -> tuple[int, ...]:
     """Return the part ids of the recommended set.
 
@@ -222,7 +222,7 @@ def recommended_parts(
     FormatError
         If no set can be recommended.
     """
-    answer = parts_of(run, settings, model)
+    answer = compare_sets_of_parts(run, settings, model)
     if answer.recommended is None:
         if answer.facts.reason:
             raise FormatError(answer.facts.reason)
@@ -240,7 +240,7 @@ def recommended_parts(
     return answer.recommended.parts
 
 
-def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
+def _drop_repeated_sets(sets: Sequence[PartSet]) -> list[PartSet]:
     """Leave out sets that repeat the parts of an earlier set under another name."""
     return [
         part_set
@@ -249,14 +249,14 @@ def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
     ]
 
 
-def _sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
+def _list_sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
     """Yield the sets worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
     rows_by_name = {
         _ALL: movable,
         "stopped deforming": stopped,
-        "heavy": _heavy(movable),
+        "heavy": _select_heavy(movable),
         "given": [row for row in rows if row.id in given_ids],
     }
     yield from (
@@ -266,7 +266,7 @@ def _sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet
     )
 
 
-def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
+def _select_heavy(movable: Sequence[PartRow]) -> list[PartRow]:
     """Return the heaviest parts that together have half of the mass; empty if a mass is unknown."""
     masses = {row.id: row.mass for row in movable if row.mass is not None}
     if len(masses) < len(movable):
@@ -283,10 +283,10 @@ def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
 
 
 @dataclass(frozen=True)
-class _Comparison:
+class _SetComparison:
     """The run, settings, costs and parts that all sets are compared with."""
 
-    run: Run
+    run: OpenedRun
     settings: Settings
     model: CostModel | None
     rows: Sequence[PartRow]
@@ -337,7 +337,7 @@ class _Comparison:
             element_fraction=element_fraction,
             mass_fraction=self._mass_fraction(part_set.parts),
             cost_share=share.value,
-            step_growth=step_growth(self.rows, {*part_set.parts, *rigid}),
+            step_growth=compute_step_growth(self.rows, {*part_set.parts, *rigid}),
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
@@ -375,13 +375,17 @@ class _Comparison:
         reference = Reference.of(
             self.run, Selection(parts=tuple(map(str, part_set.parts)))
         )
-        bodies = bodies_of(self.model.inventory, part_set.parts) if self.model else None
+        bodies = (
+            find_rigid_bodies(self.model.inventory, part_set.parts)
+            if self.model
+            else None
+        )
         settings = replace(self.settings, bodies=bodies, placement=self.placement)
         if isinstance(times, tuple):
-            situation = verify_of(reference, *times, settings).situation
+            situation = verify_run(reference, *times, settings).situation
             tr, td = times
         else:
-            answer = suggest_of(reference, times, settings, with_better=False)
+            answer = suggest_in_run(reference, times, settings, with_better=False)
             if answer.recommended is None:
                 raise RangeError(answer.why_none)
             situation, (tr, td) = (
@@ -392,15 +396,15 @@ class _Comparison:
         part_set = part_set._replace(
             window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0])
         )
-        return _with_position(part_set, situation, tr)
+        return _add_position_error(part_set, situation, tr)
 
 
-def _with_position(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
+def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
     """Add the largest position error at td of a body whose parts moved relative to each other before tr."""
     codes = ("several-bodies", "moves-apart")
     reasons = tuple(
         caution.message
-        for caution in out_of_place(situation, tr)
+        for caution in warn_about_place(situation, tr)
         if caution.code in codes
     )
     bodies = situation.bodies
@@ -425,7 +429,7 @@ def _with_position(part_set: PartSet, situation: Situation, tr: float) -> PartSe
     return placed
 
 
-def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
+def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
     """Mark the recommended set: it saves most; of sets that save equally much it has the fewest parts.
 
     A set with too large a position error is considered only if all sets have one.
@@ -445,8 +449,8 @@ def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
         yield part_set._replace(recommended=part_set is best)
 
 
-def _cautions(
-    run: Run,
+def _warn_about_sets(
+    run: OpenedRun,
     facts: RunFacts,
     model: CostModel | None,
     rows: Sequence[PartRow],
@@ -461,13 +465,15 @@ def _cautions(
             "without a deck the cost and most verdicts stay open; name the main deck of the run",
         )
         return
-    yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
-    yield from doubts_of_bodies(
+    yield from warn_about_titles(
+        (fact.part for fact in facts.parts.values()), model.inventory
+    )
+    yield from warn_about_bodies(
         [row.id for row in rows if row.movable], model.inventory
     )
-    yield from doubts_of_solver((), model.inventory)
-    yield from left_rigid_in(run, model.inventory)
-    yield from doubts_of_cost(model)
+    yield from warn_about_solver((), model.inventory)
+    yield from warn_about_left_rigid(run, model.inventory)
+    yield from warn_about_cost(model)
     missing = [row.id for row in rows if row.elements is None and row.id in facts.parts]
     if missing:
         yield Caution(

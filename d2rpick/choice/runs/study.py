@@ -21,19 +21,19 @@ from d2rpick.base.errors import (
     format_in_one_line,
     list_names,
 )
-from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.grades import GRADES
-from d2rpick.choice.quality import EQUALLY_GOOD, grade_of_residual
-from d2rpick.choice.question import read
-from d2rpick.choice.windows import (
-    acceptable_windows,
-    alike_windows,
-    clear_of_td,
-    common_windows,
-    coverage,
-    error_at,
-    error_profile,
+from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.pair.grades import GRADES
+from d2rpick.choice.pair.quality import EQUALLY_GOOD, grade_residual
+from d2rpick.choice.pair.windows import (
+    count_coverage,
+    cut_before_td,
+    find_acceptable_windows,
+    find_alike_windows,
+    find_common_windows,
+    interpolate_error,
+    make_error_profile,
 )
+from d2rpick.choice.question import read_reference
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import draw_outline
 from d2rpick.histories.source import expand
@@ -41,8 +41,8 @@ from d2rpick.histories.source import expand
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.answers import Suggestion
-    from d2rpick.choice.decision import Decision
+    from d2rpick.choice.answers import PairSuggestion
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
@@ -159,7 +159,7 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Study:
+class StudyOfRuns:
     """Answer of ``study``; ``agree``: the intervals of tr intersect, None without any tr.
 
     ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
@@ -186,7 +186,7 @@ class Study:
         grades = [row.quality for row in self.runs if row.quality]
         for row, error in zip(self.runs, self.common.errors, strict=True):
             if error is not None and row.basis != "energy":
-                grades.append(grade_of_residual(error))
+                grades.append(grade_residual(error))
         return min(grades, key=GRADES.index, default=None)
 
     @property
@@ -195,7 +195,7 @@ class Study:
         return self.common.tr is None or any(row.status != OK for row in self.runs)
 
 
-def ask(question: Question, source: str) -> StudyRow:
+def judge_run(question: Question, source: str) -> StudyRow:
     """Read and judge one run; errors of the run are reported in its row.
 
     Raises
@@ -207,12 +207,12 @@ def ask(question: Question, source: str) -> StudyRow:
         raise D2RPickError(
             f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same version everywhere"
         )
-    files = stamps(source)
+    files = stamp_files(source)
     end = None
     try:
-        reference = read([source], question.selection, question.input_format)
+        reference = read_reference([source], question.selection, question.input_format)
         end = float(reference.history.time[-1])
-        answer = suggest_of(
+        answer = suggest_in_run(
             reference, question.td, question.settings, with_better=False
         )
     except (D2RPickError, OSError) as error:
@@ -225,21 +225,23 @@ def ask(question: Question, source: str) -> StudyRow:
     time = reference.history.time
     energy = reference.history.energy
     curve = draw_outline(time, energy, _STRETCHES) if question.curve else None
-    return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
+    return replace(make_row(source, answer), files=files, curve=curve, record_end=end)
 
 
-def row_of(source: str, answer: Suggestion) -> StudyRow:
+def make_row(source: str, answer: PairSuggestion) -> StudyRow:
     """Return the row of a study from the answer for one run."""
     best = answer.chosen
     situation = answer.situation
-    acceptable = clear_of_td(
+    acceptable = cut_before_td(
         situation,
-        acceptable_windows(situation, answer.candidates, best.tr if best else None),
+        find_acceptable_windows(
+            situation, answer.candidates, best.tr if best else None
+        ),
     )
     messages = {caution.code: caution.message for caution in answer.cautions}
     alike = acceptable
     if best:
-        alike = alike_windows(situation, answer.candidates, best, acceptable)
+        alike = find_alike_windows(situation, answer.candidates, best, acceptable)
     row = StudyRow(
         source=source,
         status=NONE,
@@ -251,7 +253,7 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         td=situation.td,
         acceptable=acceptable,
         alike=alike,
-        profile=error_profile(situation, answer.candidates, acceptable),
+        profile=make_error_profile(situation, answer.candidates, acceptable),
     )
     if best is None:
         return row
@@ -262,11 +264,11 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         tr_low=best.tr_low,
         tr_high=best.tr_high,
         residual=best.residual,
-        **_decided(answer.decision),
+        **_list_decision_fields(answer.decision),
     )
 
 
-def _decided(decision: Decision | None) -> dict[str, Any]:
+def _list_decision_fields(decision: Decision | None) -> dict[str, Any]:
     """Return the verdict on the pair of a run as fields of its row."""
     if decision is None:
         return {}
@@ -278,13 +280,13 @@ def _decided(decision: Decision | None) -> dict[str, Any]:
     }
 
 
-def failed(source: str, error: BaseException) -> StudyRow:
+def make_failed_row(source: str, error: BaseException) -> StudyRow:
     """Return the row of a run whose process returned none."""
     status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
     return StudyRow(source, status, f"{source}: {format_in_one_line(error)}")
 
 
-def stamps(source: str) -> tuple[Stamp, ...]:
+def stamp_files(source: str) -> tuple[Stamp, ...]:
     """Return the present size and modification time of the files of a run, by absolute name; empty without files."""
     try:
         states = [
@@ -297,27 +299,27 @@ def stamps(source: str) -> tuple[Stamp, ...]:
     )
 
 
-def summarise(
+def compare_rows(
     td: float | tuple[float, float] | None, rows: Sequence[StudyRow]
-) -> Study:
+) -> StudyOfRuns:
     """Compare the rows of a study; ``td`` is the requested td or window for it."""
-    times, low, high = _known(rows)
+    times, low, high = _find_common_interval(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None
-    common = common_tr(rows)
+    common = choose_common_tr(rows)
     td_of_all, td_window = (None, td) if isinstance(td, tuple) else (td, None)
-    return Study(
+    return StudyOfRuns(
         td_of_all,
         td_window,
         tuple(rows),
         spread,
         agree,
         common,
-        tuple(_cautions(rows, common)),
+        tuple(_warn_about_runs(rows, common)),
     )
 
 
-def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
+def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
     """Return the tr of all runs and the bounds of the interval within the accuracy of each (low > high: none)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
@@ -325,7 +327,7 @@ def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
     return [tr for tr, _, _ in chosen], low, high
 
 
-def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
+def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     """Return the runs that were cut off: their files end within a state, or their record before that of most runs."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
@@ -336,21 +338,23 @@ def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     ]
 
 
-def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
+def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """Yield warnings about runs left out, runs that differ in kind, and warnings of single runs."""
     judged = [row for row in rows if row.judged]
     left_out = [row.source for row in rows if not row.judged]
     if left_out and judged:
-        text = f"{len(left_out)} of {runs_of(len(rows))} could not be judged"
+        text = (
+            f"{len(left_out)} of {format_number_of_runs(len(rows))} could not be judged"
+        )
         yield Caution(
             "runs-left-out",
             f"{text} and are left out: {list_names(left_out, most=NAMED)}",
         )
-    cut = [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]
+    cut = [f"{row.source} (at {row.record_end:g})" for row in find_cut_runs(rows)]
     if cut:
         yield Caution(
             "cut-runs",
-            f"{len(cut)} of {runs_of(len(rows))} were cut: {list_names(cut, most=NAMED)}",
+            f"{len(cut)} of {format_number_of_runs(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
         text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
@@ -371,17 +375,20 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:
-            counts = [f"{kind} in {runs_of(n)}" for kind, n in counted.most_common()]
+            counts = [
+                f"{kind} in {format_number_of_runs(n)}"
+                for kind, n in counted.most_common()
+            ]
             yield Caution(code, f"{sentence}: {', '.join(counts)}")
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         sources = [row.source for row in judged if code in row.warnings]
         yield Caution(
             code,
-            f"in {len(sources)} of {runs_of(len(judged))}: {list_names(sources, most=NAMED)}",
+            f"in {len(sources)} of {format_number_of_runs(len(judged))}: {list_names(sources, most=NAMED)}",
         )
 
 
-def common_tr(rows: Sequence[StudyRow]) -> Common:
+def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
     """Choose one tr for all judged runs: their own if they agree, else the earliest that is alike for all.
 
     "Alike" keeps the timing tolerance of every run.  If none does, choose the earliest tr acceptable in all runs at
@@ -391,32 +398,35 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
     judged = [row for row in rows if row.judged]
     if not judged:
         return Common(None, None, "no run could be judged")
-    shared = common_windows([row.acceptable for row in judged])
+    shared = find_common_windows([row.acceptable for row in judged])
     if not shared.size:
-        return Common(None, None, _why_none(judged))
-    keeping = common_windows([row.alike for row in judged])
-    low, high = keeping[0] if keeping.size else _least_loss(judged, shared)
+        return Common(None, None, _explain_why_no_common(judged))
+    keeping = find_common_windows([row.alike for row in judged])
+    low, high = keeping[0] if keeping.size else _find_least_loss(judged, shared)
     td = min(row.td for row in judged if row.td is not None)
-    tr = _agreed(judged, keeping)
+    tr = _find_agreed_tr(judged, keeping)
     if tr is None:
-        tr = fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
+        tr = find_fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
     errors = tuple(
-        None if row.profile is None else error_at(row.profile, tr) for row in rows
+        None if row.profile is None else interpolate_error(row.profile, tr)
+        for row in rows
     )
     return Common(tr, tuple(window), None, bool(keeping.size), errors)
 
 
-def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
+def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
     """Return the median tr of runs that agree, limited to their accuracy; None if they do not agree."""
-    tr_of_runs, low, high = _known(judged)
+    tr_of_runs, low, high = _find_common_interval(judged)
     if len(tr_of_runs) < len(judged) or low > high:
         return None
     tr = float(np.clip(median(tr_of_runs), low, high))
-    return tr if _holds(keeping, tr) else None
+    return tr if _is_in_windows(keeping, tr) else None
 
 
-def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, float]:
+def _find_least_loss(
+    judged: Sequence[StudyRow], shared: Samples
+) -> tuple[float, float]:
     """Return the first stretch of the shared windows in which no run loses more than 0.02 above the smallest loss."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
@@ -427,7 +437,7 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     times = times[begun > ended]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
-        own_error = 0.0 if row.tr is None else error_at(profile, row.tr)
+        own_error = 0.0 if row.tr is None else interpolate_error(profile, row.tr)
         worst = np.maximum(worst, np.interp(times, *profile) - own_error)
     first = int(np.argmax(worst <= worst.min() + EQUALLY_GOOD))
     holder = shared[np.searchsorted(shared[:, 0], times[first], "right") - 1]
@@ -435,12 +445,12 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     return float(times[first]), float(min(following, holder[1]))
 
 
-def fewest_digits(low: float, high: float) -> float:
+def find_fewest_digits(low: float, high: float) -> float:
     """Return a number with the fewest digits between ``low`` and ``high``: 0, or the one nearest to their middle.
 
     Examples
     --------
-    >>> fewest_digits(0.0128717, 0.0128989), fewest_digits(0.0, 0.00027)
+    >>> find_fewest_digits(0.0128717, 0.0128989), find_fewest_digits(0.0, 0.00027)
     (0.01289, 0.0)
     """
     if low <= 0.0 <= high:
@@ -450,35 +460,35 @@ def fewest_digits(low: float, high: float) -> float:
     return float(next((number for number in rounded if low <= number <= high), low))
 
 
-def runs_of(number: int) -> str:
+def format_number_of_runs(number: int) -> str:
     """Return a number of runs in words: "1 run", "2 runs"."""
     return "1 run" if number == 1 else f"{number} runs"
 
 
-def _why_none(judged: Sequence[StudyRow]) -> str:
+def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
     """State which tr is acceptable in most runs, and in which runs it is not."""
-    stretches, counts = coverage([row.acceptable for row in judged])
+    stretches, counts = count_coverage([row.acceptable for row in judged])
     if not counts.size:
         if len(judged) > 1:
-            which = f"any of {runs_of(len(judged))}"
+            which = f"any of {format_number_of_runs(len(judged))}"
         else:
             which = "the run that was judged"
         return f"no tr is acceptable in {which}"
-    tr = fewest_digits(*stretches[np.argmax(counts)])
-    unsuited = [row.source for row in judged if not _holds(row.acceptable, tr)]
+    tr = find_fewest_digits(*stretches[np.argmax(counts)])
+    unsuited = [row.source for row in judged if not _is_in_windows(row.acceptable, tr)]
     suited = len(judged) - len(unsuited)
     return (
-        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {suited}, "
+        f"no tr is acceptable in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
         f"not in {list_names(unsuited, most=NAMED)}"
     )
 
 
-def _holds(windows: Samples, time: float) -> bool:
+def _is_in_windows(windows: Samples, time: float) -> bool:
     """Return True if a time lies in one of the windows."""
     return bool(np.any((windows[:, 0] <= time) & (time <= windows[:, 1])))
 
 
-def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
+def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     """Return the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.

@@ -9,10 +9,10 @@ import numpy as np
 
 from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.aftermath import worth_of_error
-from d2rpick.choice.candidates import Candidates, judged_of
-from d2rpick.choice.grades import FAIR, GOOD, GRADES, POOR
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
+from d2rpick.choice.pair.aftermath import compare_error_with_contact
+from d2rpick.choice.pair.candidates import Candidates, judge_candidates
+from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
+from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.aftermath import Worth
-    from d2rpick.choice.candidates import Candidate, Judged
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.aftermath import Worth
+    from d2rpick.choice.pair.candidates import Candidate, Judged
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 # Errors of a deformation within this difference of the smallest are equally good [-]; the earliest safe tr wins then.
@@ -42,14 +42,16 @@ _DECIMALS: Final = 4
 _LIKE_TIMES = 0.1
 
 
-def candidates_at(
+def rank_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Yield the candidates of each td of one record, found by ``judged_of`` and ranked, one of them recommended."""
-    return chain.from_iterable(map(ranked, judged_of(situations, in_flight=in_flight)))
+    """Yield the candidates of each td of one record, ranked, one of them recommended."""
+    return chain.from_iterable(
+        map(rank_judged, judge_candidates(situations, in_flight=in_flight))
+    )
 
 
-def ranked(judged: Judged) -> Iterator[Candidates]:
+def rank_judged(judged: Judged) -> Iterator[Candidates]:
     """Rank the candidates of each td, number them, and recommend the first within the limits of the settings, if any.
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
@@ -59,8 +61,10 @@ def ranked(judged: Judged) -> Iterator[Candidates]:
     rigid = judged.td - judged.moments.tr
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
-    room = np.repeat([like_quality(situation) for situation in judged.situations], 3)
-    rows = order(group, judged.error, rigid, judged.out_of_place, room)
+    room = np.repeat(
+        [get_limit_of_like_quality(situation) for situation in judged.situations], 3
+    )
+    rows = order_by_quality(group, judged.error, rigid, judged.out_of_place, room)
     is_kept = judged.kept[rows]
     for situation, (first, last) in zip(
         judged.situations, pairwise(judged.ends), strict=True
@@ -75,12 +79,12 @@ def ranked(judged: Judged) -> Iterator[Candidates]:
         )
 
 
-def like_quality(situation: Situation) -> float:
+def get_limit_of_like_quality(situation: Situation) -> float:
     """Return the difference of errors up to which pairs are of like quality [-]: of deformations, or of levels."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
-def order(
+def order_by_quality(
     group: NDArray[np.int32],
     error: Samples,
     rigid: Samples,
@@ -94,8 +98,12 @@ def order(
     by error.
     """
     error = np.round(error, _DECIMALS)
-    is_like = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
-    longest = _extreme(np.maximum, group, np.where(is_like, rigid, -np.inf), room.size)
+    is_like = (
+        error <= (_find_extremes(np.minimum, group, error, room.size) + room)[group]
+    )
+    longest = _find_extremes(
+        np.maximum, group, np.where(is_like, rigid, -np.inf), room.size
+    )
     is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
     return np.lexsort(
         (
@@ -109,7 +117,7 @@ def order(
     )
 
 
-def _extreme(
+def _find_extremes(
     extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
     """Return the smallest or largest value of each group, by the function ``extreme``."""
@@ -118,7 +126,7 @@ def _extreme(
     return extremes
 
 
-def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
+def list_exceeded_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     """Return a message for each of --max-kinetic-share and --max-residual that is exceeded or cannot be judged."""
     settings = situation.settings
     limits = (
@@ -186,12 +194,12 @@ class Grade(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
-def grade_of_residual(residual: float) -> str:
+def grade_residual(residual: float) -> str:
     """Return the grade of a residual by itself [-].
 
     Examples
     --------
-    >>> grade_of_residual(0.1), grade_of_residual(0.3), grade_of_residual(0.6)
+    >>> grade_residual(0.1), grade_residual(0.3), grade_residual(0.6)
     ('good', 'fair', 'poor')
     """
     if residual > POOR_RESIDUAL:
@@ -229,7 +237,7 @@ class Quality(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
-def quality_of(situation: Situation, best: Candidate) -> Quality:
+def grade_pair(situation: Situation, best: Candidate) -> Quality:
     """Grade the recommended tr of a td: its motion, and its vibration, also relative to the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
@@ -239,13 +247,19 @@ def quality_of(situation: Situation, best: Candidate) -> Quality:
     motion = Grade.of(ruined, uncertain)
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
-    alone = Grade.of(_poor(situation, best), _fair(situation, best))
-    worth = worth_of_error(situation, best)
-    counted = alone if situation.settings.keep_vibration else _weighed(alone, worth)
+    alone = Grade.of(
+        _list_causes_for_poor(situation, best), _list_causes_for_fair(situation, best)
+    )
+    worth = compare_error_with_contact(situation, best)
+    counted = (
+        alone
+        if situation.settings.keep_vibration
+        else _raise_grade_by_worth(alone, worth)
+    )
     return Quality(motion, counted, alone, worth)
 
 
-def _weighed(alone: Grade, worth: Worth | None) -> Grade:
+def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     """Raise the grade of a vibration whose error hardly matters in the next contact."""
     if worth is None or alone.grade == "good" or worth.share > _HARDLY_FAIR:
         return alone
@@ -254,32 +268,32 @@ def _weighed(alone: Grade, worth: Worth | None) -> Grade:
     return Grade("fair", alone.causes)
 
 
-def _poor(situation: Situation, best: Candidate) -> list[Cause]:
+def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
     """Return the causes for the grade "poor" of the vibration."""
     causes = []
     if best.residual is None:
-        causes.append(_unknown_direction(situation))
+        causes.append(_describe_unknown_direction(situation))
     elif best.residual > POOR_RESIDUAL:
-        causes.append(_wrong_vibration(situation, best.residual))
+        causes.append(_describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
         causes += situation.history.known.once(
             ("flaws of the energy", situation.flight.start, situation.td),
-            lambda: _of_record(situation),
+            lambda: _list_causes_of_record(situation),
         )
     return causes
 
 
-def _unknown_direction(situation: Situation) -> Cause:
+def _describe_unknown_direction(situation: Situation) -> Cause:
     """Return the cause that the directions of the deformation at tr and td are unknown."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(
         f"how the deformations at tr and td lie to each other is unknown{why}",
-        f"{_way_to_the_modes(situation)}, or compare with a finished switched run",
+        f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
     )
 
 
-def _way_to_the_modes(situation: Situation) -> str:
+def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
         return "name the parts to be switched with `parts`, if the files have parts"
@@ -290,7 +304,7 @@ def _way_to_the_modes(situation: Situation) -> str:
     return "write the energies more often"
 
 
-def _wrong_vibration(situation: Situation, residual: float) -> Cause:
+def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     """Return the cause that the vibration after td is wrong, and whether tr or td has to be changed."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
@@ -302,7 +316,7 @@ def _wrong_vibration(situation: Situation, residual: float) -> Cause:
     )
 
 
-def _of_record(situation: Situation) -> list[Cause]:
+def _list_causes_of_record(situation: Situation) -> list[Cause]:
     """Return the causes why no level can be read from the samples of the flight up to td."""
     start = situation.flight.start
     _, energy = situation.history.between(
@@ -316,7 +330,7 @@ def _of_record(situation: Situation) -> list[Cause]:
                 "name the internal energy with `energy` or `parts`",
             )
         )
-    states = states_per_period(energy)
+    states = count_states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
         states_text = f"the record has {states:.2g} states per period"
         causes.append(
@@ -328,7 +342,7 @@ def _of_record(situation: Situation) -> list[Cause]:
     return causes
 
 
-def certainty(best: Candidate) -> int:
+def rate_certainty_of_tr(best: Candidate) -> int:
     """Return how well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
     if best.tr_high is None or best.timing_tolerance is None:
         return 2
@@ -346,7 +360,7 @@ def _is_loose(best: Candidate) -> bool:
     )
 
 
-def _fair(situation: Situation, best: Candidate) -> list[Cause]:
+def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     """Return the causes for the grade "fair" of the vibration."""
     if best.residual is None:
         return []
@@ -364,7 +378,7 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td may be wrong by up to {high:.0%}, since the record may hide a further mode",
-                _way_to_the_modes(situation),
+                _describe_cure_for_modes(situation),
             )
         )
     if best.residual <= MOST_GOOD and _is_loose(best):
@@ -378,12 +392,12 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
     return causes
 
 
-def states_per_period(energy: Samples) -> float | None:
+def count_states_per_period(energy: Samples) -> float | None:
     """Return the average number of samples per period of the energy (it passes its mean twice); None without one.
 
     Examples
     --------
-    >>> round(states_per_period(np.sin(np.arange(1000) * 2 * np.pi / 8) ** 2))
+    >>> round(count_states_per_period(np.sin(np.arange(1000) * 2 * np.pi / 8) ** 2))
     4
     """
     if energy.size < 2:

@@ -13,14 +13,14 @@ from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
 # Files that LS-DYNA usually writes more often than a d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
-def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
+def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     """Yield a warning if the states up to td are too few for the level at td: fewer than 10 per visible period.
 
     If no period is visible, all periods may have been missed, since a d3plot has some hundred states at most.

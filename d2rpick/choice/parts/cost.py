@@ -61,7 +61,7 @@ class Weights:
     def __post_init__(self) -> None:
         """Raise ConfigurationError naming a number outside of its range."""
         for name, value in self.per_element.items():
-            _check(f"the weight of {name!r}", value)
+            _check_weight(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
             raise ConfigurationError(
                 "no weight is above 0; give the cost of at least one formulation"
@@ -70,10 +70,10 @@ class Weights:
             raise ConfigurationError(
                 f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
             )
-        _check("rigid_node", self.rigid_node)
+        _check_weight("rigid_node", self.rigid_node)
 
 
-def _check(name: str, value: float) -> None:
+def _check_weight(name: str, value: float) -> None:
     """Raise ConfigurationError if a cost is negative or too large."""
     if not 0 <= value <= _LARGEST:
         raise ConfigurationError(
@@ -81,7 +81,9 @@ def _check(name: str, value: float) -> None:
         )
 
 
-def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
+def compute_saved_share(
+    weights: Weights, total: float, rigid: float, nodes: int
+) -> float:
     """Return the share c of a step that is saved while elements of the cost ``rigid`` are rigid, at least 0 [-].
 
     Parameters
@@ -94,7 +96,7 @@ def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> flo
 
     Examples
     --------
-    >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
+    >>> compute_saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
     0.45
     """
     if total:
@@ -144,7 +146,7 @@ class CostModel:
     @cached_property
     def total(self) -> Amount:
         """Cost of all elements."""
-        return _sum(self.of_part(part) for part in self.inventory.counts)
+        return _sum_amounts(self.of_part(part) for part in self.inventory.counts)
 
     def share_of(self, part: int) -> Share:
         """Return the share of a part's elements in the cost of all elements [-]."""
@@ -162,11 +164,13 @@ class CostModel:
                 None, f"{name_units(absent)} {choose_verb(absent)} not in the deck"
             )
         elements = self.inventory.elements_within(parts)
-        rigid = _sum(self._of(part, counts) for part, counts in elements.items())
+        rigid = _sum_amounts(
+            self._of(part, counts) for part, counts in elements.items()
+        )
         total = self.total
         nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
         return self._share(
-            rigid, saved_share(self.weights, total.cost, rigid.cost, nodes)
+            rigid, compute_saved_share(self.weights, total.cost, rigid.cost, nodes)
         )
 
     @property
@@ -221,7 +225,7 @@ class CostModel:
         return Share(value)
 
 
-def _sum(amounts: Iterable[Amount]) -> Amount:
+def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
     """Return the sum of costs, with all formulations without a weight."""
     cost = 0.0
     unknown = list[str]()
@@ -266,9 +270,11 @@ def read_weights(path: str) -> Weights:
             f"{path}: no table [per_element], the cost of each formulation was expected there"
         )
     numbers: dict[str, Any] = {
-        key: _number(path, key, values[key]) for key in _NUMBERS if key in values
+        key: _parse_weight(path, key, values[key]) for key in _NUMBERS if key in values
     }
-    weights = {name: _number(path, name, value) for name, value in per_element.items()}
+    weights = {
+        name: _parse_weight(path, name, value) for name, value in per_element.items()
+    }
     try:
         return Weights(
             weights,
@@ -280,12 +286,12 @@ def read_weights(path: str) -> Weights:
         raise ConfigurationError(f"{path}: {error}") from None
 
 
-def weights_as_toml(weights: Weights) -> str:
+def format_weights_as_toml(weights: Weights) -> str:
     """Write weights as TOML.
 
     Examples
     --------
-    >>> print(weights_as_toml(Weights({"BT": 0.3}, source="a run")))
+    >>> print(format_weights_as_toml(Weights({"BT": 0.3}, source="a run")))
     source = "a run"
     element_share = 0.91
     rigid_node = 0.04
@@ -294,23 +300,24 @@ def weights_as_toml(weights: Weights) -> str:
     "BT" = 0.3
     """
     rows = [
-        f"{_quoted(name)} = {value:.6g}" for name, value in weights.per_element.items()
+        f"{_quote_for_toml(name)} = {value:.6g}"
+        for name, value in weights.per_element.items()
     ]
     head = [
-        f"source = {_quoted(weights.source)}",
+        f"source = {_quote_for_toml(weights.source)}",
         *(f"{name} = {getattr(weights, name):.6g}" for name in _NUMBERS),
     ]
     return "\n".join([*head, "", "[per_element]", *rows])
 
 
-def _quoted(text: str) -> str:
+def _quote_for_toml(text: str) -> str:
     """Quote a text as a TOML string."""
     import json
 
     return json.dumps(text, ensure_ascii=False)  # TOML does not allow surrogate pairs
 
 
-def _number(path: str, name: str, value: object) -> float:
+def _parse_weight(path: str, name: str, value: object) -> float:
     """Return a value of a TOML file as a number, or raise ConfigurationError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")

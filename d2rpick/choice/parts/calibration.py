@@ -21,7 +21,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
-from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
+from d2rpick.choice.parts.cost import (
+    ELEMENT_SHARE,
+    MEASURED,
+    POINT,
+    RIGID_NODE,
+    Weights,
+)
 from d2rpick.deck import find_main_decks, ls_dyna_inventory, radioss_inventory
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_files import list_run_files
@@ -66,7 +72,7 @@ class Observation(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Calibration:
+class FittedWeights:
     """Fitted weights and their origin.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
@@ -79,7 +85,7 @@ class Calibration:
     cautions: tuple[Caution, ...] = ()
 
 
-def calibrate(observations: Sequence[Observation]) -> Calibration:
+def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
     """Fit weights to legs with and without rigid parts.
 
     Raises
@@ -98,21 +104,21 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
         raise ConfigurationError(
             "no leg without rigid parts has elements of a known formulation; give such a run too"
         )
-    start = _start(deformable, classes)
-    matrix, right_side = _rows(observations, classes)
+    start = _make_start_values(deformable, classes)
+    matrix, right_side = _build_equations(observations, classes)
     scaled = matrix * start / right_side[:, np.newaxis]
-    solution, is_determined = _solved(scaled)
+    solution, is_determined = _solve_equations(scaled)
     values = dict(
         zip((*classes, _REST, _RIGID), (solution * start).tolist(), strict=True)
     )
-    share = [_share(observation, values) for observation in deformable]
+    share = [_compute_element_share(observation, values) for observation in deformable]
     weights = Weights(
         {name: values[name] for name in classes}, float(np.mean(share)), values[_RIGID],
         f"calibrated by {len(observations)} legs",
     )  # fmt: skip
     misfit = float(np.sqrt(np.mean((scaled @ solution - 1) ** 2)))
     unknowns = (*classes, _REST, _RIGID)
-    return Calibration(
+    return FittedWeights(
         weights,
         tuple(np.array(unknowns)[is_determined].tolist()),
         misfit,
@@ -120,7 +126,9 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
     )
 
 
-def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples:
+def _make_start_values(
+    deformable: Sequence[Observation], classes: Sequence[str]
+) -> Samples:
     """Return start values: the measured weights in the unit of these runs, the rest per node, the rigid-node cost."""
     measured = [
         sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
@@ -145,7 +153,7 @@ def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples
     )
 
 
-def _rows(
+def _build_equations(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
     """Return the matrix and the right-hand side of the equations of all legs."""
@@ -160,7 +168,7 @@ def _rows(
     return np.array(rows), np.array(right_side)
 
 
-def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
+def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
     """Solve non-negative least squares for the unknowns that the rows determine; return all unknowns and which are.
 
     Undetermined unknowns stay 1.
@@ -179,7 +187,9 @@ def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
     return solution, is_determined
 
 
-def _share(observation: Observation, values: Mapping[str, float]) -> float:
+def _compute_element_share(
+    observation: Observation, values: Mapping[str, float]
+) -> float:
     """Return the share of the elements in the CPU time of a step [-]."""
     spent = sum(
         values.get(name, 0.0) * count for name, count in observation.counts.items()
@@ -191,7 +201,7 @@ def _share(observation: Observation, values: Mapping[str, float]) -> float:
 _US: Final = 1e6
 
 
-class _Rigid(NamedTuple):
+class _RigidPart(NamedTuple):
     """A part that is rigid from ``tr`` to ``td`` [time]."""
 
     part: int
@@ -199,7 +209,7 @@ class _Rigid(NamedTuple):
     td: float
 
 
-def observations_of_runs(
+def read_observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
     """Read the CPU times of the legs of several runs; files of equal content are used once.
@@ -207,13 +217,13 @@ def observations_of_runs(
     Raises
     ------
     DeckError, FormatError
-        As ``observations_of``.
+        As ``read_observations``.
     """
     legs_by_content: dict[str, tuple[Observation, ...]] = {}
     cautions = []
     for folder in folders:
         by_file: dict[str, list[Observation]] = {}
-        for observation in observations_of(folder):
+        for observation in read_observations(folder):
             by_file.setdefault(observation.name, []).append(observation)
         for name, legs in by_file.items():
             with Path(name).open("rb") as stream:
@@ -233,7 +243,7 @@ def observations_of_runs(
     return observations, tuple(dict.fromkeys(cautions))
 
 
-def observations_of(folder: str) -> tuple[Observation, ...]:
+def read_observations(folder: str) -> tuple[Observation, ...]:
     """Read the CPU times of the legs of the run in a folder.
 
     Parameters
@@ -256,7 +266,9 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
             count = "no main deck was found"
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
     observations = tuple(
-        _of_radioss(decks[0]) if list_run_files(decks[0]) else _of_ls_dyna(decks[0])
+        _read_radioss_observations(decks[0])
+        if list_run_files(decks[0])
+        else _read_ls_dyna_observations(decks[0])
     )
     if not observations:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
@@ -264,13 +276,13 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
     return observations
 
 
-def _of_radioss(deck: str) -> Iterator[Observation]:
+def _read_radioss_observations(deck: str) -> Iterator[Observation]:
     """Read the CPU times of a Radioss run from the listings of its engine runs."""
     run = read_run(deck)
     inventory = radioss_inventory.read_radioss_inventory(run)
     windows = find_run_windows(run).windows.windows
     rigid = [
-        _Rigid(switched.unit.id, switched.tr, switched.td or np.inf)
+        _RigidPart(switched.unit.id, switched.tr, switched.td or np.inf)
         for switched in windows
         if not switched.unit.is_body
     ]
@@ -285,18 +297,18 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
                 for switched in rigid
                 if switched.tr <= middle < switched.td
             }
-            yield _of_timing(
+            yield _make_observation(
                 read_timing(str(listing)), inventory, dict.fromkeys(parts, 1.0)
             )
 
 
-def _of_ls_dyna(deck: str) -> Iterator[Observation]:
+def _read_ls_dyna_observations(deck: str) -> Iterator[Observation]:
     """Read the CPU times of an LS-DYNA run from d3hsp and glstat."""
     content = read_deck(deck)
     inventory = ls_dyna_inventory.read_ls_dyna_inventory(content)
     windows = find_windows(read_switching(content), read_parts(content)).windows
     rigid = [
-        _Rigid(switched.part, switched.tr, switched.td or np.inf)
+        _RigidPart(switched.part, switched.tr, switched.td or np.inf)
         for switched in windows
         if switched.part is not None
     ]
@@ -304,7 +316,7 @@ def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     for name in sorted(file.name for file in folder.iterdir() if file.is_file()):
         path = str(folder / name)
         if name == "d3hsp":
-            end = _end(content)
+            end = _read_termination_time(content)
             if end:
                 lasting = {
                     window.part: (min(window.td, end) - window.tr) / end
@@ -313,23 +325,23 @@ def _of_ls_dyna(deck: str) -> Iterator[Observation]:
             else:
                 lasting = {}
             if not rigid or end:
-                yield _of_timing(read_timing(path), inventory, lasting)
+                yield _make_observation(read_timing(path), inventory, lasting)
         elif name.startswith("glstat") and is_glstat(path):
-            yield from _of_zones(read_zone_times(path), inventory, rigid)
+            yield from _make_zone_observations(read_zone_times(path), inventory, rigid)
 
 
-def _end(deck: Deck) -> float:
+def _read_termination_time(deck: Deck) -> float:
     """Return the termination time of an LS-DYNA run [time]; 0 if it is unknown."""
     cards = deck.named("CONTROL_TERMINATION")
     rows = [row for row in cards[0].rows if not row.blank] if cards else []
     return float(cards[0].real(rows[0], 0).value) if rows else 0.0
 
 
-def _of_timing(
+def _make_observation(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
     """Return the observation of a leg in which each part was rigid for the fraction ``lasting`` of the time."""
-    counts, nodes = _computed(inventory, lasting)
+    counts, nodes = _count_computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
         timing.name,
@@ -341,8 +353,8 @@ def _of_timing(
     )
 
 
-def _of_zones(
-    zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]
+def _make_zone_observations(
+    zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_RigidPart]
 ) -> Iterator[Observation]:
     """Yield an observation for each set of rigid parts: the median over the states with this set."""
     number = sum(counts.total() for counts in inventory.counts.values())
@@ -355,14 +367,14 @@ def _of_zones(
         )
         states.setdefault(rigid_parts, []).append(per_zone)
     for rigid_parts, times in states.items():
-        counts, nodes = _computed(inventory, dict.fromkeys(rigid_parts, 1.0))
+        counts, nodes = _count_computed(inventory, dict.fromkeys(rigid_parts, 1.0))
         total = float(np.median(times)) * number * _US
         yield Observation(
             zones.name, counts, len(inventory.coordinates), nodes, total, None
         )
 
 
-def _computed(
+def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
     """Return the average number of deformable elements by class, with further points, and of rigid-body nodes."""
@@ -372,7 +384,7 @@ def _computed(
         if data.material and data.material.kind == "rigid"
     }
     computed: dict[str, float] = {}
-    _count(
+    _add_counts(
         computed,
         inventory,
         {
@@ -387,7 +399,7 @@ def _computed(
         parts = [part for part, value in lasting.items() if value == fraction]
         nodes += fraction * inventory.rigid_nodes(parts)
         elements = inventory.elements_within(parts)
-        _count(
+        _add_counts(
             computed,
             inventory,
             {part: counts for part, counts in elements.items() if part not in always},
@@ -396,7 +408,7 @@ def _computed(
     return computed, nodes
 
 
-def _count(
+def _add_counts(
     into: dict[str, float],
     inventory: Inventory,
     counts: Mapping[int, Mapping[str, int]],

@@ -17,21 +17,26 @@ import numpy as np
 
 from d2rpick.base.errors import Caution
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.answers import suggest_of
-from d2rpick.choice.flights import flights_of, last_td
-from d2rpick.choice.health import WRONG_ENERGY, cautions_of_engine, refuse_unsound
-from d2rpick.choice.margins import margin_of
-from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
+from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.health import WRONG_ENERGY, refuse_unsound, warn_about_engine
+from d2rpick.choice.parts.margins import find_margin
+from d2rpick.choice.switched.switched_run import (
+    DoneWindow,
+    Times,
+    find_done_windows,
+    prepare_switched_history,
+)
+from d2rpick.choice.td.flights import compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.choice.answers import Suggestion
-    from d2rpick.choice.candidates import Candidate, Pair
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.answers import PairSuggestion
+    from d2rpick.choice.pair.candidates import Candidate, Pair
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.margin import Margin
@@ -45,7 +50,7 @@ MIN_RIGID: Final = 0.05
 _LONGER: Final = 2.0
 
 
-class Planned(NamedTuple):
+class PlannedFlight(NamedTuple):
     """One flight of a run and the rigid window in it; times in the unit of the history.
 
     ``status`` is "supported" by this reference run, "re-plan" from a switched run, "done", or "left-out"; ``reason``
@@ -61,8 +66,8 @@ class Planned(NamedTuple):
     record: float
     status: str
     reason: str | None = None
-    answer: Suggestion | None = None
-    done: Done | None = None
+    answer: PairSuggestion | None = None
+    done: DoneWindow | None = None
 
     @property
     def window(self) -> Times | None:
@@ -114,7 +119,7 @@ class Planned(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """Answer of ``plan``: all flights in time order, and warnings.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
@@ -123,12 +128,12 @@ class Plan:
     history: History
     settings: Settings
     min_rigid: float
-    flights: tuple[Planned, ...]
+    flights: tuple[PlannedFlight, ...]
     cautions: tuple[Caution, ...]
     done: tuple[Times, ...] = ()
 
     @property
-    def supported(self) -> tuple[Planned, ...]:
+    def supported(self) -> tuple[PlannedFlight, ...]:
         """Flights whose windows this reference run supports."""
         return tuple(row for row in self.flights if row.status == "supported")
 
@@ -170,14 +175,14 @@ class Plan:
         return self.settings.run_time_share(self.rigid_fraction)
 
 
-def plan_of(
+def plan_run(
     reference: Reference,
     settings: Settings,
     *,
     min_rigid: float | None = None,
     done: Sequence[Times] = (),
     before: Reference | None = None,
-) -> Plan:
+) -> RunPlan:
     """Plan the rigid windows of a run.
 
     Parameters
@@ -207,44 +212,44 @@ def plan_of(
     refuse_unsound(history, settings)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
-    history, done_times, cautions = switched_history(reference, done)
+    history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()
-    flights = flights_of(history, settings, fits)
+    flights = find_flights(history, settings, fits)
     # the earlier run may have been switched itself
-    earlier = before and flights_of(switched_history(before, ())[0], settings)
-    done_rows = done_windows(history, flights, done_times, earlier)
-    judged: Iterable[Planned] = _rows(
+    earlier = before and find_flights(prepare_switched_history(before, ())[0], settings)
+    done_rows = find_done_windows(history, flights, done_times, earlier)
+    judged: Iterable[PlannedFlight] = _list_rows(
         reference, flights, settings, shortest, done_rows, fits
     )
     if min_rigid is None:
-        judged = _without_short(list(judged))
-    rows = tuple(_with_status(list(judged), done_rows))
+        judged = _leave_out_short(list(judged))
+    rows = tuple(_mark_status(list(judged), done_rows))
     cautions = (
         *cautions,
-        *cautions_of_engine(reference.run.sources),
-        *_cautions(rows, done_rows),
+        *warn_about_engine(reference.run.sources),
+        *_warn_about_windows(rows, done_rows),
     )
-    return Plan(history, settings, shortest, rows, cautions, done_times)
+    return RunPlan(history, settings, shortest, rows, cautions, done_times)
 
 
-def _rows(
+def _list_rows(
     reference: Reference,
     flights: Sequence[Flight],
     settings: Settings,
     shortest: float,
-    done_rows: Sequence[Done],
+    done_rows: Sequence[DoneWindow],
     fits: Fits,
-) -> Iterator[Planned]:
+) -> Iterator[PlannedFlight]:
     """Yield every flight with its window, as if each were the first."""
     last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # end of the previous flight
     for number, found_flight in enumerate(flights, start=1):
-        flight = _given(reference.history, found_flight, settings.after)
+        flight = _apply_given_start(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
-        margin = margin_of(reference.history, flight, settings, fits)
-        row = Planned(number, flight, start, end, margin, record, "left-out")
+        margin = find_margin(reference.history, flight, settings, fits)
+        row = PlannedFlight(number, flight, start, end, margin, record, "left-out")
         done_in_flight = [done for done in done_rows if done.flight == found_flight]
         if done_in_flight:
             for done in done_in_flight:
@@ -257,14 +262,18 @@ def _rows(
             )
         elif end - margin.time - start < shortest:
             yield row._replace(
-                reason=_too_short(end - margin.time - start, shortest, margin)
+                reason=_explain_short_window(
+                    end - margin.time - start, shortest, margin
+                )
             )
         else:
-            yield _asked(reference, row, settings, shortest, landed, fits)
+            yield _suggest_window(reference, row, settings, shortest, landed, fits)
         landed = flight.end
 
 
-def _given(history: History, flight: Flight, load_end: float | None) -> Flight:
+def _apply_given_start(
+    history: History, flight: Flight, load_end: float | None
+) -> Flight:
     """Let a flight that contains the given end of the load begin there, as ``suggest`` does."""
     start, end = flight.within(history.time)
     if load_end is None or not start <= load_end < end:
@@ -272,14 +281,14 @@ def _given(history: History, flight: Flight, load_end: float | None) -> Flight:
     return flight._replace(start=load_end, source="given")
 
 
-def _asked(
+def _suggest_window(
     reference: Reference,
-    row: Planned,
+    row: PlannedFlight,
     settings: Settings,
     shortest: float,
     landed: float | None,
     fits: Fits,
-) -> Planned:
+) -> PlannedFlight:
     """Return the row with the suggestion for its flight, which does not reach back beyond the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
@@ -292,8 +301,8 @@ def _asked(
     if settings.landing is not None and not row.start < settings.landing <= row.end:
         flight_settings = replace(flight_settings, landing=None)
     # the energy alone may show no end of the flight to a td in it: keep the margin before the listed end
-    window = row.start, last_td(row.end, row.margin.time)
-    answer = suggest_of(reference, window, flight_settings, since=landed, fits=fits)
+    window = row.start, compute_last_td(row.end, row.margin.time)
+    answer = suggest_in_run(reference, window, flight_settings, since=landed, fits=fits)
     known_flight = answer.situation.flight
     row = row._replace(answer=answer)
     if known_flight.start is not None and (
@@ -307,23 +316,23 @@ def _asked(
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
         return row._replace(
-            reason=_too_short(answer.recommended.rigid_time, shortest, row.margin)
+            reason=_explain_short_window(
+                answer.recommended.rigid_time, shortest, row.margin
+            )
         )
     if answer.decision and not answer.decision.reaches(settings.min_quality):
-        return row._replace(
-            reason=_not_good_enough(answer.decision, answer.recommended)
-        )
+        return row._replace(reason=_explain_grade(answer.decision, answer.recommended))
     return row._replace(status="supported")
 
 
-def _not_good_enough(decision: Decision, pair: Pair) -> str:
+def _explain_grade(decision: Decision, pair: Pair) -> str:
     """Explain why a pair is not planned, and how to plan it nevertheless."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     advice = f"with `min_quality` {decision.grade} it is planned all the same"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
 
 
-def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
+def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
     """Explain that a window is too short."""
     if margin.time:
         margin_text = f", with the margin {margin.time:.3g} before the contact"
@@ -332,7 +341,7 @@ def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
     return f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}, at least {shortest:.3g} was asked for"
 
 
-def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
+def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
     """Leave out each window that locks in energy before a much longer one, even if that has to wait for a run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
@@ -356,9 +365,9 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
         yield row._replace(status="left-out", reason=f"{window_text}: {why}; {cure}")
 
 
-def _with_status(
-    rows: Sequence[Planned], done_rows: Sequence[Done]
-) -> Iterator[Planned]:
+def _mark_status(
+    rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
+) -> Iterator[PlannedFlight]:
     """Mark windows to be planned again after the first that locks in energy, and after a contact while rigid."""
     in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
@@ -376,7 +385,7 @@ def _with_status(
             why = f"{moved}; plan this one from a run that was switched in that window"
 
 
-def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
+def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
     """Yield a warning if a short window replaces a longer one that could be supported instead."""
     first = next(
         (row for row in rows if row.status == "supported" and row.locks_in), None
@@ -398,7 +407,9 @@ def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
-def _cautions(rows: Sequence[Planned], done_rows: Sequence[Done]) -> Iterator[Caution]:
+def _warn_about_windows(
+    rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
+) -> Iterator[Caution]:
     """Yield the warnings about all windows, each once."""
     for done in done_rows:
         window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.told}"
@@ -415,6 +426,6 @@ def _cautions(rows: Sequence[Planned], done_rows: Sequence[Done]) -> Iterator[Ca
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)
-    yield from _blocked(rows)
+    yield from _warn_about_blocked(rows)
     if not rows:
         yield Caution("no-flight", "nothing in the record shows a flight")

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.margins import margin_of
+from d2rpick.choice.parts.margins import find_margin
 from d2rpick.flight.flight import Flight, find_all_seen, list_witnesses
 from d2rpick.flight.window import list_moments
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -23,7 +23,7 @@ _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 _NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
 
 
-def longest_flight(
+def find_longest_flight(
     history: History,
     settings: Settings,
     fits: Fits | None = None,
@@ -40,9 +40,9 @@ def longest_flight(
     RangeError
         If there is no flight and no ``otherwise``.
     """
-    flights = flights_of(history, settings, fits)
+    flights = find_flights(history, settings, fits)
     if settings.landing is not None:
-        last = _last_before(settings.landing, flights)
+        last = _find_last_before(settings.landing, flights)
         if last:
             flights = (last,)
     if not flights and otherwise:
@@ -64,16 +64,16 @@ def longest_flight(
         windows,
         key=lambda window_and_flight: window_and_flight[0][1] - window_and_flight[0][0],
     )
-    latest = last_td(end, margin_of(history, longest, settings, fits).time)
+    latest = compute_last_td(end, find_margin(history, longest, settings, fits).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
 
-def last_td(end: float, margin: float) -> float:
+def compute_last_td(end: float, margin: float) -> float:
     """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
-def flights_of(
+def find_flights(
     history: History, settings: Settings, fits: Fits | None = None
 ) -> tuple[Flight, ...]:
     """Find all flights of a record, ascending in time; the flight of a given landing ends there.
@@ -99,27 +99,32 @@ def flights_of(
     """
     landing = settings.landing
     if landing is None:
-        return _with_given_start(
-            history, settings, _flights_of(history, settings, fits), fits
+        return _add_given_start(
+            history,
+            settings,
+            _find_flights_without_landing(history, settings, fits),
+            fits,
         )
     history.check(landing, argument="landing")
-    flights = _flights_of(history, replace(settings, landing=None), fits)
-    last = _last_before(landing, flights)
+    flights = _find_flights_without_landing(
+        history, replace(settings, landing=None), fits
+    )
+    last = _find_last_before(landing, flights)
     if last and landing <= last.within(history.time)[1]:
         flights = tuple(
             flight._replace(end=landing) if flight is last else flight
             for flight in flights
         )
-        return _with_given_start(history, settings, flights, fits)
-    from d2rpick.choice.situation import examine
+        return _add_given_start(history, settings, flights, fits)
+    from d2rpick.choice.pair.situation import examine_td
 
-    landing_flight = examine(history, landing, settings, fits).flight
+    landing_flight = examine_td(history, landing, settings, fits).flight
     if landing_flight.end == landing and not landing_flight.refusal:
-        return _in_order(history, flights, landing_flight)
+        return _insert_flight(history, flights, landing_flight)
     return flights
 
 
-def _with_given_start(
+def _add_given_start(
     history: History, settings: Settings, flights: tuple[Flight, ...], fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Add the flight that starts at the end of the load given by the user, unless a flight contains that time."""
@@ -128,11 +133,11 @@ def _with_given_start(
     windows = [flight.within(history.time) for flight in flights]
     if load_end is None or any(start <= load_end < end for start, end in windows):
         return flights
-    from d2rpick.choice.situation import examine
+    from d2rpick.choice.pair.situation import examine_td
 
     end = min((start for start, _ in windows if start > load_end), default=last)
     end = end if settings.landing is None else min(end, settings.landing)
-    given_flight = examine(history, (load_end + end) / 2, settings, fits).flight
+    given_flight = examine_td(history, (load_end + end) / 2, settings, fits).flight
     if (
         given_flight.source != "given"
         or given_flight.refusal
@@ -141,10 +146,10 @@ def _with_given_start(
         return flights
     if given_flight.end is None and end != last:
         given_flight = given_flight._replace(end=end)
-    return _in_order(history, flights, given_flight)
+    return _insert_flight(history, flights, given_flight)
 
 
-def _in_order(
+def _insert_flight(
     history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
     """Return flights ascending in time, with the given flight replacing those that it overlaps."""
@@ -161,7 +166,7 @@ def _in_order(
     )
 
 
-def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
+def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
     """Return the last flight that starts before a landing [time]; None without one."""
     return max(
         (flight for flight in flights if (flight.start or 0.0) < landing),
@@ -170,7 +175,7 @@ def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
     )
 
 
-def _flights_of(
+def _find_flights_without_landing(
     history: History, settings: Settings, fits: Fits | None
 ) -> tuple[Flight, ...]:
     """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
@@ -188,11 +193,11 @@ def _flights_of(
             for source, window in witnessed
         )
     # imported here: evidence better than the energy does not need it
-    from d2rpick.choice.situation import (
-        looking,
+    from d2rpick.choice.pair.situation import (
+        make_look,
     )
 
-    look = looking(history, settings, fits)
+    look = make_look(history, settings, fits)
     if settings.replay and not list_witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
         for share in _WHERE_IT_VIBRATES:
@@ -201,7 +206,7 @@ def _flights_of(
             if flight.described and start < end and not flight.refusal:
                 # this flight ends with the vibration, even if its start is given
                 return (flight,)
-        look = looking(history, replace(settings, replay=False))
+        look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
     # the last quiet time before td shows most of the flight
     for td in sorted(list_moments(history.time), reverse=True):
@@ -219,7 +224,7 @@ def _flights_of(
     return tuple(reversed(flights))
 
 
-def momentum_of_flight(history: History) -> dict[str, Samples]:
+def list_momentum_columns(history: History) -> dict[str, Samples]:
     """Return columns of the momentum that shows the flight, and of the mass.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they

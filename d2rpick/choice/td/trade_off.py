@@ -10,36 +10,36 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.choice.answers import Suggestion, suggest_at, suggest_of
-from d2rpick.choice.candidates import judged_of
-from d2rpick.choice.flights import longest_flight
+from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.quality import EQUALLY_GOOD, candidates_at, ranked
-from d2rpick.choice.situation import OfTd, Situation, looking
-from d2rpick.choice.suggest_td import (
+from d2rpick.choice.pair.candidates import judge_candidates
+from d2rpick.choice.pair.quality import EQUALLY_GOOD, rank_candidates, rank_judged
+from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
+from d2rpick.choice.pair.warnings import warn_about_td
+from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.suggest_td import (
     STEPS,
-    as_printed,
-    error_of,
-    offered_times,
-    within_flight,
+    find_best_known,
+    get_error_of_pair,
+    list_offered_times,
+    round_error,
 )
-from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.digits import round_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
-    from d2rpick.choice.aftermath import Kept
-    from d2rpick.choice.candidates import Candidate, Candidates, Pair
-    from d2rpick.choice.decision import Decision
-    from d2rpick.choice.plan import Plan
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair
+    from d2rpick.choice.pair.decision import Decision
+    from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.question import Reference, Settings
+    from d2rpick.choice.td.plan import RunPlan
 
 
 @dataclass(frozen=True, eq=False)
-class Offer(OfTd):
+class Offer(AnswerAtTd):
     """The answer of ``suggest`` for one td, of which most is computed only when it is looked up.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
@@ -65,7 +65,7 @@ class Offer(OfTd):
         It is the residual; on basis "energy" the shortfall of the level at td from the largest vibration energy, 1 -
         sqrt(E(td)/(2 <E>)).
         """
-        return error_of(self.situation, self.pair)
+        return get_error_of_pair(self.situation, self.pair)
 
     @property
     def tr(self) -> float | None:
@@ -89,7 +89,7 @@ class Offer(OfTd):
         return None if share is None else 1 - share
 
     @cached_property
-    def answer(self) -> Suggestion:
+    def answer(self) -> PairSuggestion:
         """The complete answer of ``suggest`` for this td.
 
         Windows need all candidates, and the reason why no tr is recommended needs those before the flight too.
@@ -99,7 +99,7 @@ class Offer(OfTd):
         else:
             candidates = None
         if candidates and self.basis == "energy":
-            candidates = next(candidates_at([self.situation], in_flight=True))
+            candidates = next(rank_candidates([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=candidates)
 
     @property
@@ -118,12 +118,12 @@ class Offer(OfTd):
         return self.answer.kept
 
 
-def offers_of(
+def make_offers(
     situations: Sequence[Situation], peaks: Container[float]
 ) -> Iterator[Offer]:
     """Yield the offer of each situation; ``peaks`` are the times of the energy peaks [time]."""
-    for judged in judged_of(situations, in_flight=True):
-        candidates_of_each = [*ranked(judged)]
+    for judged in judge_candidates(situations, in_flight=True):
+        candidates_of_each = [*rank_judged(judged)]
         orders = [
             candidates.order[
                 : 0 if candidates.recommended is None else candidates.recommended + 1
@@ -158,7 +158,7 @@ class TradeOff:
     """
 
     situation: Situation
-    suggestion: Suggestion
+    suggestion: PairSuggestion
     td_window: tuple[float, float]
     offers: tuple[Offer, ...]
     cautions: tuple[Caution, ...]
@@ -168,7 +168,7 @@ class TradeOff:
     step: Offer | None = None
 
 
-def explore_of(
+def explore_run(
     reference: Reference,
     settings: Settings,
     td_window: tuple[float, float] | None = None,
@@ -202,18 +202,18 @@ def explore_of(
     fits = Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
-    window = td_window or longest_flight(
+    window = td_window or find_longest_flight(
         history, settings, fits, otherwise=None if td is None else record
     )
-    look = looking(history, settings, fits, since)
-    known_best, inside = within_flight(look, history, window)
-    offered, peaks = offered_times(known_best, inside, steps)
+    look = make_look(history, settings, fits, since)
+    known_best, inside = find_best_known(look, history, window)
+    offered, peaks = list_offered_times(known_best, inside, steps)
     times = offered.tolist() if td is None else [*offered.tolist(), td]
-    suggestion = suggest_of(
+    suggestion = suggest_in_run(
         reference, window, settings, fits=fits, since=since, times=times
     )
     chosen = suggestion.recommended.td if suggestion.recommended else None
-    fully = looking(history, settings, fits, since, quick=False)
+    fully = make_look(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     # the full search gives the reason why no oscillator is seen
     situations = [
@@ -221,7 +221,7 @@ def explore_of(
     ]
     offers = [
         replace(offer, recommended=offer.td == chosen)
-        for offer in _marked([*offers_of(situations, peaks)])
+        for offer in _mark_unbeaten([*make_offers(situations, peaks)])
     ]
     requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
@@ -231,39 +231,44 @@ def explore_of(
         # the energy alone shows a different flight to each td: show that of ``suggest``
         situation = warned = fully(td)
     start = requested or max(
-        filter(_found, offers), key=lambda offer: offer.rigid_time or 0.0, default=None
+        filter(_is_comparable, offers),
+        key=lambda offer: offer.rigid_time or 0.0,
+        default=None,
     )
     return TradeOff(
         situation=situation,
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_cautions(warned, window, inside, offers)),
+        cautions=tuple(_warn_about_window(warned, window, inside, offers)),
         asked=requested,
         recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
-        step=_step(start, offers) if start else None,
+        step=_find_step(start, offers) if start else None,
     )
 
 
-def _found(offer: Offer) -> bool:
+def _is_comparable(offer: Offer) -> bool:
     """Return True if an offer can be compared: it has a pair that saves run time, and an error."""
     return offer.candidates.saving is not None and offer.error is not None
 
 
-def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
+def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
     """Mark the unbeaten offers; errors of deformations are not compared with errors of energies."""
     unbeaten = set()
     for is_residual in (True, False):
         group = [
             offer
             for offer in offers
-            if _found(offer) and (offer.basis != "energy") == is_residual
+            if _is_comparable(offer) and (offer.basis != "energy") == is_residual
         ]
         smallest_error = np.inf
         longest = np.inf
         printed = {
-            offer.td: (-round_as_read(offer.rigid_time or 0.0), as_printed(offer.error))
+            offer.td: (
+                -round_as_read(offer.rigid_time or 0.0),
+                round_error(offer.error),
+            )
             for offer in group
         }
         for offer in sorted(group, key=lambda offer: printed[offer.td]):
@@ -278,7 +283,7 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     return (replace(offer, unbeaten=offer.td in unbeaten) for offer in offers)
 
 
-def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
+def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     """Return the nearest unbeaten offer with half the error, else the recommended one if it has less, else None."""
     error = np.inf if start.error is None else start.error
     least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
@@ -290,7 +295,7 @@ def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     better = [
         offer
         for offer in comparable
-        if _found(offer) and (offer.error or 0.0) < error - EQUALLY_GOOD
+        if _is_comparable(offer) and (offer.error or 0.0) < error - EQUALLY_GOOD
     ]
     halved = [
         offer
@@ -303,7 +308,7 @@ def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     return next((offer for offer in better if offer.recommended), None)
 
 
-def _cautions(
+def _warn_about_window(
     situation: Situation,
     window: tuple[float, float],
     inside: tuple[float, float],
@@ -312,7 +317,7 @@ def _cautions(
     """Yield the warnings that concern the whole window; each offer has those of its own td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
-        caution for caution in cautions_of(situation) if caution.code not in of_td
+        caution for caution in warn_about_td(situation) if caution.code not in of_td
     )
     if inside[1] < window[1]:
         kept_clear = window[1] - inside[1]
@@ -320,7 +325,7 @@ def _cautions(
             "margin-kept",
             f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
         )
-    if not any(map(_found, offers)):
+    if not any(map(_is_comparable, offers)):
         yield Caution(
             "no-candidate",
             "no td in the window has an acceptable tr that saves anything",
@@ -333,7 +338,7 @@ _STEPS_OF_PAGE: Final = 120
 _FEWEST_STEPS: Final = 40
 
 
-def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
+def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:
     """Explore other td for each flight of a plan; the more flights, the coarser the grids."""
     answers = {
         row.number: row.answer for row in plan.flights if row.answer and row.window
@@ -342,7 +347,7 @@ def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
     trade_offs = (
-        explored_around(
+        explore_around(
             reference,
             answer.situation,
             answer.td_window,
@@ -354,7 +359,7 @@ def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     return tuple(trade_off for trade_off in trade_offs if trade_off)
 
 
-def explored_around(
+def explore_around(
     reference: Reference,
     situation: Situation,
     window: tuple[float, float] | None = None,
@@ -386,7 +391,7 @@ def explored_around(
         return None
     try:
         span = window or flight.within(situation.history.time)
-        return explore_of(
+        return explore_run(
             reference,
             situation.settings,
             span,

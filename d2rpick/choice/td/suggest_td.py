@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.quality import (
+from d2rpick.choice.pair.quality import (
     LIKE_LEVELS,
     MOST_GOOD,
     ROUNDING,
-    candidates_at,
-    certainty,
-    like_quality,
+    get_limit_of_like_quality,
+    rank_candidates,
+    rate_certainty_of_tr,
 )
-from d2rpick.choice.situation import Situation, looking
-from d2rpick.choice.warnings import mean_in_flight, shortfall
+from d2rpick.choice.pair.situation import Situation, make_look
+from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
+from d2rpick.choice.td.flights import find_longest_flight
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -30,16 +30,16 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.choice.candidates import Pair
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.situation import Look
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.measures import Profile
 
     Choice = tuple[Situation, Pair]
 
 
-def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
+def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     """Return upper bounds for the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
     If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
@@ -62,7 +62,8 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     tolerance = situation.settings.tolerance
     passed = time[
         np.minimum(
-            _reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1
+            _find_first_near(*extremes, level, np.full(times.shape, -ROUNDING)),
+            time.size - 1,
         )
     ]
     turns = np.searchsorted(history.turns, times) - np.searchsorted(
@@ -71,13 +72,13 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
     # or later, but after the state before
-    entered = time[np.maximum(_reached(*extremes, level, near) - 1, 0)]
+    entered = time[np.maximum(_find_first_near(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
     )
 
 
-def _reached(
+def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
     """Return the index of the first state by which the energy has been near each level, else the number of states.
@@ -155,37 +156,41 @@ def choose_td(
         If the window lies outside the record, or without one nothing in it shows a flight.
     """
     fits = fits or Fits()
-    window = window or longest_flight(history, settings, fits)
-    look = looking(history, settings, fits, since)
-    situation, inside = within_flight(look, history, window)
-    choose = _by_level if situation.vibration.unknown else _by_residual
-    choose = _by_modes if situation.basis == "modal" else choose
+    window = window or find_longest_flight(history, settings, fits)
+    look = make_look(history, settings, fits, since)
+    situation, inside = find_best_known(look, history, window)
+    choose = _choose_by_level if situation.vibration.unknown else _choose_by_residual
+    choose = _choose_by_modes if situation.basis == "modal" else choose
     chosen, longest = choose(situation, inside, look)
     td = chosen if chosen is not None else inside[1]
     if look(td).at_rest:
-        last = _last_at_rest(situation, inside)
+        last = _find_last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
         if times is None:
-            times = offered_times(situation, inside, STEPS)[0].tolist()
+            times = list_offered_times(situation, inside, STEPS)[0].tolist()
         earliest = float(history.time[0]) if since is None else since
-        td = _unbeaten(
+        td = _find_unbeaten(
             td,
             times,
             earliest,
             look,
-            looking(history, replace(settings, replay=False), since=since),
+            make_look(history, replace(settings, replay=False), since=since),
         )
-    pair = _longest(_acceptable([look(longest)])) if longest is not None else None
+    pair = (
+        _find_longest(_select_acceptable([look(longest)]))
+        if longest is not None
+        else None
+    )
     return Chosen(
-        looking(history, settings, fits, since, quick=False)(td),
+        make_look(history, settings, fits, since, quick=False)(td),
         window,
         inside,
         pair[1] if pair else None,
     )
 
 
-def offered_times(
+def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
     """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
@@ -202,7 +207,7 @@ def offered_times(
     return times[times < situation.history.time[-1]], set(peaks.tolist())
 
 
-def error_of(situation: Situation, best: Pair | None) -> float | None:
+def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
     """Return the error by which pairs at different td are compared [-]; None without a pair or with a level too high.
 
     A level is too high if it exceeds the largest possible vibration energy.
@@ -213,20 +218,20 @@ def error_of(situation: Situation, best: Pair | None) -> float | None:
         return 0.0
     if best.residual is not None:
         return best.residual
-    mean = mean_in_flight(situation)
+    mean = compute_mean_in_flight(situation)
     if mean is None:
         error = np.inf
     else:
-        error = float(shortfall(np.array(situation.energy_td), mean))
+        error = float(compute_shortfall(np.array(situation.energy_td), mean))
     return error if error < np.inf else None
 
 
-def as_printed(error: float | None) -> float:
+def round_error(error: float | None) -> float:
     """Round an error to the digits that are shown to the user; infinite if it is unknown."""
     return np.inf if error is None else round(error, _READ)
 
 
-def _unbeaten(
+def _find_unbeaten(
     td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
 ) -> float:
     """Return ``td``, or a td of ``times`` whose pair is no worse in error and rigid time and better in one.
@@ -236,39 +241,39 @@ def _unbeaten(
     be compared with the pair at td, no oscillator is searched at a td that loses without one.  No pair is rigid before
     ``earliest`` [time].
     """
-    choice = next(iter(_acceptable([look(td)])), None)
+    choice = next(iter(_select_acceptable([look(td)])), None)
     if choice is None:
         return td
     look_at = look if choice[0].flight.source == "energy" else choice[0].at
     look_first = (
         at_level if look_at is look and choice[0].basis == "energy" else look_at
     )
-    error = as_printed(error_of(*choice))
+    error = round_error(get_error_of_pair(*choice))
     late_enough = (time for time in times if time - earliest >= choice[1].rigid_time)
-    better = _beating(
+    better = _select_beating(
         choice,
         [
             look_at(time)
             for time in late_enough
-            if _may_beat(look_first(time), choice, error)
+            if _can_beat(look_first(time), choice, error)
         ],
     )
     for situation, _ in sorted(
         better,
         key=lambda candidate: (
             -candidate[1].rigid_time,
-            as_printed(error_of(*candidate)),
+            round_error(get_error_of_pair(*candidate)),
         ),
     ):
         longer = look(situation.td)
-        if not _beating(choice, [longer]):
+        if not _select_beating(choice, [longer]):
             continue
-        if _certainty_of_tr(longer) >= _certainty_of_tr(choice[0]):
+        if _rate_tr_at(longer) >= _rate_tr_at(choice[0]):
             return situation.td
     return td
 
 
-def _may_beat(situation: Situation, choice: Choice, error: float) -> bool:
+def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
     """Return True if a pair at the td of a situation may be as good as a pair with ``error``, and as long.
 
     Pairs by deformations are not compared with pairs by levels.
@@ -276,27 +281,29 @@ def _may_beat(situation: Situation, choice: Choice, error: float) -> bool:
     if (situation.basis == "energy") != (choice[0].basis == "energy"):
         return False
     share = situation.kinetic_share
-    mean = mean_in_flight(situation)
+    mean = compute_mean_in_flight(situation)
     smallest_shortfall = (
-        0.0 if mean is None else float(shortfall(np.array(situation.energy_td), mean))
+        0.0
+        if mean is None
+        else float(compute_shortfall(np.array(situation.energy_td), mean))
     )
     smallest_error = smallest_shortfall if share is None else sqrt(share)
-    if as_printed(smallest_error) > error:
+    if round_error(smallest_error) > error:
         return False
-    (longest,) = longest_rigid_times(situation, np.array([situation.td]))
+    (longest,) = bound_rigid_times(situation, np.array([situation.td]))
     return bool(longest >= choice[1].rigid_time)
 
 
-def _beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
+def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
     """Return the choices that are better than a given one in error or rigid time and worse in neither.
 
     Errors are compared as printed.
     """
-    error = as_printed(error_of(*choice))
+    error = round_error(get_error_of_pair(*choice))
     rigid = choice[1].rigid_time
     rivals = (
-        (situation, best, as_printed(error_of(situation, best)))
-        for situation, best in _acceptable(situations)
+        (situation, best, round_error(get_error_of_pair(situation, best)))
+        for situation, best in _select_acceptable(situations)
     )
     return [
         (situation, best)
@@ -307,7 +314,7 @@ def _beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
     ]
 
 
-def within_flight(
+def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
     """Return the situation with the best-known flight in ``window``, and the part of it that keeps the margin [time].
@@ -318,11 +325,11 @@ def within_flight(
         If the window lies outside the record.
     """
     history.check(*window, argument="td_window")
-    situation = _flying(look, window)
-    return situation, (window[0], _latest(situation, window))
+    situation = _find_flying(look, window)
+    return situation, (window[0], _find_latest(situation, window))
 
 
-def _latest(situation: Situation, window: tuple[float, float]) -> float:
+def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
     """Return the last td in the window that keeps the margin also after rounding to the printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
@@ -337,7 +344,7 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
     )
 
 
-def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
+def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Return the last td in a window in which nothing vibrates.
 
     It lies before the last state, and before the contact by the time that the contact may move.
@@ -352,23 +359,23 @@ def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     return min(last, round_down_as_read(flight.end - _HIDDEN * spread))
 
 
-def _flying(look: Look, window: tuple[float, float]) -> Situation:
+def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
     """Return the first situation with the best-known flight, at the start, middle or end of the window."""
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
-        if _certainty(situations[-1]) == (False, 0):
+        if _rate_certainty(situations[-1]) == (False, 0):
             break  # no situation can be more certain
-    return min(situations, key=_certainty)
+    return min(situations, key=_rate_certainty)
 
 
-def _certainty(situation: Situation) -> tuple[bool, int]:
+def _rate_certainty(situation: Situation) -> tuple[bool, int]:
     """Return a sort key for how certainly td lies in a flight: the smallest is the most certain."""
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
-def _by_residual(
+def _choose_by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
     """Return the td with the longest rigid window of like residual, and the one of all acceptable pairs."""
@@ -376,25 +383,25 @@ def _by_residual(
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
     ]
-    pairs = _acceptable(
+    pairs = _select_acceptable(
         look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:]))
     )
-    pairs = pairs or _acceptable(map(look, window))
-    limit = min((best.error for _, best in pairs), default=0.0) + like_quality(
-        situation
-    )
+    pairs = pairs or _select_acceptable(map(look, window))
+    limit = min(
+        (best.error for _, best in pairs), default=0.0
+    ) + get_limit_of_like_quality(situation)
     alike = [pair for pair in pairs if pair[1].error <= limit]
-    return _td(_longest(_surest(alike))), _td(_longest(pairs))
+    return _get_td(_find_longest(_select_surest(alike))), _get_td(_find_longest(pairs))
 
 
-def _surest(pairs: Sequence[Choice]) -> list[Choice]:
+def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
     """Return the pairs with the most certain tr, of those that are long enough to be planned, if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
     shortest = _SHORTEST * float(record[-1] - record[0])
     long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
-    certainties = [_certainty_of_tr(situation) for situation, _ in long]
+    certainties = [_rate_tr_at(situation) for situation, _ in long]
     return [
         pair
         for pair, pair_certainty in zip(long, certainties, strict=True)
@@ -402,13 +409,13 @@ def _surest(pairs: Sequence[Choice]) -> list[Choice]:
     ]
 
 
-def _certainty_of_tr(situation: Situation) -> int:
+def _rate_tr_at(situation: Situation) -> int:
     """Return how certain the tr recommended at a td is, from 0 to 2; 0 without one."""
-    best = next(candidates_at([situation], in_flight=True)).chosen
-    return 0 if best is None else certainty(best)
+    best = next(rank_candidates([situation], in_flight=True)).chosen
+    return 0 if best is None else rate_certainty_of_tr(best)
 
 
-def _by_modes(
+def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
     """Return the td with the smallest residuals of long windows, for many modes, and the longest acceptable one.
@@ -418,13 +425,13 @@ def _by_modes(
     compared = situation.vibration.compared
     start = situation.earliest_tr
     if start is None or compared is None:
-        return _by_residual(situation, window, look)
+        return _choose_by_residual(situation, window, look)
     first = max(start, compared.first)
     last = min(window[1], compared.last)
     choices: list[list[Choice]] = []
     for share in _LEAST_RIGID:
-        times = _offered_by_modes(situation, (window[0], first, last), share)
-        pairs = _acceptable(look(td) for td in times)
+        times = _list_times_by_modes(situation, (window[0], first, last), share)
+        pairs = _select_acceptable(look(td) for td in times)
         least_time = share * (last - first)
         choices.append(
             [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
@@ -432,15 +439,15 @@ def _by_modes(
         if not times or any(best.error <= MOST_GOOD for _, best in choices[-1]):
             break
     if not choices[0]:
-        return _by_residual(situation, window, look)
+        return _choose_by_residual(situation, window, look)
     is_good = any(best.error <= MOST_GOOD for _, best in choices[-1])
     long = choices[-1] if is_good else choices[0]
-    limit = min(best.error for _, best in long) + like_quality(situation)
-    alike = _longest(pair for pair in long if pair[1].error <= limit)
-    return _td(alike), _td(_longest(choices[0]))
+    limit = min(best.error for _, best in long) + get_limit_of_like_quality(situation)
+    alike = _find_longest(pair for pair in long if pair[1].error <= limit)
+    return _get_td(alike), _get_td(_find_longest(choices[0]))
 
 
-def _offered_by_modes(
+def _list_times_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
     """Return the td with the smallest residuals, rigid for ``share`` of the longest time; empty for few td.
@@ -457,7 +464,7 @@ def _offered_by_modes(
         return []
     times = times[:: -(-times.size // _MOST_TD)]
     rows = [
-        _least_error(modes.profile(td), first, td - least_rigid)
+        _find_least_error(modes.profile(td), first, td - least_rigid)
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
@@ -473,7 +480,9 @@ def _offered_by_modes(
     return [*dict.fromkeys(offered)]
 
 
-def _least_error(profile: Profile, first: float, last: float) -> tuple[float, float]:
+def _find_least_error(
+    profile: Profile, first: float, last: float
+) -> tuple[float, float]:
     """Return the smallest lock-in error of a tr between two times [-], and that tr [time]; infinite for none."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
@@ -483,57 +492,61 @@ def _least_error(profile: Profile, first: float, last: float) -> tuple[float, fl
     return float(errors[best]), float(profile.time[rows][best])
 
 
-def _by_level(
+def _choose_by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
     """Return the td by the level alone: the closer to the largest vibration energy, 2 <E>, the better."""
-    mean = mean_in_flight(situation)
+    mean = compute_mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
         return None, None
     levels = situation.history.energies_at(np.array(peaks))
-    falls = dict(zip(peaks, shortfall(levels, mean).tolist(), strict=True))
+    falls = dict(zip(peaks, compute_shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
     # without a search for an oscillator at each td
-    best = next((td for td in below if _acceptable([situation.at(td)])), None)
+    best = next((td for td in below if _select_acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
     limit = falls[best] + situation.settings.tolerance
-    alike = _longest(_shortening(situation, [td for td in below if falls[td] <= limit]))
+    alike = _find_longest(
+        _list_by_rigid_time(situation, [td for td in below if falls[td] <= limit])
+    )
     chosen = look(alike[0].td) if alike else None
-    return _td(alike if chosen and _acceptable([chosen]) else None), _td(
-        _longest(_shortening(situation, below))
+    return _get_td(alike if chosen and _select_acceptable([chosen]) else None), _get_td(
+        _find_longest(_list_by_rigid_time(situation, below))
     )
 
 
-def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
+def _list_by_rigid_time(
+    situation: Situation, times: Iterable[float]
+) -> Iterator[Choice]:
     """Yield acceptable choices by descending bound of the rigid time, while a longer one is possible."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
-    bounds = longest_rigid_times(situation, tds)
+    bounds = bound_rigid_times(situation, tds)
     order = np.lexsort((-tds, -bounds))
     for td, possible in zip(tds[order].tolist(), bounds[order].tolist(), strict=True):
         if possible <= 0 or possible < longest:
             return
-        for pair in _acceptable([situation.at(td)]):
+        for pair in _select_acceptable([situation.at(td)]):
             longest = max(longest, pair[1].rigid_time)
             yield pair
 
 
-def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
+def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """Return the situations with their recommended pairs, without pairs that save nothing."""
     return [
         (candidates.situation, candidates.saving)
-        for candidates in candidates_at([*situations], in_flight=True)
+        for candidates in rank_candidates([*situations], in_flight=True)
         if candidates.saving
     ]
 
 
-def _longest(pairs: Iterable[Choice]) -> Choice | None:
+def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
     """Return the choice with the longest rigid time, of equal ones the last; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 
-def _td(pair: Choice | None) -> float | None:
+def _get_td(pair: Choice | None) -> float | None:
     """Return the td of a choice; None without a choice."""
     return pair[0].td if pair else None

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.candidates import Candidate, Candidates, judge
-from d2rpick.choice.warnings import most_energy
+from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
+from d2rpick.choice.pair.warnings import find_largest_energy
 from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 
@@ -26,7 +26,7 @@ _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
 
-def acceptable_windows(
+def find_acceptable_windows(
     situation: Situation, candidates: Candidates, recommended: float | None
 ) -> Samples:
     """Find the windows in which a tr is acceptable.
@@ -48,14 +48,16 @@ def acceptable_windows(
     array of shape (n, 2)
         First and last time of each window, ascending [time].
     """
-    grid = monotone_grid(situation, candidates)
+    grid = make_monotone_grid(situation, candidates)
     if situation.at_rest:  # any tr before td is right, unless td itself is wrong
         widest = grid[np.newaxis, [0, -1]]
     else:
-        widest = _windows_below(
-            situation, grid, min(situation.most_error, _residual_left(situation))
+        widest = _find_windows_below(
+            situation,
+            grid,
+            min(situation.most_error, _compute_residual_left(situation)),
         )
-    judged = judge(
+    judged = judge_times(
         situation,
         np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
     )
@@ -71,7 +73,7 @@ def acceptable_windows(
     return acceptable
 
 
-def clear_of_td(situation: Situation, windows: Samples) -> Samples:
+def cut_before_td(situation: Situation, windows: Samples) -> Samples:
     """Cut the windows one output interval before td: after that nothing is saved."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
@@ -80,7 +82,7 @@ def clear_of_td(situation: Situation, windows: Samples) -> Samples:
     return np.stack([early[:, 0], np.minimum(early[:, 1], end)], axis=1)
 
 
-def alike_windows(
+def find_alike_windows(
     situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
 ) -> Samples:
     """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
@@ -95,7 +97,7 @@ def alike_windows(
         All candidates.
     chosen : Candidate
     acceptable : array of shape (n, 2)
-        The result of ``acceptable_windows``.
+        The result of ``find_acceptable_windows``.
 
     Returns
     -------
@@ -103,15 +105,17 @@ def alike_windows(
         First and last time of each window, ascending [time].
     """
     level = float(situation.errors(np.array([chosen.tr]))[0]) + TOLERATED_GROWTH
-    return common_windows(
+    return find_common_windows(
         [
             acceptable,
-            _windows_below(situation, monotone_grid(situation, candidates), level),
+            _find_windows_below(
+                situation, make_monotone_grid(situation, candidates), level
+            ),
         ]
     )
 
 
-def coverage(
+def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Count the runs that have a time in one of their windows.
@@ -129,7 +133,7 @@ def coverage(
 
     Examples
     --------
-    >>> stretches, counts = coverage([np.array([[0.0, 2.0]]), np.array([[1.0, 3.0]])])
+    >>> stretches, counts = count_coverage([np.array([[0.0, 2.0]]), np.array([[1.0, 3.0]])])
     >>> stretches.tolist(), counts.tolist()
     ([[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]], [1, 2, 1])
     """
@@ -148,19 +152,19 @@ def coverage(
     return stretches[is_counted], counts[is_counted]
 
 
-def common_windows(runs: Sequence[Samples]) -> Samples:
+def find_common_windows(runs: Sequence[Samples]) -> Samples:
     """Return the windows that all runs share, shape (k, 2) [time].
 
     Examples
     --------
-    >>> common_windows([np.array([[0.0, 2.0], [4.0, 5.0]]), np.array([[1.0, 4.5]])]).tolist()
+    >>> find_common_windows([np.array([[0.0, 2.0], [4.0, 5.0]]), np.array([[1.0, 4.5]])]).tolist()
     [[1.0, 2.0], [4.0, 4.5]]
     """
-    stretches, counts = coverage(runs)
+    stretches, counts = count_coverage(runs)
     return np.asarray(stretches[counts == len(runs)])
 
 
-def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
+def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     """Return times in the flight before td between which the rule changes at most once [time]."""
     history = situation.history
     td = situation.td
@@ -170,7 +174,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     ends = [start, np.nextafter(td, -np.inf)]
     # the largest acceptable energy is passed between samples; stay just below it in floating point
     highest_crossings = find_crossings(
-        history.time, history.energy, (1 - _BELOW) * most_energy(situation)
+        history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]
     times = np.concatenate(
         [
@@ -184,7 +188,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     return merge_times(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
-def _residual_left(situation: Situation) -> float:
+def _compute_residual_left(situation: Situation) -> float:
     """Return the lock-in error that --max-residual allows in addition to the kinetic fraction: R^2 = L^2 + K [-]."""
     limit = situation.settings.max_residual
     share = situation.kinetic_share
@@ -196,9 +200,9 @@ def _residual_left(situation: Situation) -> float:
     return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))
 
 
-def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
+def _find_windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
     """Return the windows in which the error does not exceed ``level``, shape (n, 2) [time]."""
-    highest = most_energy(situation)
+    highest = find_largest_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
         return (situation.errors(times) <= level) & (
@@ -224,7 +228,7 @@ _EXACT: Final = 5e-4
 _HALVINGS: Final = 20
 
 
-def error_profile(
+def make_error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
     """Return the error of a tr in windows as points of a polyline, exact to 0.0005.
@@ -245,43 +249,43 @@ def error_profile(
     """
     if not windows.size:
         return np.zeros((2, 0))
-    inner = monotone_grid(situation, candidates)
-    times = merge_times(inner[_inside(inner, windows)], windows)
+    inner = make_monotone_grid(situation, candidates)
+    times = merge_times(inner[_is_inside(inner, windows)], windows)
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
-        middles = middles[_inside(middles, windows)]
+        middles = middles[_is_inside(middles, windows)]
         bent = (
             np.abs(
-                _errors(situation, middles)
-                - np.interp(middles, times, _errors(situation, times))
+                _compute_errors(situation, middles)
+                - np.interp(middles, times, _compute_errors(situation, times))
             )
             > _EXACT / 2
         )
         if not bent.any():
             break
         times = merge_times(times, middles[bent])
-    return _thinned(times, _errors(situation, times), windows)
+    return _thin_out(times, _compute_errors(situation, times), windows)
 
 
-def error_at(profile: Samples, time: float) -> float:
+def interpolate_error(profile: Samples, time: float) -> float:
     """Return the error at a time in one of the windows of a profile [-]."""
     return float(np.interp(time, *profile))
 
 
-def _errors(situation: Situation, times: Samples) -> Samples:
+def _compute_errors(situation: Situation, times: Samples) -> Samples:
     """Return the residuals, or the level errors on the energy alone, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
-def _inside(times: Samples, windows: Samples) -> Samples:
+def _is_inside(times: Samples, windows: Samples) -> Samples:
     """Return True for each time that lies in a window."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 
 
-def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
+def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
     """Leave out points on a straight line: keep the ends of the windows, then add the worst point of each gap."""
     points = np.flatnonzero(np.isin(times, windows))
     while True:

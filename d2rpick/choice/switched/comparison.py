@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched_run import FEWEST, SAME, same_parts
+from d2rpick.choice.switched.switched_run import FEWEST, SAME, choose_same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
@@ -18,11 +18,11 @@ from d2rpick.vibration import measures
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History, Samples, Track
     from d2rpick.histories.names import Part
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.run import OpenedRun
 
 
 # Largest deviation of the momentum after td; beyond this share of it the motion differs from the reference run [-].
@@ -72,7 +72,7 @@ class Comparison(NamedTuple):
     notes: tuple[str, ...]
 
 
-def compare(
+def compare_with_reference(
     situation: Situation,
     tr: float,
     reference: Reference,
@@ -94,7 +94,7 @@ def compare(
     run = reference.run
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
-    judged = same_parts(reference, switched, pair)
+    judged = choose_same_parts(reference, switched, pair)
     end = np.inf
     if situation.latest_td > situation.td:
         end = situation.latest_td
@@ -107,7 +107,7 @@ def compare(
         pair,
         end,
         situation.settings.tolerance,
-        momenta=(run.momentum(together), _momentum(switched.run, together)),
+        momenta=(run.momentum(together), _read_momentum(switched.run, together)),
         centres=centres,
         is_reported=judged.is_reported,
         min_mean=min_mean,
@@ -118,7 +118,7 @@ def compare(
     )
 
 
-def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
+def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:
     """Return the momentum of some parts; None if the run lacks one of them or their momenta."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
@@ -164,7 +164,7 @@ def compare_runs(
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
     energies_after = switched.between(td, end)[1]
     reference_after = reference.between(td, end)[1]
-    _refuse_few(
+    _check_number_of_states(
         reference, switched, min(energies_after.size, reference_after.size), td, end
     )
     energies_before = switched.energy[switched.time < td]
@@ -172,7 +172,7 @@ def compare_runs(
     if (
         energies_before.size
         and energies_after[0] == energies_before[-1]
-        and _reported_wrong(energies_before[-1], energies_to_end[1:])
+        and _is_reported_wrong(energies_before[-1], energies_to_end[1:])
     ):
         energies_after = energies_after[1:]
         # the switch comes at the first step from td on: this state was still rigid
@@ -180,18 +180,22 @@ def compare_runs(
     frozen = float(energies_after[0])
     energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
-    if energies_before.size and _reported_wrong(energies_before[-1], energies_to_end):
+    if energies_before.size and _is_reported_wrong(
+        energies_before[-1], energies_to_end
+    ):
         reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, at td {frozen:.6g} came back"
         notes.append(f"{reported}; some solvers report rigid solid elements wrongly")
-    still = _still(reference, switched, tr, td)
-    error = _relative(*momenta, td, end)
-    rigid = _rigid_window(switched, tr, td, still)
+    still = _find_limit_of_change(reference, switched, tr, td)
+    error = _compute_relative_distance(*momenta, td, end)
+    rigid = _find_rigid_window(switched, tr, td, still)
     mean, mean_reference = float(energies_after.mean()), float(reference_after.mean())
-    objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
+    objections = [*_check_rigid_window(reference, switched, rigid, tr, td, still)]
     if is_reported:
-        objections += _not_locked_in(reference, tr, frozen, energy_td, tolerance)
+        objections += _check_locked_in_energy(
+            reference, tr, frozen, energy_td, tolerance
+        )
         if mean_reference > round_off(reference):
-            objections += _another_mean(mean / mean_reference, min_mean)
+            objections += _check_mean_energy(mean / mean_reference, min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
         moved = f"the switched run's momentum after td is off by {error:.1%}"
         objections.append(f"{moved}: its motion differs from the reference")
@@ -206,7 +210,7 @@ def compare_runs(
         spread_after=float(energies_after.std()),
         spread_after_reference=float(reference_after.std()),
         momentum_error=error,
-        displacement=_distance(*centres, td, end),
+        displacement=_compute_distance(*centres, td, end),
         rigid_from=rigid and rigid[0],
         rigid_to=rigid and rigid[1],
         objections=tuple(objections),
@@ -214,7 +218,7 @@ def compare_runs(
     )
 
 
-def _refuse_few(
+def _check_number_of_states(
     reference: History, switched: History, states: int, td: float, end: float
 ) -> None:
     """Raise RangeError if a run has too few states after td."""
@@ -230,25 +234,27 @@ def _refuse_few(
         raise RangeError(f"{name}: {states_text}; too few to compare the runs")
 
 
-def _still(reference: History, switched: History, tr: float, td: float) -> float:
+def _find_limit_of_change(
+    reference: History, switched: History, tr: float, td: float
+) -> float:
     """Return the largest change of a constant energy [energy]: small relative to the vibration, or digits."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
-    vibrates = _range(reference, tr, td)
+    vibrates = _compute_energy_range(reference, tr, td)
     rounding = round_off(reference)
     if level + vibrates <= rounding:
         return max(digits, rounding)
     return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
 
 
-def _range(history: History, start: float, end: float) -> float:
+def _compute_energy_range(history: History, start: float, end: float) -> float:
     """Return the range of the energy between two times [energy]."""
     inside = history.between(start, end)[1]
     at_ends = history.energies_at(np.array([start, end]))
     return float(np.ptp(np.append(inside, at_ends)))
 
 
-def _rigid_window(
+def _find_rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
     """Return the first and last state of constant energy around the middle of (tr, td) [time]; None without one."""
@@ -263,7 +269,7 @@ def _rigid_window(
     return float(time[first]), float(time[last])
 
 
-def _not_rigid(
+def _check_rigid_window(
     reference: History,
     switched: History,
     rigid: tuple[float, float] | None,
@@ -284,7 +290,9 @@ def _not_rigid(
         return
 
     def lasts_longer(start: float, end: float) -> bool:
-        return end - start > room and _range(reference, start, end) > limit
+        return (
+            end - start > room and _compute_energy_range(reference, start, end) > limit
+        )
 
     if (
         rigid[0] > tr + room
@@ -296,7 +304,7 @@ def _not_rigid(
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
-def _not_locked_in(
+def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
     """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
@@ -313,7 +321,7 @@ def _not_locked_in(
         yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {energy_td:.6g}"
 
 
-def _another_mean(share: float, min_mean: float) -> Iterator[str]:
+def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not min_mean <= share <= 2 - min_mean:
         mean_text = (
@@ -322,7 +330,7 @@ def _another_mean(share: float, min_mean: float) -> Iterator[str]:
         yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
 
 
-def times_of(switched: History, reference: History) -> tuple[float, float]:
+def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
     """Find tr and td of a switched run: its energy is constant between them, that of the reference run is not.
 
     Returns
@@ -347,7 +355,10 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     moving = []
     for first, last in spans:
         largest = max(rounding, 2 * limit[first : last + 1].max())
-        if _range(reference, float(time[first]), float(time[last])) > largest:
+        if (
+            _compute_energy_range(reference, float(time[first]), float(time[last]))
+            > largest
+        ):
             moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
@@ -376,7 +387,7 @@ def _explain_why_no_times(
     return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"
 
 
-def _reported_wrong(rigid: float, energies_after: Samples) -> bool:
+def _is_reported_wrong(rigid: float, energies_after: Samples) -> bool:
     """Return True if the energy reported while rigid differs from the energy at td."""
     usual = np.abs(np.diff(energies_after)).max()
     return bool(
@@ -385,11 +396,11 @@ def _reported_wrong(rigid: float, energies_after: Samples) -> bool:
     )
 
 
-def _relative(
+def _compute_relative_distance(
     reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
     """Return the largest distance between two tracks over the largest size of the reference track [-]."""
-    distance = _distance(reference, switched, td, end)
+    distance = _compute_distance(reference, switched, td, end)
     if reference is None or distance is None:
         return None
     sizes = np.linalg.norm(reference.values, axis=1)
@@ -398,7 +409,7 @@ def _relative(
     return distance / largest if largest > 0 else None
 
 
-def _distance(
+def _compute_distance(
     reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
     """Return the largest distance of the second track from the first between two times; None if one is missing.

@@ -19,8 +19,8 @@ from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
-    from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
 # Relative accuracy of vibration energies from spectral lines, swings or signs of parts [-].
@@ -43,13 +43,13 @@ class Kept(NamedTuple):
     high: float
 
 
-def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
+def bound_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
     """Return bounds of the mean energy after td for one tr; None if they are unknown."""
     if situation.at_rest:
         return Kept(1.0, 1.0)
     ratios = [
-        _ratio(candidate.energy, situation.energy_td, *energies)
-        for energies in _vibration_energies(situation)
+        _compute_mean_ratio(candidate.energy, situation.energy_td, *energies)
+        for energies in _bound_vibration_energies(situation)
     ]
     finite = [ratio for ratio in ratios if np.isfinite(ratio)]
     if not finite:
@@ -67,7 +67,7 @@ def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
     )
 
 
-def _ratio(
+def _compute_mean_ratio(
     energy_tr: float, energy_td: float, elastic_td: float, whole: float
 ) -> float:
     """Return the mean energy after td over that of the reference run [-].
@@ -81,7 +81,7 @@ def _ratio(
     return np.nan
 
 
-def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
+def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     """Return bounds of the elastic and the whole vibration energy at td, in matching pairs [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
@@ -92,10 +92,10 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
         else:
             scales = (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
         return [(scale * elastic, scale * whole) for scale in scales]
-    bounds = vibration_energy_bounds(situation)
+    bounds = bound_vibration_energy(situation)
     if bounds is None:
         return []
-    time, energy = _energies_in_flight(situation)
+    time, energy = _select_energies_in_flight(situation)
     mean = float(np.mean(energy))
     # share of the mean vibration energy of the flight that damping leaves at td
     exponents = -situation.flight.damping * (time - situation.td)
@@ -108,12 +108,12 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     ]
 
 
-def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
+def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
     """Return the smallest and largest vibration energy that can cause the fluctuations in the flight [energy].
 
     No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
     """
-    time, energy = _energies_in_flight(situation)
+    time, energy = _select_energies_in_flight(situation)
     if time.size < _FEWEST_STATES:
         return None
     since = time - time[0]
@@ -125,7 +125,7 @@ def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
     )
 
 
-def _energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
+def _select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Return times and energies of the flight, up to td if its end is unknown [time], [energy]."""
     start = situation.flight.start
     end = situation.flight.end
@@ -144,7 +144,9 @@ class Worth(NamedTuple):
     contact: float
 
 
-def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
+def compare_error_with_contact(
+    situation: Situation, candidate: Candidate
+) -> Worth | None:
     """Compare the vibration error of a pair with the next contact; None if that contact is unknown.
 
     The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
@@ -153,7 +155,7 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
     known, flight = situation.history.known, situation.flight
     contact = known.once(
         ("energy of the next contact", flight),
-        lambda: energy_of_next_contact(situation),
+        lambda: find_energy_of_next_contact(situation),
     )
     if contact is None or situation.at_rest:
         return None
@@ -164,14 +166,14 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
             compared.deformation.vibration_energy(situation.td)
         )
     else:
-        bounds = vibration_energy_bounds(situation)
+        bounds = bound_vibration_energy(situation)
         if bounds is None:
             return None
         energy = wrong_sign(0.0) ** 2 * bounds[1]
     return Worth(energy / contact, contact)
 
 
-def energy_of_next_contact(situation: Situation) -> float | None:
+def find_energy_of_next_contact(situation: Situation) -> float | None:
     """Return the energy that the next contact puts into the parts [energy]; None if no contact is seen.
 
     It is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy of

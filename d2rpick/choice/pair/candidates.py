@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
-from d2rpick.choice.warnings import POOR_RESIDUAL, Objection, objections
+from d2rpick.choice.pair.warnings import POOR_RESIDUAL, Objection, list_objections
 from d2rpick.histories.digits import round_up_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
@@ -24,7 +24,7 @@ from d2rpick.vibration.moments import Moments
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.position_error import Off
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Columns
@@ -168,7 +168,7 @@ class Judged:
             "same_swing": (turns_to_td - turns_to_tr < 2) & ~at_rest,
             "position_error": position_error,
         }
-        problems = tuple(objections(situations, place, tr, columns))
+        problems = tuple(list_objections(situations, place, tr, columns))
         return cls(situations, place, moments, columns, problems)
 
     @property
@@ -230,7 +230,7 @@ class Judged:
     @property
     def near_td(self) -> NDArray[np.bool_]:
         """True for each candidate of many modes in the last part of the flight before td, which saves little."""
-        starts = [_start_of_flight(situation) for situation in self.situations]
+        starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.place]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
@@ -290,7 +290,7 @@ class Candidates(Sequence[Candidate]):
             name: self.judged.columns[name][i].item()
             for name in ("residual", "level_error", "same_swing")
         }
-        residual = _known(values["residual"])
+        residual = _replace_nan(values["residual"])
         error = values["level_error"] if residual is None else residual
         return Pair(
             self.judged.moments.tr[i].item(),
@@ -319,7 +319,9 @@ class Candidates(Sequence[Candidate]):
             return self[i : i + 1][0]
         # The accuracy of the time is computed only for these, since it takes longer than the choice.
         reach = self.situation.vibration.reach(
-            _as_found(self.situation, self.judged.moments.at(self.order[place]))
+            _mark_given_as_matches(
+                self.situation, self.judged.moments.at(self.order[place])
+            )
         )
         return tuple(map(self._candidate, range(len(self))[place], reach.tolist()))
 
@@ -332,7 +334,8 @@ class Candidates(Sequence[Candidate]):
         judged = self.judged
         tr, kind, rising = judged.moments[i]
         values: dict[str, Any] = {
-            name: _known(column[i].item()) for name, column in judged.columns.items()
+            name: _replace_nan(column[i].item())
+            for name, column in judged.columns.items()
         }
         # True if the deformation at tr was compared with that at td
         is_compared = values["sign_match"] is not None
@@ -340,7 +343,7 @@ class Candidates(Sequence[Candidate]):
         history = situation.history
         td = situation.td
         if values["position_error"] is not None and situation.bodies:
-            values |= _position(situation.bodies.worst(tr, td))
+            values |= _describe_position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if is_compared else ()
         notes = list[str]()
@@ -352,7 +355,7 @@ class Candidates(Sequence[Candidate]):
         is_kept = residual is None or residual <= POOR_RESIDUAL
         if values["same_swing"]:
             notes.append(_SAME_SWING)
-        notes += _remarks(situation, reach, values if is_compared else {}, parts)
+        notes += _list_remarks(situation, reach, values if is_compared else {}, parts)
         level_ratio = None
         if situation.energy_td > 0 and not situation.at_rest:
             level_ratio = values["energy"] / situation.energy_td
@@ -376,17 +379,17 @@ class Candidates(Sequence[Candidate]):
         )
 
 
-def _start_of_flight(situation: Situation) -> float:
+def _get_start_of_flight(situation: Situation) -> float:
     """Return the earliest tr in the flight [time]; minus infinity if it is unknown."""
     return -np.inf if situation.earliest_tr is None else situation.earliest_tr
 
 
-def _known(value: Any) -> Any:
+def _replace_nan(value: Any) -> Any:
     """Return the value of a column, None for NaN."""
     return None if value != value else value
 
 
-def judged_of(
+def judge_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
 ) -> Iterator[Judged]:
     """Judge all level crossings before td, extrema near the level and closest matches, in time order.
@@ -400,14 +403,14 @@ def judged_of(
         batch = situations[first : first + together]
         starts = [-np.inf] * len(batch)
         if in_flight:
-            starts = [_start_of_flight(situation) for situation in batch]
+            starts = [_get_start_of_flight(situation) for situation in batch]
         moments_of_each = find_moments(
             [situation.vibration for situation in batch],
             batch[0].settings.tolerance,
             starts,
         )
         distinct = [
-            _at_start(situation) or _distinct(situation, moments)
+            _find_start_at_rest(situation) or _select_distinct(situation, moments)
             for situation, moments in zip(batch, moments_of_each, strict=True)
         ]
         yield Judged.of(batch, distinct)
@@ -415,13 +418,13 @@ def judged_of(
         together = max(1, min(_MORE * together, most // max(1, *map(len, distinct))))
 
 
-def judge(situation: Situation, times: Iterable[float]) -> Candidates:
+def judge_times(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and judge it by flight, sign and tolerance."""
     judged = Judged.of([situation], [Moments.of("given", [*times])])
     return Candidates(situation, judged, np.arange(judged.place.size))
 
 
-def _at_start(situation: Situation) -> Moments | None:
+def _find_start_at_rest(situation: Situation) -> Moments | None:
     """Return the start of a flight in which nothing vibrates, rounded up to printed digits; None if it vibrates."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
@@ -431,13 +434,15 @@ def _at_start(situation: Situation) -> Moments | None:
     return Moments.of("start", [printed if printed < situation.td else first])
 
 
-def _as_found(situation: Situation, moments: Moments) -> Moments:
+def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
     """Mark each given tr as a match if a match lies there, since its accuracy does not depend on who names it."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
         return moments
-    matches = _distinct(situation, vibration.moments(situation.settings.tolerance))
+    matches = _select_distinct(
+        situation, vibration.moments(situation.settings.tolerance)
+    )
     if not matches.are("match").any():
         return moments
     nearest = matches.at(
@@ -449,7 +454,7 @@ def _as_found(situation: Situation, moments: Moments) -> Moments:
     )
 
 
-def _distinct(situation: Situation, moments: Moments) -> Moments:
+def _select_distinct(situation: Situation, moments: Moments) -> Moments:
     """Return the moments in time order, without matches next to a crossing or an extremum."""
     matches = moments.are("match")
     if matches.any():
@@ -465,7 +470,7 @@ def _distinct(situation: Situation, moments: Moments) -> Moments:
     return moments.at(np.argsort(moments.tr, kind="stable"))
 
 
-def _remarks(
+def _list_remarks(
     situation: Situation,
     reach: float,
     measured: Mapping[str, Any],
@@ -489,7 +494,7 @@ def _remarks(
         yield "the level lies within the sampling error of an extremum"
 
 
-def _position(worst: Off | None) -> dict[str, Any]:
+def _describe_position(worst: Off | None) -> dict[str, Any]:
     """Return the fields of a candidate for the largest position error; empty if it is unknown."""
     if worst is None:
         return {}

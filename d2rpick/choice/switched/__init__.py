@@ -1,0 +1,1 @@
+"""Compare finished switched runs with their reference."""
