@@ -11,11 +11,11 @@ _Found = TypeVar("_Found")
 class CountedFits(Fits):
     """Fits of a record, with the number of results that were computed rather than remembered."""
 
-    made = 0
+    computed = 0
 
     def once(self, key: Hashable, make: Callable[[], _Found]) -> _Found:
         def counted() -> _Found:
-            self.made += 1
+            self.computed += 1
             return make()
 
         return super().once(key, counted)

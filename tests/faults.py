@@ -13,6 +13,17 @@ from hypothesis import HealthCheck, settings, strategies as st
 Item = TypeVar("Item")
 _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))
 
+FAULTS = st.lists(
+    st.tuples(
+        st.sampled_from(["flip", "cut", "drop", "double", "swap", "insert", "blank"]),
+        st.floats(0, 1),
+        st.floats(0, 1),
+        st.integers(0, 255) | st.sampled_from(b"\n 0123456789.E+-*"),
+    ),
+    min_size=1,
+    max_size=3,
+)
+
 
 def make_settings(count: int) -> settings:
     """Return hypothesis settings for this number of examples, which may be slow and large."""
@@ -45,16 +56,6 @@ def list_cuts(text: bytes) -> list[int]:
 
 # A fault: its kind, its start and its size (as shares of the file), and the byte it writes.
 Fault = tuple[str, float, float, int]
-FAULTS = st.lists(
-    st.tuples(
-        st.sampled_from(["flip", "cut", "drop", "double", "swap", "insert", "blank"]),
-        st.floats(0, 1),
-        st.floats(0, 1),
-        st.integers(0, 255) | st.sampled_from(b"\n 0123456789.E+-*"),
-    ),
-    min_size=1,
-    max_size=3,
-)
 State = tuple[
     float | None, list[float | None]
 ]  # time and energies; None for text that is not a number

@@ -10,6 +10,8 @@ import jsonschema
 
 from tests.command import run_json
 
+OF_OTHERS = Path(__file__).with_name("schemas")
+
 
 def check_by_schema(document: dict[str, Any]) -> None:
     """Validate an answer by the schema of the package that it names."""
@@ -34,9 +36,6 @@ def check_junit(text: str) -> None:
 
 def check_sarif(text: str) -> None:
     _sarif().validate(json.loads(text))
-
-
-OF_OTHERS = Path(__file__).with_name("schemas")
 
 
 @cache

@@ -35,6 +35,8 @@ _COMMANDS_INTRODUCTION: Final = (
     "quoted pattern with the files of one run ([histories](histories.md)); DECK is a main deck."
 )
 
+_SOLVERS: Final = {"ls-dyna": "LS-DYNA", "radioss": "Radioss"}
+
 
 def cell(text: str) -> str:
     """Write a text so that it fits a cell of a table."""
@@ -126,9 +128,6 @@ def rules_page() -> str:
         lines += ["\n\n".join(" ".join(text.split()) for text in paragraphs), ""]
         lines += [f"**Fix.** {' '.join(rule.fix.split())}"]
     return "\n".join(lines) + "\n"
-
-
-_SOLVERS: Final = {"ls-dyna": "LS-DYNA", "radioss": "Radioss"}
 
 
 def json_page() -> str:

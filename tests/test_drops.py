@@ -30,7 +30,7 @@ T_END, INTERVAL = 1.2, 2e-4
 BOX = Selection(parts=("box",))
 
 
-class Outcome(NamedTuple):
+class DropOutcome(NamedTuple):
     """Supported windows, and the next contact of the switched run after each [s]; None if there is none."""
 
     windows: tuple[tuple[float, float], ...]
@@ -45,7 +45,7 @@ class Outcome(NamedTuple):
         )
 
 
-def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
+def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> DropOutcome:
     """Plan a run with these parameters, and compute it switched in the supported windows."""
     with tempfile.TemporaryDirectory() as folder:
         files = write_run_files(
@@ -62,7 +62,7 @@ def compute_outcome(parameters: Parameters, interval: float = INTERVAL) -> Outco
     next_contacts = tuple(
         next((start for start, _ in contacts if start > tr), None) for tr, _ in windows
     )
-    return Outcome(windows, next_contacts)
+    return DropOutcome(windows, next_contacts)
 
 
 @pytest.mark.slow

@@ -36,6 +36,66 @@ LAYERS = (
 # The only folders that may import these libraries.
 RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for types
 
+LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
+PRINTS = re.compile(r"\b(?:print|exit|write)\(")
+SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
+# Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
+# need.
+UNNEEDED = {
+    *(
+        "pathlib",
+        "json",
+        "csv",
+        "tempfile",
+        "hashlib",
+        "array",
+        "heapq",
+        "unicodedata",
+        "logging",
+        "subprocess",
+        "xml",
+    ),
+    *(
+        "concurrent.futures",
+        "multiprocessing",
+        "shutil",
+        "tomllib",
+        "difflib",
+        "zlib",
+        "traceback",
+        "unittest",
+    ),
+    *("importlib.metadata", "importlib.resources"),
+    *(
+        "numpy.ma",
+        "numpy.typing",
+        "numpy.polynomial",
+        "numpy.random",
+        "numpy.testing",
+        "numpy.f2py",
+    ),
+}
+SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
+CARD = ("card", "--tr", "0.02", "--td", "0.09")
+# The result of each command with JSON output, and the version of its schema.
+SCHEMAS = [
+    f"schemas/{name}.json"
+    for name in (
+        *(
+            "suggest-1",
+            "explore-1",
+            "plan-1",
+            "parts-1",
+            "calibrate-1",
+            "verify-1",
+            "info-1",
+            "check-1",
+            "study-1",
+        ),
+        *("reproduce-2", "rollover-1", "drive-1"),
+    )
+]
+
 
 def name_module(path: Path) -> str:
     """Return the name of a module within the package."""
@@ -83,7 +143,6 @@ def _imports(module: str) -> Iterator[str]:
             yield from (name if name in MODULES else origin for name in inside)
 
 
-LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
 INNER = sorted(
     name for name in MODULES if name != "d2rpick"
 )  # the public names are above all layers
@@ -154,9 +213,6 @@ def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
     assert not [text for text in top if "import" in text and "validation" in text]
 
 
-PRINTS = re.compile(r"\b(?:print|exit|write)\(")
-
-
 def test_only_the_command_line_prints_and_exits() -> None:
     called = {
         (module, ast.unparse(node.func))
@@ -170,9 +226,6 @@ def test_only_the_command_line_prints_and_exits() -> None:
         for module, name in called
         if name in ("print", "exit", "sys.exit", "sys.stdout.write", "sys.stderr.write")
     }
-
-
-SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
 
 
 def list_swapped(tree: ast.Module) -> Iterator[str]:
@@ -233,46 +286,6 @@ def compute_share(modules: frozenset[str]) -> float:
     size = {name: path.stat().st_size for name, path in MODULES.items()}
     loaded = {name.removeprefix("d2rpick.") for name in modules}
     return sum(size[name] for name in loaded) / sum(size.values())
-
-
-# Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
-# need.
-UNNEEDED = {
-    *(
-        "pathlib",
-        "json",
-        "csv",
-        "tempfile",
-        "hashlib",
-        "array",
-        "heapq",
-        "unicodedata",
-        "logging",
-        "subprocess",
-        "xml",
-    ),
-    *(
-        "concurrent.futures",
-        "multiprocessing",
-        "shutil",
-        "tomllib",
-        "difflib",
-        "zlib",
-        "traceback",
-        "unittest",
-    ),
-    *("importlib.metadata", "importlib.resources"),
-    *(
-        "numpy.ma",
-        "numpy.typing",
-        "numpy.polynomial",
-        "numpy.random",
-        "numpy.testing",
-        "numpy.f2py",
-    ),
-}
-SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
-CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
 
 @pytest.mark.parametrize(
@@ -365,26 +378,6 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
 
 def test_the_command_line_offers_the_formats_of_models_there_are() -> None:
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
-
-
-# The result of each command with JSON output, and the version of its schema.
-SCHEMAS = [
-    f"schemas/{name}.json"
-    for name in (
-        *(
-            "suggest-1",
-            "explore-1",
-            "plan-1",
-            "parts-1",
-            "calibrate-1",
-            "verify-1",
-            "info-1",
-            "check-1",
-            "study-1",
-        ),
-        *("reproduce-2", "rollover-1", "drive-1"),
-    )
-]
 
 
 def test_every_schema_is_listed() -> None:

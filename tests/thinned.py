@@ -24,6 +24,21 @@ MOTION = (1, 2, 3, 4, 5, 6)  # internal and kinetic energy, momentum, mass
 CENTRES = (7, 9, 10, 11)  # hourglass energy, centre
 SILENT = (1, 3, 4, 5, 6)  # without the kinetic energy
 
+TABLES = {
+    "chain_ref": ("time_s", "x3_m", "IE_spring1_J", "IE_spring2_J", "IE_total_J"),
+    "load_L1_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
+    "load_L3_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
+    **{
+        f"oscillator_{name}_ref": ("time_s", "IE_J", "KE_J", "momentum_x", "EXTWORK_J")
+        for name in ("S1", "S2", "S4")
+    },
+    **{
+        f"oscillator_{name}": ("time_s", "IE_J")
+        for name in ("ref", "d2r_13_64", "d2r_6_80", "d2r_13p587_68p753")
+    },
+    "rollover_r20": ("time_s", "boxIE_J"),
+}
+
 
 class Thinned(NamedTuple):
     """Selection of the states and variables of a time history that are kept."""
@@ -47,20 +62,6 @@ RUNS = {
     "car_drop/switched/car_heavy_T03": Thinned(2, 0.17),
     "car_drop/drop2T01": Thinned(2, codes=SILENT),
     **{f"car_drop/switched/drop2_w123_T0{leg}": Thinned(2) for leg in range(1, 7)},
-}
-TABLES = {
-    "chain_ref": ("time_s", "x3_m", "IE_spring1_J", "IE_spring2_J", "IE_total_J"),
-    "load_L1_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
-    "load_L3_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
-    **{
-        f"oscillator_{name}_ref": ("time_s", "IE_J", "KE_J", "momentum_x", "EXTWORK_J")
-        for name in ("S1", "S2", "S4")
-    },
-    **{
-        f"oscillator_{name}": ("time_s", "IE_J")
-        for name in ("ref", "d2r_13_64", "d2r_6_80", "d2r_13p587_68p753")
-    },
-    "rollover_r20": ("time_s", "boxIE_J"),
 }
 
 

@@ -1,6 +1,6 @@
-"""Hold a switched run against the reference, by their time histories: ``python -m validation.compare --help``.
+"""Compare a switched run with its reference by their time histories: ``python -m validation.compare --help``.
 
-The internal energy from td to the next landing, and when the contacts begin.
+Compared are the internal energy from td to the next landing, and the times at which contacts begin.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# A contact has begun when its energy has changed by this share of its range since the state before.
+# A contact has begun when its energy has changed by this share of its range since the previous state.
 _CONTACT = 1e-4
-# Below this share of the highest energy of the run it is round-off, as in a free fall.
+# Below this share of the highest energy of the run, an energy is round-off, as in a free fall.
 _ROUNDING = 1e-9
-# Changes that follow each other within this time belong to one contact [s]: the corners of a shell rattle.
+# Changes within this time of each other belong to one contact [s], because the corners of a shell chatter.
 _SAME_CONTACT = 5e-3
 
 
@@ -45,7 +45,7 @@ class Run(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A switched run against its reference from td on.
+    """Differences of a switched run from its reference after td.
 
     ``deviation``: largest difference of the internal energy over its peak in the reference; ``mean_ratio``: of the mean
     energies; both up to ``landing``, the next contact, or the end, None where there is no energy.  ``shifts`` of the
@@ -59,7 +59,7 @@ class Comparison(NamedTuple):
 
 
 def read(names: Sequence[str]) -> Run:
-    """Read the legs of a run."""
+    """Read the restart segments of a run."""
     (database,) = open_run(names, Selection()).databases
     return Run(
         database.time,
@@ -68,7 +68,7 @@ def read(names: Sequence[str]) -> Run:
 
 
 def compare(reference: Run, switched: Run, td: float) -> Comparison:
-    """Hold a switched run against its reference."""
+    """Compare a switched run with its reference."""
     theirs, ours = (
         [time for time in run.contacts() if time > td] for run in (reference, switched)
     )

@@ -1,7 +1,7 @@
-"""Hold driven runs against their reference, with OpenRadioss: ``python -m validation.driven FOLDER [NAME...]``.
+"""Compare driven runs with their reference, by OpenRadioss: ``python -m validation.driven FOLDER [NAME...]``.
 
-What is not in FOLDER yet is computed: the reference, the run that switches itself.  Without OPENRADIOSS_PATH it is
-skipped.  Exit code 1 when a goal is missed.
+Missing results in FOLDER are computed: the reference, and the run that switches itself.  Without OPENRADIOSS_PATH
+nothing is computed.  The exit code is 1 if a goal is missed.
 """
 
 from __future__ import annotations
@@ -33,13 +33,17 @@ if TYPE_CHECKING:
     from d2rpick.api.drives import Drive
     from d2rpick.running.sequence import Leg, Window
 
+_MOST: Final = 1.03  # of the processor time of the reference, whatever a run does
+TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
+_AFTER: Final = 2e-4  # behind td the body is looked at [s]
+
 
 class Goal(NamedTuple):
-    """At most: shift of a landing [s], place [m] and angle [degrees] of the body at td, share of the processor time.
+    """Upper limits: shift of a landing [s], position [m] and angle [degrees] of the body at td, share of CPU time.
 
-    ``energy`` is the least mean energy from td to the landing, of the reference [-].  These hold for the first
-    ``flights`` of the reference: a box that bounces is another run after some, whatever is switched.  ``nodes``: so
-    many of the nodes that are watched, the first ones, are those of the body.
+    ``energy`` is the least mean energy from td to the landing over that of the reference [-].  The limits hold for the
+    first ``flights`` of the reference: after some bounces, any change makes a box fly differently.  ``nodes`` is the
+    number of watched nodes, the first ones, that belong to the body.
     """
 
     landing: float
@@ -53,18 +57,15 @@ class Goal(NamedTuple):
 
 _CAR: Final = Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.78, 2, 12)
 _BOX: Final = Goal(2e-3, 8e-3, np.inf, 0.70, 0.60, 3, 8)
-_MOST: Final = 1.03  # of the processor time of the reference, whatever a run does
 GOALS: Final = {
     name: _CAR if name.startswith("CAR") else _BOX
     for name in MODELS
     if name.startswith(("CAR", "DROP"))
 }
-TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
-_AFTER: Final = 2e-4  # behind td the body is looked at [s]
 
 
 def drive_model(name: str, folder: Path) -> Drive:
-    """Drive a model to its end, or give what an earlier call has."""
+    """Drive a model to its end, or return the result of an earlier call."""
     model, deck = MODELS[name], folder / "deck"
     deck.mkdir(parents=True, exist_ok=True)
     (deck / f"{name}_0000.rad").write_bytes(model.deck())
@@ -77,7 +78,7 @@ def drive_model(name: str, folder: Path) -> Drive:
 
 
 def compute_reference(name: str, folder: Path, solver: Path) -> list[str]:
-    """Compute a model without switching, unless that is done."""
+    """Compute the reference run of a model, unless that is done."""
     done = folder / "reference" / f"{name}T01"
     return (
         [str(done)]
@@ -89,7 +90,7 @@ def compute_reference(name: str, folder: Path, solver: Path) -> list[str]:
 def locate_nodes(
     names: Sequence[str], deck: Path, count: int, time: float
 ) -> NDArray[np.float64]:
-    """Where the first nodes that are watched are at a time, shape (count, 3) [m]."""
+    """Return the positions of the first watched nodes at a time, shape (count, 3) [m]."""
     text = deck.read_text()
     lines = text.partition("\n/TH/NODE/")[2].partition("\n/TH/")[0].splitlines()[3:]
     wanted = [int(line[:10]) for line in lines]
@@ -122,7 +123,7 @@ def _read_history(name: str) -> TimeHistory:
 def compute_angle(
     first_positions: NDArray[np.float64], second_positions: NDArray[np.float64]
 ) -> float:
-    """Angle between two places (n, 3) of a body [degrees]."""
+    """Return the angle between two positions (n, 3) of a body [degrees]."""
     left_vectors, _, right_vectors = np.linalg.svd(
         (first_positions - first_positions.mean(axis=0)).T
         @ (second_positions - second_positions.mean(axis=0))
@@ -141,7 +142,7 @@ def compute_angle(
 def measure_model(
     name: str, folder: Path, solver: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
-    """Give what is measured, its value, its limit, and whether it is within that."""
+    """Yield the name of each measure, its value, its limit, and True if it is within the limit."""
     goal, run_driven, names = (
         GOALS[name],
         drive_model(name, folder),
@@ -188,7 +189,7 @@ def measure_model(
 
 
 def _measure_cost(leg: Leg, until: float) -> float:
-    """Processor time of a leg, up to a time if it is deformable [s]."""
+    """Return the processor time of a restart segment, up to a time if it is deformable [s]."""
     cost_before = until - leg.order.start
     return (
         0.0
@@ -232,7 +233,7 @@ def _measure_window(
 
 
 def is_refused(name: str, folder: Path) -> bool:
-    """Whether a wait below half of a period that the deck tells is refused."""
+    """Return True if a wait below half of a period in the deck is refused."""
     try:
         Driving(
             str(folder / "deck" / f"{name}_0000.rad"), folder, print, wait=TOO_SHORT
@@ -243,7 +244,7 @@ def is_refused(name: str, folder: Path) -> bool:
 
 
 def main() -> int:
-    """Print each figure with its goal; give the exit code."""
+    """Print each figure with its goal; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m validation.driven", description=__doc__
     )

@@ -1,4 +1,4 @@
-"""The figures of docs/explanation/validation.md, from the results: ``python -m validation.figures``."""
+"""Draw the figures of docs/explanation/validation.md from the results: ``python -m validation.figures``."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _ABSORBS: Final = 0.05  # least share of the rise of the total energy in a part 
 
 
 def read_results(name: str) -> NDArray[Any]:
-    """Read a table of results; empty cells are nan."""
+    """Read a table of results; empty cells are NaN."""
     return np.genfromtxt(
         RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
     )
 
 
 def draw_oscillators() -> Figure:
-    """Residuals that were predicted beside those of the solver, for one and for two modes."""
+    """Draw predicted residuals beside those of the solver, for one and for two modes."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     left_axes, right_axes = figure.subplots(1, 2)
     left_axes.bar(
@@ -88,7 +88,7 @@ def draw_oscillators() -> Figure:
 
 
 def draw_rollover() -> Figure:
-    """Roll at td and mean energy after td of the shell box, against tr."""
+    """Draw roll at td and mean energy after td of the shell box against tr."""
     rows = np.sort(read_results("rollover_scan"), order="tr_s")
     tr = 1e3 * rows["tr_s"]
     figure = Figure(figsize=(10, 4.2), layout="constrained")
@@ -117,7 +117,7 @@ def draw_rollover() -> Figure:
 
 
 def draw_car() -> Figure:
-    """Angle at td and mean energy of the car, against tr and against the level."""
+    """Draw angle at td and mean energy of the car, against tr and against the level."""
     rows = read_results("car_runs")
     rows = np.sort(rows[np.char.startswith(rows["run"], "car_a")], order="tr_s")
     tr = 1e3 * rows["tr_s"]
@@ -163,7 +163,7 @@ def draw_car() -> Figure:
 
 
 def drop() -> Figure:
-    """How far the contacts of the falling box move, run by run."""
+    """Draw how far the contacts of the falling box move, for each run."""
     rows = read_results("drop2_runs")
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -185,14 +185,14 @@ def drop() -> Figure:
 
 
 def find_absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
-    """Tell which rows of the vibration table are parts that take a fair share of the energy of the landing."""
+    """Return which rows of the vibration table are parts that absorb a relevant share of the landing energy."""
     total = {row["case"]: row["rise_J"] for row in rows if row["energy"] == "total"}
     shares = rows["rise_J"] / [total[case] for case in rows["case"]]
     return np.asarray((rows["energy"] != "total") & (shares >= _ABSORBS))
 
 
 def draw_vibration() -> Figure:
-    """Residuals by all nodes against the predicted ones, and what differs after the landing against the worth."""
+    """Draw residuals of all nodes against predicted ones, and differences after the landing against their estimate."""
     rows = read_results("vibration")
     switched = rows[~np.isnan(rows["tr_s"])]
     absorbing = find_absorbing_parts(switched)

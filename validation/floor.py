@@ -31,7 +31,7 @@ TD: Final = {"OSC": 0.068753, "CAR": 0.1464, "DROP2": 0.277}
 _AXES: Final = ("x", "y", "z")
 
 
-class Motion(NamedTuple):
+class RunMotion(NamedTuple):
     """Momentum vector (n, 3) and internal energy (n,) of a model over time (n,)."""
 
     time: Samples
@@ -50,16 +50,16 @@ class Floor(NamedTuple):
     energy_rms: float
 
 
-def read_motion(names: Sequence[str]) -> Motion:
+def read_motion(names: Sequence[str]) -> RunMotion:
     """Read the motion of a run from its time histories."""
     (database,) = open_run(names, Selection()).databases
     momentum = [database.channel(f"{axis}_momentum") for axis in _AXES]
     energy = database.channel("internal_energy")
-    return Motion(database.time, np.column_stack(momentum), energy)
+    return RunMotion(database.time, np.column_stack(momentum), energy)
 
 
 def compare_motions(
-    name: str, scale: float, reference: Motion, perturbed: Motion
+    name: str, scale: float, reference: RunMotion, perturbed: RunMotion
 ) -> Floor:
     """Compare two motions at the states of the reference after td."""
     later = reference.time > TD[name]

@@ -1,9 +1,9 @@
 """Deck of a frame that is pushed, flies, vibrates in several modes and lands on its feet (SI units).
 
-Twelve beams join eight corners.  Every corner carries a plate of dense shells, one of them a heavier plate, so that no
-two modes are alike.  Square tubes of shells under the lower corners are the feet.  A force pushes an upper corner
-askew; then nothing acts until the feet meet the ground.  All parts but the ground are one rigid body, which stays
-deactivated until the switch.
+Twelve beams join eight corners.  Every corner carries a plate of dense shells; one plate is heavier, so that all modes
+differ.  Square tubes of shells under the lower corners are the feet.  A force pushes an upper corner obliquely; then
+nothing acts until the feet meet the ground.  All parts except the ground are one rigid body, which is deactivated until
+the switch.
 """
 
 from __future__ import annotations
@@ -47,34 +47,6 @@ _PUSH_TIME: Final = 4e-3  # half a sine [s]
 _GAP: Final = 1e-3  # of the contact [m]
 _GROUND_SIDE: Final = 2.4  # [m]
 
-
-@dataclass(frozen=True)
-class Landing:
-    """How the frame meets the ground: its speed towards it [m/s], and when it would meet it unpushed [s]."""
-
-    speed: float = 5.0
-    time: float = 0.135
-
-
-class Part(NamedTuple):
-    """A part of the model: title, kind of element, number of the property and of the material."""
-
-    title: str
-    kind: str
-    property: int
-    material: int
-
-
-_PARTS: Final = (
-    Part(PARTS[0], "BEAM", 1, 1),
-    Part(PARTS[1], "SHELL", 2, 2),
-    Part(PARTS[2], "SHELL", 3, 2),
-    Part(PARTS[3], "SHELL", 4, 1),
-    Part("ground", "SHELL", 5, 3),
-)
-_BEAMS, _PLATES, _HEAVY, _FEET, _GROUND = range(len(_PARTS))
-
-
 _HEAD: Final = f"""#RADIOSS STARTER
 /BEGIN
 {NAME}
@@ -83,7 +55,6 @@ _HEAD: Final = f"""#RADIOSS STARTER
                   kg                   m                   s
 /TITLE
 frame with heavy corners"""
-
 _PLASTIC: Final = """/MAT/PLAS_JOHNS/{number}
 {title}
 {density:20.10g}
@@ -109,7 +80,6 @@ _MATERIALS: Final = "\n".join(
         _ELASTIC.format(number=3, title="ground", density=7850, modulus=2.1e11),
     )
 )
-
 _BEAM: Final = """/PROP/BEAM/{number}
 beam
                    0
@@ -131,7 +101,6 @@ _PROPERTIES: Final = "\n".join(
         _SHELL.format(number=5, formulation=1, layers=1, thickness=0.010),
     )
 )
-
 _START: Final = """/INIVEL/TRA/1
 thrown
                    0                   0{speed:20.10g}         4         0
@@ -157,9 +126,36 @@ frame to ground
          0         0                   0         2         0         0                   0         0"""
 
 
+@dataclass(frozen=True)
+class Landing:
+    """Landing of the frame: its speed towards the ground [m/s], and when it would land without the push [s]."""
+
+    speed: float = 5.0
+    time: float = 0.135
+
+
+class Part(NamedTuple):
+    """Part of the model: title, kind of element, property number and material number."""
+
+    title: str
+    kind: str
+    property: int
+    material: int
+
+
+_PARTS: Final = (
+    Part(PARTS[0], "BEAM", 1, 1),
+    Part(PARTS[1], "SHELL", 2, 2),
+    Part(PARTS[2], "SHELL", 3, 2),
+    Part(PARTS[3], "SHELL", 4, 1),
+    Part("ground", "SHELL", 5, 3),
+)
+_BEAMS, _PLATES, _HEAVY, _FEET, _GROUND = range(len(_PARTS))
+
+
 @dataclass
 class Mesh:
-    """Nodes by their places, and the elements of each part as lists of node numbers."""
+    """Nodes by position, and the elements of each part as lists of node numbers."""
 
     places: list[Place] = field(default_factory=list)
     elements: list[list[list[int]]] = field(
@@ -168,7 +164,7 @@ class Mesh:
     _numbers: dict[Place, int] = field(default_factory=dict)
 
     def node(self, position: Iterable[float]) -> int:
-        """Give the number of the node at a place, a new one if there is none."""
+        """Return the number of the node at a position; add the node if there is none."""
         x, y, z = (round(float(value), 7) + 0.0 for value in position)
         if (x, y, z) not in self._numbers:
             self.places.append((x, y, z))
@@ -176,7 +172,7 @@ class Mesh:
         return self._numbers[x, y, z]
 
     def add_beam(self, start: Reals, end: Reals, side_vector: Reals) -> None:
-        """Add the elements of a beam; the node ``beside`` it orients its section."""
+        """Add the elements of a beam, whose section is oriented by a node in the direction of ``side_vector``."""
         stations = (
             start + share * (end - start)
             for share in np.linspace(0, 1, _BEAM_PIECES + 1)
@@ -197,7 +193,7 @@ class Mesh:
 
 
 def mesh_frame() -> Mesh:
-    """Give the frame without the ground, its lower corners at z = 0."""
+    """Return the frame without the ground; its lower corners are at z = 0."""
     mesh = Mesh()
     corners = [np.array(ends) for ends in product((0, 1), repeat=3)]
     axes = np.eye(3, dtype=int)
@@ -229,12 +225,12 @@ def _add_foot(mesh: Mesh, top: Reals) -> None:
 
 
 def _list_points(axis: int, values: Reals) -> Line:
-    """Give points along an axis."""
+    """Return points along an axis."""
     return [value * np.eye(3)[axis] for value in values]
 
 
 def write_deck(landing: Landing) -> str:
-    """Give the starter deck of the frame; its histories hold the motion of all nodes of the frame."""
+    """Return the starter deck of the frame; its histories contain the motion of all nodes of the frame."""
     mesh = mesh_frame()
     frame = range(1, len(mesh.places) + 1)
     sides = np.linspace(-_GROUND_SIDE / 2, _GROUND_SIDE / 2, 9)

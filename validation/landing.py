@@ -1,8 +1,8 @@
-"""What differs after the landing between a switched run and its reference.
+"""Differences after the landing between a switched run and its reference.
 
-States are too far apart to tell when a contact begins.  So the runs are aligned near their first contacts after td,
-where the sums of their energies differ least.  Energies are in shares of the rise of the same energy in the reference,
-from before the landing to its peak; ``total`` is the sum over the parts.
+States are too far apart to show when a contact begins.  So the runs are aligned near their first contacts after td,
+where the sums of their energies differ least.  Energies are relative to the rise of the same energy in the reference,
+from before the landing to its peak; ``total`` is the sum of the parts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TOTAL: Final = "total"
 
 
 class EnergyDifference(NamedTuple):
-    """Differences of an internal energy after the landing, in shares of its rise in the reference [-].
+    """Differences of an internal energy after the landing, relative to its rise in the reference [-].
 
     ``rms`` over the time, of the highest values (``peak``) and of the means at the end (``final``).  ``rise`` [energy].
     """
@@ -47,7 +47,7 @@ class EnergyDifference(NamedTuple):
 
 
 class LandingDifference(NamedTuple):
-    """Differences after the landing: energies of parts and their ``total``, and what the contact does.
+    """Differences after the landing: energies of the parts and their ``total``, and the effect of the contact.
 
     ``shift`` of the landing [s]; ``impulse`` of the difference over that of the reference [-]; the centre of mass at
     the end is out of ``place`` [length] and the structure is ``turned`` [degrees].
@@ -61,7 +61,7 @@ class LandingDifference(NamedTuple):
 
 
 class Course(NamedTuple):
-    """A run from its landing on: energies of parts (n, parts) and of before, impulse (3,), places at the end."""
+    """Run from its landing on: energies of parts (n, parts) and before it, impulse (3,), positions at the end."""
 
     landing: float
     energies: Reals
@@ -71,7 +71,7 @@ class Course(NamedTuple):
 
 
 class Record:
-    """Histories of the switched parts of a run, and when its landing begins, the first contact after td [time]."""
+    """Histories of the switched parts of a run, and the start of its landing: the first contact after td [time]."""
 
     def __init__(self, legs: Sequence[Path], parts: Sequence[str], td: float) -> None:
         names = [str(leg) for leg in sorted(legs)]
@@ -83,7 +83,7 @@ class Record:
         self.landing = min(time for time in read(names).contacts() if time > td)
 
     def energies(self, times: Reals | float) -> Reals:
-        """Internal energies of the parts and their total at some times, shape (..., parts + 1) [energy]."""
+        """Return the internal energies of the parts and their total at some times, shape (..., parts + 1) [energy]."""
         energies = np.stack(
             [
                 np.interp(times, self._database.time, column)
@@ -107,7 +107,7 @@ class Record:
         self.landing += float(_ALIGNED[np.argmin(misfits)])
 
     def course(self, nodes: Nodes, since: Reals) -> Course:
-        """Give the run at some times since its landing."""
+        """Return the run at some times since its landing."""
         end, start = self.landing + float(since[-1]), self.landing - _BEFORE
         motion = interpolate(
             read_motion(self._legs, nodes, end - _BEFORE, end + _BEFORE),

@@ -1,4 +1,4 @@
-"""The models: a deck each, the rigid body that switches it, and the reference run."""
+"""Models of the validation: a deck, the rigid body that switches it, and the reference run."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _PRINT: Final = -2000  # cycles between two lines of the listing
 
 @dataclass(frozen=True)
 class Model:
-    """A deck ``name``_0000.rad.gz whose switched parts are one rigid body with the main node ``main``.
+    """Model with the deck ``name``_0000.rad.gz, whose switched parts are one rigid body with main node ``main``.
 
-    The run ends at ``t_end`` and writes its time history each ``interval`` [s].  While rigid the step is capped at
-    ``cap`` [s]: with nothing left that is deformable it would grow without limit.  ``begin`` are further lines of the
-    first leg.  ``scale`` is the share of the stable step of the elements that the solver takes.
+    The run ends at ``t_end`` and writes its time history each ``interval`` [s].  While it is rigid, the time step is
+    capped at ``cap`` [s], because without deformable elements it would grow without limit.  ``begin`` are further lines
+    of the first engine file.  ``scale`` is the solver's share of the stable time step.
     """
 
     name: str
@@ -33,11 +33,11 @@ class Model:
     scale: float = 0.9
 
     def deck(self) -> bytes:
-        """Give the starter deck."""
+        """Return the starter deck."""
         return gzip.decompress((DECKS / f"{self.name}_0000.rad.gz").read_bytes())
 
     def legs(self, windows: Sequence[tuple[float, float]]) -> Iterator[str]:
-        """Give the engine files of a run that is rigid in ``windows`` (tr, td) [s], in order."""
+        """Yield the engine files of a run that is rigid in ``windows`` (tr, td) [s], in order."""
         bounds = [
             (0.0, False),
             *(

@@ -1,6 +1,6 @@
-"""Motion of all nodes of a run, and how far the vibration of a switched run is off (R, correlation).
+"""Motion of all nodes of a run, and the error of the vibration of a switched run (R, correlation).
 
-A deck writes the motion of nodes by its first card /TH/NODE, six columns each: DX, DY, DZ, VX, VY and VZ.
+A deck writes the motion of nodes by its first card /TH/NODE, in six columns each: DX, DY, DZ, VX, VY and VZ.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ _NUMBER = 4  # bytes
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """The nodes whose motion a deck writes: places (nodes, 3) [length] and masses (nodes,) [mass]."""
+    """Nodes whose motion a deck writes: positions (nodes, 3) [length] and masses (nodes,) [mass]."""
 
     places: Reals
     masses: Reals
 
     def centre(self, positions: Reals) -> Reals:
-        """Centre of mass of the nodes at some places (..., nodes, 3)."""
+        """Return the centre of mass of the nodes at some positions (..., nodes, 3)."""
         return np.asarray(
             np.einsum("n,...nx->...x", self.masses, positions) / self.masses.sum()
         )
 
 
 class Motion(NamedTuple):
-    """Times (n,), places and velocities of all nodes (n, nodes, 3)."""
+    """Times (n,), positions and velocities of all nodes (n, nodes, 3)."""
 
     time: Reals
     places: Reals
@@ -52,7 +52,7 @@ class Motion(NamedTuple):
 
 
 class VibrationError(NamedTuple):
-    """How far the vibration of a switched run is off, by the velocities of all nodes less the rigid motion.
+    """Error of the vibration of a switched run, from the velocities of all nodes less the rigid motion.
 
     ``residual`` is the root of the kinetic energy of the difference over that of the reference [-]; ``correlation`` is
     the mean product of the velocities, weighted by mass, over the root of the product of both kinetic energies [-].
@@ -63,10 +63,10 @@ class VibrationError(NamedTuple):
 
 
 def read_nodes(deck: Path) -> Nodes:
-    """Read the nodes that a starter deck writes.
+    """Read the nodes whose motion a starter deck writes.
 
-    The mass of a part is shared by its elements as their sizes are, alike if these are springs, and the mass of an
-    element by its nodes.
+    The mass of a part is distributed to its elements by size (equally for springs), and the mass of an element to its
+    nodes equally.
     """
     inventory = read_inventory(str(deck))
     of_parts = compute_masses_and_steps(inventory)
@@ -147,7 +147,7 @@ def compare_vibration(
 
 
 def interpolate(motion: Motion, times: Reals) -> Motion:
-    """Give a motion at other times, which lie between its own."""
+    """Return a motion at other times, which are between its own."""
     next_state = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
     share = (times - motion.time[next_state - 1]) / (
         motion.time[next_state] - motion.time[next_state - 1]
@@ -161,7 +161,7 @@ def interpolate(motion: Motion, times: Reals) -> Motion:
 
 
 def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
-    """Give the velocities (n, nodes, 3) less those of the rigid body with the same momenta, linear and angular."""
+    """Return the velocities (n, nodes, 3) less those of the rigid body with the same linear and angular momentum."""
     arms = motion.places - nodes.centre(motion.places)[:, np.newaxis]
     moving = motion.velocities - nodes.centre(motion.velocities)[:, np.newaxis]
     angular = np.einsum("n,tnx->tx", nodes.masses, np.cross(arms, moving))
@@ -175,6 +175,6 @@ def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
 
 
 def compute_vibration_energy(motion: Motion, nodes: Nodes) -> float:
-    """Mean energy of the vibration [energy]: twice its kinetic energy, as far as the times cover whole periods."""
+    """Return the mean energy of the vibration [energy]: twice the kinetic energy, if the times cover whole periods."""
     moving = remove_rigid_motion(motion, nodes)
     return float(np.einsum("n,tnx,tnx->", nodes.masses, moving, moving) / len(moving))

@@ -1,6 +1,6 @@
 """Run a model with OpenRadioss, switched or not: ``python -m validation.run OSC FOLDER --window 0.013587 0.068753``.
 
-OPENRADIOSS_PATH names the folder of the solver; its starter and engine lie in ``bin`` or ``exec`` under it.
+OPENRADIOSS_PATH names the folder of the solver; its starter and engine are in the subfolder ``bin`` or ``exec``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _PROGRAMS = {
 
 
 def main() -> None:
-    """Write deck and legs, run them, say which files came out."""
+    """Write deck and engine files, run them, and print the names of the time histories."""
     parser = argparse.ArgumentParser(
         prog="python -m validation.run", description=__doc__
     )
@@ -46,7 +46,7 @@ def main() -> None:
 def run(
     model: Model, folder: Path, windows: list[tuple[float, float]], solver: Path
 ) -> list[Path]:
-    """Run a model in ``folder``, rigid in ``windows``; give its time histories, one for each leg."""
+    """Run a model in ``folder``, rigid in ``windows``; return its time histories, one for each engine file."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{model.name}_0000.rad").write_bytes(model.deck())
     legs = [
@@ -75,7 +75,7 @@ def run(
 
 
 def _call(solver: Path, program_kind: str, folder: Path, *options: str) -> None:
-    """Call starter or engine in ``folder``, its words in a log there."""
+    """Run starter or engine in ``folder``; write its output to a log there."""
     programs = [
         solver / name for name in _PROGRAMS[program_kind] if (solver / name).exists()
     ]

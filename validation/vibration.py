@@ -1,9 +1,9 @@
-"""Switch at pairs with a predicted residual, and see what differs: ``python -m validation.vibration FOLDER [CASE...]``.
+"""Switch at pairs with a predicted residual, and compare: ``python -m validation.vibration FOLDER [CASE...]``.
 
-A case is a model with a landing after td.  Its reference, the same with a smaller step and a run for each pair are
-computed unless FOLDER has them.  The velocities of all nodes from td to the landing give the residual and the
-correlation; what differs after the landing is printed with what the vibration error is worth: R^2 H over the rise of
-the internal energy.  Without OPENRADIOSS_PATH it is skipped.
+A case is a model with a landing after td.  Its reference, a reference with a smaller time step and a run for each pair
+are computed unless FOLDER contains them.  The velocities of all nodes from td to the landing give the residual and the
+correlation.  Differences after the landing are printed with their estimate from the vibration error: R^2 H over the
+rise of the internal energy.  Without OPENRADIOSS_PATH nothing is computed.
 """
 
 from __future__ import annotations
@@ -57,72 +57,6 @@ _THINNED: Final = 4  # every so many states are written to a csv history
 _GROUP_OF_BODY: Final = (60, 70)  # columns of the group in the card of a rigid body
 _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
 
-
-@dataclass(frozen=True)
-class Frame(Model):
-    """The frame of `frame_deck` with the speed at which it lands."""
-
-    landing: Landing = field(default_factory=Landing)
-
-    def deck(self) -> bytes:
-        """Give the starter deck."""
-        return write_deck(self.landing).encode()
-
-
-@dataclass(frozen=True)
-class AllNodes(Model):
-    """A stored deck whose rigid body holds the nodes of a ``group``; its histories hold the motion of them all."""
-
-    group: int = 0
-
-    def deck(self) -> bytes:
-        """Give the starter deck."""
-        text = super().deck().decode()
-        text_before, text_after = text.split("/TH/NODE/1\n")
-        tail = text_after[text_after.index("/TH/PART/") :]
-        nodes = (
-            text.partition(f"/GRNOD/NODE/{self.group}\n")[2]
-            .partition("\n/")[0]
-            .split("\n", 1)[1]
-            .split()
-        )
-        watched = "".join(
-            f"{int(node):10d}{0:10d}node {node}\n"
-            for node in nodes
-            if int(node) != self.main
-        )
-        variables = "DX        DY        DZ        VX        VY        VZ"
-        return f"{self._switch_group(text_before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{tail}".encode()
-
-    def _switch_group(self, text: str) -> str:
-        """Let the first rigid body hold the group."""
-        head, body = text.split("/RBODY/1\n")
-        title, card, further = body.split("\n", 2)
-        start, end = _GROUP_OF_BODY
-        return f"{head}/RBODY/1\n{title}\n{card[:start]}{self.group:10d}{card[end:]}\n{further}"
-
-
-class Case(NamedTuple):
-    """A model, the parts that are switched, the pairs, and times [s].
-
-    It flies from ``flight_start`` to the landing; what differs is compared for the time ``after_landing``.
-    """
-
-    model: Model
-    parts: tuple[str, ...]
-    pairs: tuple[Pair, ...]
-    flight_start: float
-    after_landing: float
-
-
-def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
-    """Give a stored model that switches a group of nodes and writes their motion each ``interval`` [s]."""
-    model = MODELS[name]
-    return AllNodes(
-        name, model.what, model.main, model.t_end, interval, model.cap, group=group
-    )
-
-
 _ROLL_PAIRS: Final = (
     (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
 )  # fmt: skip
@@ -148,10 +82,80 @@ _FRAME_STARTS: Final = (
     0.024125,
 )
 _FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
+_COLUMNS: Final = (
+    "case", "tr_s", "td_s", "R_predicted", "R_high", "mean_energy_low", "mean_energy_high",
+    "R_nodes", "correlation", "mean_energy", "worth", "shift_s", "impulse", "place_m",
+    "turned_deg", "energy", "rise_J", "rms", "peak", "final",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Frame(Model):
+    """Frame of `frame_deck` with its landing speed."""
+
+    landing: Landing = field(default_factory=Landing)
+
+    def deck(self) -> bytes:
+        """Return the starter deck."""
+        return write_deck(self.landing).encode()
+
+
+@dataclass(frozen=True)
+class AllNodes(Model):
+    """Stored deck whose rigid body contains the nodes of a ``group``; its histories hold their motion."""
+
+    group: int = 0
+
+    def deck(self) -> bytes:
+        """Return the starter deck."""
+        text = super().deck().decode()
+        text_before, text_after = text.split("/TH/NODE/1\n")
+        tail = text_after[text_after.index("/TH/PART/") :]
+        nodes = (
+            text.partition(f"/GRNOD/NODE/{self.group}\n")[2]
+            .partition("\n/")[0]
+            .split("\n", 1)[1]
+            .split()
+        )
+        watched = "".join(
+            f"{int(node):10d}{0:10d}node {node}\n"
+            for node in nodes
+            if int(node) != self.main
+        )
+        variables = "DX        DY        DZ        VX        VY        VZ"
+        return f"{self._switch_group(text_before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{tail}".encode()
+
+    def _switch_group(self, text: str) -> str:
+        """Make the first rigid body contain the group."""
+        head, body = text.split("/RBODY/1\n")
+        title, card, further = body.split("\n", 2)
+        start, end = _GROUP_OF_BODY
+        return f"{head}/RBODY/1\n{title}\n{card[:start]}{self.group:10d}{card[end:]}\n{further}"
+
+
+class Case(NamedTuple):
+    """Model, switched parts, pairs, and times [s].
+
+    It flies from ``flight_start`` to the landing; the runs are compared for the time ``after_landing``.
+    """
+
+    model: Model
+    parts: tuple[str, ...]
+    pairs: tuple[Pair, ...]
+    flight_start: float
+    after_landing: float
+
+
+def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
+    """Return a stored model that switches a group of nodes and writes their motion each ``interval`` [s]."""
+    model = MODELS[name]
+    return AllNodes(
+        name, model.what, model.main, model.t_end, interval, model.cap, group=group
+    )
 
 
 def _make_frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
-    """Give the frame with a speed of landing [m/s]; the ground lies where the frame lands at the same time."""
+    """Return the frame with a landing speed [m/s]; the ground is placed so that the frame lands at the same time."""
     landing = Landing(speed, _LANDING + _REACH / speed)
     model = Frame(
         frame_deck.NAME,
@@ -189,7 +193,7 @@ CASES: Final = {
 
 
 class Prediction(NamedTuple):
-    """What d2rpick says of a pair from the reference alone, None if it does not know [-].
+    """Prediction of d2rpick for a pair, from the reference alone; None if unknown [-].
 
     ``residual`` and its upper bound, bounds of the mean energy from td to the landing over that of the reference.
     """
@@ -201,7 +205,7 @@ class Prediction(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What came out of a pair, or of the smaller step, which has neither pair nor vibration.
+    """Result for a pair, or for the smaller time step, which has neither pair nor vibration.
 
     ``mean_energy`` from td to the landing is over that of the reference [-].
     ``worth`` is R^2 H over the rise of the internal energy at the landing, with the residual R of the nodes [-].
@@ -217,7 +221,7 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Reference:
-    """The run of a case without switching, and what its switched runs are compared with."""
+    """Reference run of a case, with which its switched runs are compared."""
 
     case: Case
     legs: list[Path]
@@ -225,7 +229,7 @@ class Reference:
     history: Path
 
     def compare_scatter(self, legs: Sequence[Path]) -> Row:
-        """Compare a run that is not switched either."""
+        """Compare the reference with a run that is not switched either."""
         landing = self._compare_landings(legs, self.case.pairs[0][1])
         return Row(None, Prediction(), None, None, 0.0, landing)
 
@@ -258,7 +262,7 @@ class Reference:
         )
 
     def record(self, td: float) -> Record:
-        """Give the histories of the reference with its landing after td [s]."""
+        """Return the histories of the reference with its landing after td [s]."""
         return Record(self.legs, self.case.parts, td)
 
     def write_history(self) -> None:
@@ -290,7 +294,7 @@ class Reference:
 
 
 def compute_study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
-    """Compute what is missing in a folder; give a row for the smaller step, then one for each pair.
+    """Compute missing runs of a case in a folder; yield a row for the smaller time step, then one for each pair.
 
     The energies and momenta of the reference are written to ``reference.csv`` in the folder.
     """
@@ -310,7 +314,7 @@ def compute_study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
 
 
 def predict(history: Path, tr: float, td: float) -> Prediction:
-    """Give what d2rpick finds of a pair in the history of the reference."""
+    """Return the prediction of d2rpick for a pair from the history of the reference."""
     verdict = d2rpick.verify(d2rpick.read(history), tr=tr, td=td).to_dict()
     return Prediction(**{name: verdict[name] for name in Prediction._fields})
 
@@ -318,7 +322,7 @@ def predict(history: Path, tr: float, td: float) -> Prediction:
 def compute(
     model: Model, folder: Path, windows: list[Pair], solver: Path
 ) -> list[Path]:
-    """Run a model unless its folder has a finished run; give its time histories."""
+    """Run a model unless its folder contains a finished run; return its time histories."""
     done = folder / "done"
     if not done.exists():
         run(model, folder, windows, solver)
@@ -326,15 +330,8 @@ def compute(
     return sorted(folder.glob(f"{model.name}T[0-9][0-9]"))
 
 
-_COLUMNS: Final = (
-    "case", "tr_s", "td_s", "R_predicted", "R_high", "mean_energy_low", "mean_energy_high",
-    "R_nodes", "correlation", "mean_energy", "worth", "shift_s", "impulse", "place_m",
-    "turned_deg", "energy", "rise_J", "rms", "peak", "final",
-)  # fmt: skip
-
-
 def list_cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
-    """Give the lines of a row in the table of results, one for each energy."""
+    """Yield the lines of a row in the table of results, one for each energy."""
     pair, vibration = row.pair or (None, None), row.vibration or (None, None)
     shared = (
         name,

@@ -104,9 +104,9 @@ def explore(
     run : Run
         As `read` gives it, without switching.
     td : float, optional
-        Explored too, and what others are compared with [time].
+        A td to explore too, with which the others are compared [time].
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight; where none is seen but td is named, the record.
+        Range of td [time].  Default: the longest flight; if there is none but td is given, the record.
     steps : int
         Number of evenly spaced td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing

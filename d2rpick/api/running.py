@@ -44,14 +44,15 @@ def first(
     deck : path
         Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
     output_dir : path
-        Another folder than that of the deck; made where it does not exist.
+        A folder other than that of the deck; created if it does not exist.
     parts : int, str or sequence of these, optional
-        Numbers and ranges of the parts to switch.  Default: Radioss, those of the bodies that the engine file puts off.
+        Ids and id ranges of the parts to switch.  Default (Radioss): the parts of the rigid bodies that the engine file
+        deactivates.
     wait : float, optional
         Time without force that counts as flight [time].  Default: half of the longest inner period, by masses and
         springs of the deck.
     after : float, optional
-        Nothing becomes rigid before [time].
+        Earliest time at which parts become rigid [time].
     overwrite : bool
         Replace files that exist.
 
@@ -111,13 +112,13 @@ def follow(
     run : path
         Folder, T01, glstat, matsum or binout, or a pattern for these, which need not be there yet.
     parts : int, str or sequence of these, optional
-        That are to be switched.
+        The parts to switch.
     wait : float, optional
         Time without a force that counts as flight [time].  Default: half of the longest inner period that is known.
     deck : path, optional
         Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.
     lasting : float, optional
-        For so long [s]; 0: what there is now.  Default: until the run has ended.
+        Duration [s]; 0: only the events so far.  Default: until the run has ended.
 
     Returns
     -------

@@ -189,7 +189,7 @@ def read(
     Parameters
     ----------
     source : path, several, or an open binary file
-        A file, a folder, a glob, the legs of a run, companions of different formats; a string is one path.
+        A file, a folder, a glob, the restart segments of a run, companion files in other formats; a string is one path.
     time, energy : str or int, optional
         Columns, labels or HDF5 paths, by name or 1-based number; several energies are added.
     channels : mapping, optional

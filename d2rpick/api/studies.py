@@ -91,7 +91,7 @@ def study(
     td : float, optional
         When the parts are switched back [time].
     td_window : (float, float), optional
-        Instead of ``td``: where each run chooses its own [time]; without both, in its longest flight.
+        Instead of ``td``: the range in which each run chooses its own td [time]; without both, its longest flight.
     parts, flying, **choosing
         As for `suggest`.
     time, energy, channels, input_format

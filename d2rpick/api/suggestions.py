@@ -181,16 +181,16 @@ def suggest(
     td : float
         When the parts are switched back [time].
     td_window : (float, float)
-        Instead of ``td``: where to choose it [time]; without both, in the longest flight.
+        Instead of ``td``: the range in which td is chosen [time]; without both, the longest flight.
     parts : number, title or several, optional
         The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
         ``"all"`` all that have energy.
     flying : number, title or several, optional
         What flies together with them.
     deck : path, optional
-        Main deck of the run: tells what the parts cost, which are springs, which rigid bodies they become, and the
-        parts of ``"recommended"``.  Without it they are taken for one body: ``position_error_assumes`` of a candidate.
-        Default: the only main deck in the folder that was read; False for none.
+        Main deck of the run: it defines the cost of the parts, the springs, the rigid bodies, and the parts of
+        ``"recommended"``.  Without it the parts are assumed to become one rigid body, see ``position_error_assumes`` of
+        a candidate.  Default: the only main deck in the folder that was read; False for none.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing

@@ -55,6 +55,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.vibration.span import Fits
 
+# Number of pairs at other peaks that may fail the full examination before the search is given up.
+_MOST_REFUSED = 3
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PairVerdict(AnswerAtTd):
@@ -176,10 +179,6 @@ def _check_order(tr: float, td: float) -> None:
         raise RangeError(
             f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td"
         )
-
-
-# Number of pairs at other peaks that may fail the full examination before the search is given up.
-_MOST_REFUSED = 3
 
 
 class AcceptableWindow(NamedTuple):

@@ -50,6 +50,17 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 # Codes of warnings that do not concern parts whose own momentum shows a free flight.
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
+_UNRELIABLE: Final = "do not rely on the internal energy"
+# Criteria of a run that blew up: within 5 % of the record its kinetic energy exceeds all earlier energy by 9 orders of
+# magnitude, the internal energy times 1e6 is still smaller, and the internal energy grows by a factor of 1000. A load
+# on a body at rest deforms it while moving it; a velocity given to the whole body does not deform it.
+_WITHIN: Final = 1 / 20
+_GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
+# Number of earlier states with energy that are needed: the first states of a body at rest contain round-off or 0.
+_FEWEST: Final = 12
+# Energies below this are none in any unit: those of LS-DYNA start at 2e-20 per process.
+_NOTHING: Final = 1e-20
+
 
 class Health(NamedTuple):
     """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if not written.
@@ -176,7 +187,6 @@ def _is_unbalanced(health: Health) -> bool:
     )
 
 
-_UNRELIABLE: Final = "do not rely on the internal energy"
 # Code of each warning, the condition for it, and its text.
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
@@ -314,17 +324,6 @@ def _measure_window(
     if work is not None:
         fields["window_work"] = work / locked
     return fields
-
-
-# Criteria of a run that blew up: within 5 % of the record its kinetic energy exceeds all earlier energy by 9 orders of
-# magnitude, the internal energy times 1e6 is still smaller, and the internal energy grows by a factor of 1000. A load
-# on a body at rest deforms it while moving it; a velocity given to the whole body does not deform it.
-_WITHIN: Final = 1 / 20
-_GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# Number of earlier states with energy that are needed: the first states of a body at rest contain round-off or 0.
-_FEWEST: Final = 12
-# Energies below this are none in any unit: those of LS-DYNA start at 2e-20 per process.
-_NOTHING: Final = 1e-20
 
 
 def refuse_unsound(

@@ -306,7 +306,9 @@ def _find_implied_format(name: str) -> str | None:
         ctx.get_parameter_source("output_format")
         is not click.core.ParameterSource.DEFAULT
     )
-    if is_given or "write_as" in ctx.params:  # the name of a history decides itself
+    if (
+        is_given or "write_as" in ctx.params
+    ):  # `extract` derives the format from the file name itself
         return None
     form = next(
         (form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None

@@ -121,7 +121,7 @@ _HISTORY: Final = row(
     Field(
         "format",
         "text",
-        get=lambda run: " + ".join(one.format for one in run.databases),
+        get=lambda run: " + ".join(database.format for database in run.databases),
     ),
     Field("notes", "texts"),
 )

@@ -31,6 +31,26 @@ _PROCESSES = 25
 _POINTS = 1_000_000
 _ROUNDS = 5
 
+SEARCHES = (
+    ("no window", ("suggest",), 3.0),
+    ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
+    ("explore", ("explore", "--steps", "200"), 10.0),
+)
+# No flight is seen: each td looks at windows of its own, down to short ones.
+UNSEEN = (
+    *SEARCHES[1:2],
+    ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0),
+)
+STARTS = (
+    *(
+        (("info", f"sample_data/rollover_box{kind}"), 1.5)
+        for kind in (".binout", ".matsum", "T01")
+    ),
+    (("info", "sample_data/rollover_box.h5"), 1.6),  # h5py alone takes 1.33
+    (("plan", "sample_data/energy.csv"), 2.0),
+    (("explore", "sample_data/energy.csv", "--td", "0.064"), 2.5),
+)
+
 
 def process_ratio(
     libraries: str, *args: str, env: Mapping[str, str] | None = None
@@ -139,25 +159,6 @@ class Row(NamedTuple):
     least: float | None = None
 
 
-SEARCHES = (
-    ("no window", ("suggest",), 3.0),
-    ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
-    ("explore", ("explore", "--steps", "200"), 10.0),
-)
-# No flight is seen: each td looks at windows of its own, down to short ones.
-UNSEEN = (
-    *SEARCHES[1:2],
-    ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0),
-)
-STARTS = (
-    *(
-        (("info", f"sample_data/rollover_box{kind}"), 1.5)
-        for kind in (".binout", ".matsum", "T01")
-    ),
-    (("info", "sample_data/rollover_box.h5"), 1.6),  # h5py alone takes 1.33
-    (("plan", "sample_data/energy.csv"), 2.0),
-    (("explore", "sample_data/energy.csv", "--td", "0.064"), 2.5),
-)
 # Ceilings of what somebody waits for at the screen, in processor seconds [s].
 WAITS = (
     *(

@@ -35,6 +35,8 @@ LITTLE, LONG = 0.01, 0.1
 FORMS: Final = ("parts", "momenta", "totals")
 PARTS: Final = tuple(Part(number, f"mass {number}") for number in (1, 2, 3))
 
+TIME: Final = np.linspace(0, 1, STATES + 1)
+
 
 class Flown(NamedTuple):
     """One record: (states,), momenta (states, 3, 2), energies, and the ``force`` beside gravity, (states, 2)."""
@@ -44,9 +46,6 @@ class Flown(NamedTuple):
     internal: Samples
     force: Samples
     masses: Samples
-
-
-TIME: Final = np.linspace(0, 1, STATES + 1)
 
 
 def compute_runs(

@@ -51,7 +51,7 @@ GRAVITY: Final = 9.81
 OTHER_GRAVITIES: Final = (1.62, 3.71, 8.87, 24.8, 49.05)
 
 
-class Load(NamedTuple):
+class LastingLoad(NamedTuple):
     """Forces on ``count`` chains: ``force`` (n, 3, 2) of time, masses (n, 3), positions and velocities (n, 3, 2).
 
     If ``falling``, half of the chains fall on earth.
@@ -61,7 +61,7 @@ class Load(NamedTuple):
     falling: bool = True
 
 
-def friction(random: np.random.Generator, count: int) -> Load:
+def friction(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw dry friction of the ground, a constant deceleration of all masses or of the first."""
     size = 10 ** random.uniform(-1, 1.3, (count, 1, 1))
     only_first = random.random((count, 1)) < 1 / 3
@@ -74,10 +74,10 @@ def friction(random: np.random.Generator, count: int) -> Load:
         speed = np.linalg.norm(velocity, axis=2, keepdims=True)
         return np.asarray(-size * carried * velocity / np.maximum(speed, 0.01))
 
-    return Load(force, falling=False)
+    return LastingLoad(force, falling=False)
 
 
-def drag(random: np.random.Generator, count: int) -> Load:
+def drag(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw drag by the square of the speed, on one or two masses."""
     size, on_first = (
         10 ** random.uniform(-2.5, 0, (count, 1, 1)),
@@ -90,10 +90,10 @@ def drag(random: np.random.Generator, count: int) -> Load:
         speed = np.linalg.norm(velocity, axis=2, keepdims=True)
         return np.asarray(-size * whole * shares / 5 * speed * velocity)
 
-    return Load(force)
+    return LastingLoad(force)
 
 
-def late_contact(random: np.random.Generator, count: int) -> Load:
+def late_contact(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw a light contact of the first mass late in the record."""
     start, length = (
         random.uniform(0.4, 0.85, count),
@@ -107,10 +107,10 @@ def late_contact(random: np.random.Generator, count: int) -> Load:
         ] * along
         return apply_to_first(pushed)
 
-    return Load(force)
+    return LastingLoad(force)
 
 
-def airbag(random: np.random.Generator, count: int) -> Load:
+def airbag(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw a pressure that rises at once and leaks away."""
     start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
     size, along = 10 ** random.uniform(-0.5, 1.5, count), draw_directions(random, count)
@@ -122,10 +122,10 @@ def airbag(random: np.random.Generator, count: int) -> Load:
             (size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along
         )
 
-    return Load(force)
+    return LastingLoad(force)
 
 
-def rope(random: np.random.Generator, count: int) -> Load:
+def rope(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw a rope to the ground that is slack up to its length."""
     length, pull = (
         random.uniform(0.3, 3, (count, 1)),
@@ -139,10 +139,10 @@ def rope(random: np.random.Generator, count: int) -> Load:
             -pull * stretched * positions[:, 0] / np.maximum(distance, 1e-9)
         )
 
-    return Load(force)
+    return LastingLoad(force)
 
 
-def couple(random: np.random.Generator, count: int) -> Load:
+def couple(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw two opposite forces on two masses, which change no momentum."""
     start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
     size, along = 10 ** random.uniform(-1, 1, count), draw_directions(random, count)
@@ -153,10 +153,10 @@ def couple(random: np.random.Generator, count: int) -> Load:
         ] * along
         return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
 
-    return Load(force)
+    return LastingLoad(force)
 
 
-def other_gravity(random: np.random.Generator, count: int) -> Load:
+def other_gravity(random: np.random.Generator, count: int) -> LastingLoad:
     """Draw the gravity of another planet, which no file distinguishes from a load without a deck."""
     size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
 
@@ -168,7 +168,7 @@ def other_gravity(random: np.random.Generator, count: int) -> Load:
             * np.ones_like(positions)
         )
 
-    return Load(force, falling=False)
+    return LastingLoad(force, falling=False)
 
 
 CLASSES: Final = {
@@ -177,7 +177,9 @@ CLASSES: Final = {
 }
 
 
-def compute_runs(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
+def compute_runs(
+    random: np.random.Generator, count: int, load: LastingLoad
+) -> Iterator[Run]:
     """Integrate ``count`` chains that are pushed and then fly, except for their load.
 
     Every other chain has a single spring and moves along x: one oscillator describes its energy.

@@ -39,6 +39,20 @@ _EARLY: Final = 0.01
 # Rounding of times in the file, and the search of the oracle.
 _ROUNDING: Final = 1e-3
 
+_NUMBERS: Final = (
+    "td_asked",
+    "oracle",
+    "flight_start",
+    "flight_end",
+    "seconds",
+    "tr",
+    "td",
+    "true",
+    "residual",
+    "low",
+    "high",
+)
+
 
 class Pair(NamedTuple):
     """Recommended pair: true residual, stated residual and band (if any), grade and basis."""
@@ -74,21 +88,6 @@ class Trial(NamedTuple):
     flight_end: float | None = None
     error: str = ""
     seconds: float = 0.0
-
-
-_NUMBERS: Final = (
-    "td_asked",
-    "oracle",
-    "flight_start",
-    "flight_end",
-    "seconds",
-    "tr",
-    "td",
-    "true",
-    "residual",
-    "low",
-    "high",
-)
 
 
 def tabulate(name: str, trials: Sequence[Trial]) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Linear structures, whose motion is known in closed form: modes with a damping of their own, behind any loads."""
+"""Linear structures with closed-form motion: individually damped modes under any loads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Load(NamedTuple):
 
     @property
     def end(self) -> float:
-        """When the force has ceased [time]."""
+        """Time at which the force has ended [time]."""
         return self.start + self.duration
 
     def evaluate(self, time: Samples) -> Samples:
@@ -101,7 +101,7 @@ class Modes(NamedTuple):
         return points, np.linalg.norm(vibration, axis=1)
 
     def release(self, time: Samples) -> Samples:
-        """Return the points of runs that start at rest with the deformation of these times, shape (n, d)."""
+        """Return the points of runs that start at rest with the deformation at these times, shape (n, d)."""
         deformation, velocity = self._project(*self.compute_states(time))
         return np.hstack([deformation, np.zeros_like(velocity)])
 

@@ -68,7 +68,7 @@ class Motion(NamedTuple):
         return float(np.sqrt(stiffness @ lack / (stiffness @ whole)))
 
 
-class Record(NamedTuple):
+class PartsRecord(NamedTuple):
     """History, settings, td range (of width 0 for one td), and the true motion."""
 
     history: History
@@ -156,7 +156,7 @@ CLASSES: Final = {
 }
 
 
-def draw_records(kind: str, seed: int, number: int) -> Iterator[Record]:
+def draw_records(kind: str, seed: int, number: int) -> Iterator[PartsRecord]:
     """Yield random records of a class: 4 to 14 slow periods, 20 to 150 states per fast period, some with noise."""
     for record_number in range(number):
         rng = np.random.default_rng([seed, list(CLASSES).index(kind), record_number])
@@ -175,7 +175,7 @@ def draw_records(kind: str, seed: int, number: int) -> Iterator[Record]:
         ).reshape(energies.shape)
         first = float(time[-1] * rng.uniform(0.4, 0.9))
         last = float(time[-1] * 0.95) if rng.uniform() < 0.5 else first
-        yield Record(
+        yield PartsRecord(
             make_history_of_parts(time, energies),
             Settings(after=0.0),
             (first, last),
@@ -192,7 +192,7 @@ def make_history_of_parts(time: Samples, energies: Samples) -> History:
     )  # fmt: skip
 
 
-def recommend_pair(record: Record) -> Pair | None:
+def recommend_pair(record: PartsRecord) -> Pair | None:
     """Ask for a pair; return None if none is recommended."""
     first, last = record.window
     ask = (

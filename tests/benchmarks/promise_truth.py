@@ -1,4 +1,4 @@
-"""The true error R of any pair, and the least that a flight allows.
+"""The true error R of any pair, and the least error that a flight allows.
 
 The state of a vibration is a point in a space whose squared lengths are energies.  The switched run starts at td with
 the deformation of tr, at rest; R is its distance from the reference run there, over the size of the vibration.
@@ -24,7 +24,7 @@ _VALLEYS: Final = 12
 
 
 class Vibration(Protocol):
-    """A motion that is known at any time, as points in the energy norm; all times are in its own unit."""
+    """Motion known at any time, as points in the energy norm; all times are in its own unit."""
 
     @property
     def most_times(self) -> int:

@@ -38,6 +38,18 @@ from tests.reading import read_solved
 
 PLAIN = Settings()
 
+LIMITS = st.none() | st.floats(0.0, 1.2)
+OPTIONS = st.builds(
+    Settings,
+    after=st.none() | st.floats(2.0, 5.0),
+    margin=st.sampled_from([0.0, 0.1]),
+    tolerance=st.floats(0.0, 1.0),
+    max_kinetic_share=LIMITS,
+    max_residual=LIMITS,
+    replay=st.booleans(),
+)
+BOX = Selection(parts=("box",))
+
 
 @pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
@@ -171,7 +183,7 @@ def test_verify_measures_what_suggest_measures() -> None:
     assert judged.admissible
     assert not judged.verified
     assert judged.decision.verdict == "do not use"
-    assert judged.td_ok is False  # a kinetic share of 0.92
+    assert judged.td_ok is False  # the kinetic fraction is 0.92
 
 
 def make_ringing_history() -> History:
@@ -200,18 +212,6 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
         assert (judged.tr_low, judged.tr_high) == pytest.approx(
             (remark_row.tr_low, remark_row.tr_high), rel=1e-9
         )
-
-
-LIMITS = st.none() | st.floats(0.0, 1.2)
-OPTIONS = st.builds(
-    Settings,
-    after=st.none() | st.floats(2.0, 5.0),
-    margin=st.sampled_from([0.0, 0.1]),
-    tolerance=st.floats(0.0, 1.0),
-    max_kinetic_share=LIMITS,
-    max_residual=LIMITS,
-    replay=st.booleans(),
-)
 
 
 @st.composite
@@ -305,13 +305,10 @@ def test_too_few_states_per_period_recommend_nothing() -> None:
     history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     answer = suggest_in_history(
         history, 8.0, Settings()
-    )  # six states in each period of the energy
+    )  # 6 states in each period of the energy
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
     assert any("states per period" in note for note in answer.candidates[0].notes)
-
-
-BOX = Selection(parts=("box",))
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:
@@ -326,7 +323,7 @@ def test_the_health_of_the_run_comes_with_every_answer() -> None:
     assert in_window.health is not None
     assert (
         suggest_in_run(read_reference([ENERGY]), 0.064, PLAIN).health is None
-    )  # a table of two columns tells nothing of it
+    )  # a table of two columns contains no momentum
 
 
 def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
@@ -338,7 +335,7 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
     assert of_whole.parts == of_box.parts
     assert of_whole.chosen == tuple(range(len(require(of_whole.parts))))
     assert [require(of_whole.parts)[i].title for i in of_box.chosen] == ["box"]
-    assert of_whole.values is of_box.values  # read once
+    assert of_whole.values is of_box.values  # the file is read once
 
 
 def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
@@ -349,7 +346,7 @@ def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     reference, fits = read_reference([T01], BOX), CountedFits()
     box = suggest_in_run(reference, 0.37, PLAIN, fits=fits)
-    fits_made = fits.made
+    fits_made = fits.computed
     assert fits_made > 0
     judge = partial(verify_run, reference, settings=PLAIN, earlier=box.situation)
     assert print_judged_card(
@@ -358,4 +355,4 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
         judge,
         CardRequest("ls-dyna"),
     )
-    assert fits.made == fits_made
+    assert fits.computed == fits_made

@@ -44,6 +44,20 @@ TR, TD = 0.0135867, 0.0687534
 VERIFY = ("verify", "--no-verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
 LEGS = locate_stored("rollover_r100_T0*.gz")
 
+RIGHT = ("--part", "box", BOX, "--switched", LEGS)
+AT_20 = (
+    "--energy",
+    "boxIE_J",
+    ROLLOVER,
+    "--switched",
+    locate_stored("rollover_r20.csv.gz"),
+)
+SWITCHES = ("--tr", str(TR), "--td", str(TD))
+TIME: Samples = np.linspace(0.0, 1.0, 101)
+NONE = (None, None)
+LONG: Samples = np.linspace(0.0, 1.0, 1001)
+CAR_TR, CAR_TD = 0.0496, 0.1464
+
 
 def scan(run_name: str) -> dict[str, float]:
     """Return a row of the table with the results of the solver's switched runs."""
@@ -52,7 +66,7 @@ def scan(run_name: str) -> dict[str, float]:
         delimiter=",",
         names=True,
         dtype=None,
-        encoding="utf-8",  # older versions of numpy take bytes, with a warning
+        encoding="utf-8",  # older numpy returns bytes and warns
     )
     assert table.dtype.names
     (row,) = table[table["run"].astype(str) == run_name]
@@ -68,15 +82,15 @@ def verify_rollover(*options: str) -> dict[str, Any]:
 
 
 def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> None:
-    reference, expected = verify_rollover(), scan("r100")
-    check_by_schema(reference)
-    switched = reference["switched"]
+    verdict, expected = verify_rollover(), scan("r100")
+    check_by_schema(verdict)
+    switched = verdict["switched"]
     assert [name[-6:] for name in switched["source"]] == ["T01.gz", "T02.gz", "T03.gz"]
     assert switched["energy_frozen"] == pytest.approx(expected["IEfrozen_J"], rel=1e-5)
-    # between two of every tenth state; of all of them 1.7492
+    # Interpolated between every tenth state; between all states it is 1.7492.
     assert switched["energy_td"] == pytest.approx(1.7515, abs=1e-4)
     assert switched["level_ratio"] == switched["energy_frozen"] / switched["energy_td"]
-    # that table's means reach to 380 ms and were taken of every tenth state; contact is at 381.9 ms
+    # The means of the table reach to 380 ms and use every tenth state; the contact is at 381.9 ms.
     assert switched["mean_after"] == pytest.approx(
         expected["IEmean_td_to_380ms_J"], rel=0.01
     )
@@ -84,26 +98,25 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
         expected["IEmean_ref_J"], rel=0.06
     )
     assert switched["spread_after"] < switched["spread_after_reference"]
-    assert switched["end"] == pytest.approx(0.3819, abs=5e-4)  # a state each 0.5 ms
+    assert switched["end"] == pytest.approx(0.3819, abs=5e-4)  # one state each 0.5 ms
     assert switched["momentum_error"] < 1e-6
-    # of the centre at td, in mm; the largest distance afterwards is no smaller
+    # Distance of the centre at td [mm]; the largest distance afterwards is no smaller.
     at_td = np.hypot(expected["dx_td_mm"], expected["dz_td_mm"]) / 1e3
     assert switched["displacement"] == pytest.approx(at_td, rel=0.15)
     assert switched["notes"] == []
 
 
 def test_a_mean_energy_that_is_another_one_is_an_objection() -> None:
-    reference, expected = verify_rollover(), scan("r100")
+    verdict, expected = verify_rollover(), scan("r100")
     share = (
-        reference["switched"]["mean_after"]
-        / reference["switched"]["mean_after_reference"]
+        verdict["switched"]["mean_after"] / verdict["switched"]["mean_after_reference"]
     )
     assert share == pytest.approx(
         expected["IEmean_td_to_380ms_J"] / expected["IEmean_ref_J"], rel=0.06
     )
     assert share < 0.7
-    assert not reference["verified"]
-    (reason,) = reference["switched"]["objections"]
+    assert not verdict["verified"]
+    (reason,) = verdict["switched"]["objections"]
     assert (
         f"{share:.2g} times that of the reference, 0.7 to 1.3 were expected" in reason
     )
@@ -178,16 +191,6 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
     assert result.exit_code == 1
 
 
-RIGHT = ("--part", "box", BOX, "--switched", LEGS)
-AT_20 = (
-    "--energy",
-    "boxIE_J",
-    ROLLOVER,
-    "--switched",
-    locate_stored("rollover_r20.csv.gz"),
-)
-
-
 @pytest.mark.parametrize(
     ("tr", "td", "runs", "message"),
     [
@@ -204,7 +207,7 @@ AT_20 = (
             "0.37",
             (*RIGHT[:-1], BOX),
             "does not stand still",
-        ),  # it was never rigid
+        ),  # this run was never rigid
         ("0.02", "0.37", AT_20, "locked in, 11.1"),
     ],
 )
@@ -235,7 +238,7 @@ def test_the_option_is_repeated_for_further_files_of_the_switched_run() -> None:
     assert document["history"]["source"] == [BOX]
 
 
-# The floating oscillator of the paper, computed by a solver, as tables without momentum.
+# The floating oscillator of the paper, computed by a solver and written as tables without momentum.
 
 
 @pytest.mark.parametrize(
@@ -275,9 +278,7 @@ def test_a_switched_table_is_compared_by_its_energy(
     assert switched["notes"] == []
 
 
-# The closed form, written as a solver would.
-
-SWITCHES = ("--tr", str(TR), "--td", str(TD))
+# The closed form, written in the format of a solver.
 
 
 @pytest.fixture
@@ -476,9 +477,6 @@ def test_a_switched_run_that_lacks_a_part_that_flies_has_no_momentum_to_compare(
 
 # The comparison itself.
 
-TIME: Samples = np.linspace(0.0, 1.0, 101)
-NONE = (None, None)
-
 
 def make_history(energy: Samples, time: Samples = TIME, name: str = "run") -> History:
     return History(time, energy, source=(name,), format="csv", channel="E")
@@ -526,7 +524,7 @@ def test_what_has_come_to_rest_is_not_off_by_its_noise() -> None:
 @pytest.mark.parametrize(
     ("momenta", "error"),
     [
-        # before td and at its first state it does not count
+        # states before td, and the first state at td, are not compared
         ((track(0 * TIME + 10), track(np.where(TIME <= 0.5, 0.0, 10.0))), 0),
         (NONE, None), ((track(TIME), None), None), ((None, track(TIME)), None),
         ((track(0 * TIME), track(TIME)), None),
@@ -568,9 +566,6 @@ def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
         ).level_ratio
         is None
     )
-
-
-LONG: Samples = np.linspace(0.0, 1.0, 1001)
 
 
 def make_crushed_energy(vibration: float) -> Samples:
@@ -666,9 +661,6 @@ def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
     for option in ("-o", "--report"):
         assert "this is an input" in run(*arguments, option, str(file)).stderr
     assert file.read_bytes() == content_before
-
-
-CAR_TR, CAR_TD = 0.0496, 0.1464
 
 
 def list_legs(run: str) -> list[str]:

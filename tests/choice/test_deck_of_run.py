@@ -39,6 +39,38 @@ from tests.sample_deck import DECK
 
 TD = ("--td", "0.0687534")
 
+ASKED = {
+    "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
+    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
+    "explore": (
+        "--td-window",
+        "0.3",
+        "0.37",
+        "--steps",
+        "2",
+        "--part",
+        "all",
+        "--no-verify",
+    ),
+    "plan": ("--part", "all", "--no-verify"),
+    "parts": ("--part", "all"),
+}
+# Parts with the numbers of the box under other titles; and with its titles under other numbers.
+OTHER = {
+    "titles": DECK.read_text("utf-8")
+    .replace("\nbox\n", "\nfloor\n")
+    .replace("\nstep\n", "\nrail\n"),
+    "numbers": f"*KEYWORD\n*INCLUDE_TRANSFORM\n{DECK}\n{0:10d}{0:10d}{10:10d}\n*END\n",
+}
+TIME = np.linspace(0.0, 1.0, 1001)
+PARTS = (Part(1, "body"), Part(2, "other"))
+PUSH = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
+PLAIN = Settings(replay=False)
+HELD = (
+    "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
+)
+MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         X         0         0         1\n"
+
 
 def place_example(folder: Path, example: Example) -> str:
     return write(folder, example.deck, example.files, example.name)
@@ -78,7 +110,7 @@ def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
         ("plan",),
         ("parts",),
     ):
-        if args[0] != "parts":  # which asks for parts with energies
+        if args[0] != "parts":  # parts requires energies of parts
             assert list_warnings(*args, "--deck", deck, ENERGY)[code] == deck_message
     assert list_doubts(place_example(tmp_path, RULES[rule].passing[0])) == {}
 
@@ -135,7 +167,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
     for rule, expected in (
         ("D2R406", 1),
         ("D2R408", 0),
-    ):  # the latter's deck has a wheel whose main node is 1809
+    ):  # the deck of the other run has a wheel with main node 1809
         example = RULES[rule].failing[0]
         files = {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n"}
         deck = write(tmp_path, example.deck, files, example.name)
@@ -159,7 +191,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
         assert [leg.count("1809") for leg in legs] == [1] * len(legs)
 
 
-# An engine that reports wrong energies.
+# Engine versions that report wrong energies.
 
 
 @pytest.mark.slow
@@ -191,11 +223,13 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(
             "CAR_0002.out: built in 2025" in list_warnings(*args)["engine-wrong-energy"]
         ), args
     codes = [warning["code"] for warning in run_json("plan", history)["warnings"]]
-    assert codes.count("engine-wrong-energy") == 1  # however many flights there are
+    assert (
+        codes.count("engine-wrong-energy") == 1
+    )  # one warning for any number of flights
     assert "engine-wrong-energy" not in list_warnings("suggest", *TD, ENERGY)
 
 
-# Bodies that no leg switches.
+# Bodies that no engine file switches.
 
 
 @pytest.mark.parametrize(
@@ -221,35 +255,7 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     listed = run_json("check", deck, "--history", history, "--select", "D2R408,D2R409")[
         "findings"
     ]
-    assert [
-        f"{listed_message['rule']} {listed_message['severity']}"
-        for listed_message in listed
-    ] == found
-
-
-ASKED = {
-    "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
-    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
-    "explore": (
-        "--td-window",
-        "0.3",
-        "0.37",
-        "--steps",
-        "2",
-        "--part",
-        "all",
-        "--no-verify",
-    ),
-    "plan": ("--part", "all", "--no-verify"),
-    "parts": ("--part", "all"),
-}
-# Parts with the numbers of the box under other titles; and with its titles under other numbers.
-OTHER = {
-    "titles": DECK.read_text("utf-8")
-    .replace("\nbox\n", "\nfloor\n")
-    .replace("\nstep\n", "\nrail\n"),
-    "numbers": f"*KEYWORD\n*INCLUDE_TRANSFORM\n{DECK}\n{0:10d}{0:10d}{10:10d}\n*END\n",
-}
+    assert [f"{finding['rule']} {finding['severity']}" for finding in listed] == found
 
 
 @pytest.fixture(params=OTHER)
@@ -257,8 +263,8 @@ def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return str(put(tmp_path / "main.k", OTHER[request.param]))
 
 
-def list_messages(message_words: dict[str, Any]) -> dict[str, Any]:
-    return {**message_words, "command": None, "warnings": None}
+def drop_warnings(document: dict[str, Any]) -> dict[str, Any]:
+    return {**document, "command": None, "warnings": None}
 
 
 @pytest.mark.slow
@@ -267,7 +273,7 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     args = command, *ASKED[command], "--deck", foreign, MATSUM
     without = command, *ASKED[command], MATSUM
     document, plain = run_json(*args), run_json(*without)
-    assert list_messages(document) == list_messages(plain)
+    assert drop_warnings(document) == drop_warnings(plain)
     assert list_warning_codes(document) == list_warning_codes(plain) | {
         "deck-of-another-model"
     }
@@ -310,7 +316,7 @@ def test_the_library_leaves_it_out_too(foreign: str) -> None:
         d2.suggest(d2.read(MATSUM), **arguments, deck=foreign),
         d2.suggest(d2.read(MATSUM), **arguments),
     )
-    assert list_messages(suggestion.to_dict()) == list_messages(without.to_dict())
+    assert drop_warnings(suggestion.to_dict()) == drop_warnings(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:
@@ -364,14 +370,6 @@ def test_titles_are_compared_without_letters_that_files_encode_in_different_ways
     )
 
 
-TIME = np.linspace(0.0, 1.0, 1001)
-PARTS = (Part(1, "body"), Part(2, "other"))
-PUSH = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
-PLAIN = Settings(replay=False)
-HELD = (
-    "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
-)
-MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         X         0         0         1\n"
 MOVED += f"{0:20d}{1:20d}{0:20d}{{stop:20g}}\n"
 
 
@@ -419,7 +417,7 @@ def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
     assert find_flight_around(make_falling_momenta(0.0, make_gravity(0.0)), 0.6)
     assert find_flight_around(
         make_falling_momenta(0.0, make_gravity(0.0, 9.81)), 0.6
-    )  # it acts for a time only
+    )  # it acts for a limited time only
     assert (
         find_flight_around(make_falling_momenta(0.0, make_gravity(9.81)), 0.6) is None
     )
@@ -531,7 +529,7 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
         d2.suggest(reference, parts=options[1:] or None, deck=deck, replay=False)
     d2.suggest(
         reference, 0.12, parts=options[1:] or None, replay=False
-    )  # the run that was read is as it was
+    )  # the run that was read is unchanged
 
 
 @pytest.mark.slow

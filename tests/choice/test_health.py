@@ -32,6 +32,17 @@ PRINTED = np.round(2e6 + 3 * WORK, -1)
 PART = Part(7, "floor")
 WINDOW = (0.2, 0.8)
 
+LOADED = np.linspace(0, 0.1, 201)
+# A body that is shaken, and falls apart between two states at 0.03.
+TORN = LOADED > 0.03
+TORN_INTERNAL = np.where(TORN, 8e3, 3 * LOADED)
+TORN_KINETIC = np.where(TORN, 1.5e13, 0.2 * np.sqrt(LOADED))
+LATE = LOADED > 0.05
+COMMANDS = (
+    ("suggest",), ("suggest", "--td", "0.02"), ("suggest", "--td-window", "0.01", "0.02"), ("plan",), ("explore",),
+    ("study", "--td", "0.02"),
+)  # fmt: skip
+
 
 def list_warnings(
     balance: Balance, window: tuple[float, float] | None = WINDOW
@@ -63,7 +74,7 @@ def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
         ("work-in-window", {"external_work": WORK + 0.1 * TIME}, {"external_work": WORK + 0.5 * (TIME > 0.5)}),
         ("erosion", {"eroded": 0.01 * (TIME > 0.1)}, {"eroded": 0.01 * (TIME > 0.5)}),
         ("eroded-energy", {"eroded": 0.1 * (TIME > 0.1)}, {"eroded": 0.2 * (TIME > 0.1)}),
-        # friction that is told apart is no penetration, and what printed digits leave open is no work
+        # Separately recorded friction is no penetration, and rounding of printed digits is no work.
         ("sliding", {"sliding": 1.0 * (TIME < 0.1), "friction": 0.9 * (TIME < 0.1)}, {"sliding": 1.0 * (TIME < 0.1)}),
         ("work-in-window", {"external_work": PRINTED, "precision": Precision(digits=6)}, {"external_work": PRINTED}),
     ],
@@ -197,7 +208,7 @@ def test_the_total_energy_of_abaqus_is_without_the_external_work(
 
 
 def test_damping_that_counts_as_external_work_is_no_load() -> None:
-    fall = 4 * np.exp(-3 * TIME) - 2  # of v' = g - 3 v with g = -6
+    fall = 4 * np.exp(-3 * TIME) - 2  # solution of v' = g - 3 v with g = -6
     velocity = np.stack([np.exp(-3 * TIME), 0 * TIME, fall], axis=1)
     kinetic = 5 / 2 * np.sum(velocity**2, axis=1) + 50 * np.exp(-3 * TIME) * (
         1.2 + np.cos(60 * TIME)
@@ -331,14 +342,6 @@ def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
     assert suggestion["health"]["until"] == 0.064
 
 
-LOADED = np.linspace(0, 0.1, 201)
-# A body that is shaken, and falls apart between two states at 0.03.
-TORN = LOADED > 0.03
-TORN_INTERNAL = np.where(TORN, 8e3, 3 * LOADED)
-TORN_KINETIC = np.where(TORN, 1.5e13, 0.2 * np.sqrt(LOADED))
-LATE = LOADED > 0.05
-
-
 def record(internal: Samples, kinetic: Samples, **terms: Any) -> History:
     balance = Balance(LOADED, internal=internal, kinetic=kinetic, **terms)
     return History(
@@ -363,14 +366,14 @@ def test_a_run_that_gains_energy_from_nothing_blew_up(
 @pytest.mark.parametrize(
     ("internal", "kinetic", "terms"),
     [
-        # a load on a body that was at rest but for round-off, and one that hits a wall after a free fall
+        # A load on a body at rest (except round-off), and a body that hits a wall after free fall.
         (np.where(LATE, 40.0, 1e-13), np.where(LATE, 1e3, 1e-12), {}),
         (np.where(LATE, 200.0, 1e-18), np.where(LATE, 20.0, 220.0), {}),
-        # a velocity that is given to all of it, at rest before or in the noise of a contact, does not deform it
+        # A velocity given to the whole body, at rest or in the noise of a contact, does not deform it.
         (np.where(LATE, 2e-9, 1e-9), np.where(LATE, 1e5, 1e-9), {}),
         (0 * LOADED, np.where(LATE, 1e5, 1.9e-9), {}),
         (np.where(LATE, 1e-5, 0.0), np.where(LATE, 1e5, 1.9e-9), {}),
-        # what external work explains, and a gain that a load may well have
+        # Energy explained by external work, and a gain that a load can cause.
         (
             TORN_INTERNAL,
             TORN_KINETIC,
@@ -400,10 +403,10 @@ def test_energies_of_nothing_are_nothing_to_judge() -> None:
     ]
     assert (
         list_objections(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []
-    )  # a free fall deforms nothing yet
+    )  # free fall does not deform anything yet
     assert (
         list_objections(make_energy_history(0 * LOADED, LOADED)) == []
-    )  # of a column alone its energy is objected to
+    )  # a single column is judged by its energy alone
 
 
 @pytest.fixture
@@ -424,12 +427,6 @@ def csv(tmp_path: Path) -> Any:
         return str(file)
 
     return write
-
-
-COMMANDS = (
-    ("suggest",), ("suggest", "--td", "0.02"), ("suggest", "--td-window", "0.01", "0.02"), ("plan",), ("explore",),
-    ("study", "--td", "0.02"),
-)  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ from tests.energies import (
 from tests.reading import read
 
 PLAIN = Settings()
-# no oscillator describes the box, and none is sought: the level alone is poor
+# The level alone is poor here: no oscillator describes the box, and none is searched.
 LEVEL = Settings(replay=False, min_quality="poor")
 planned = cache(plan_run)
 

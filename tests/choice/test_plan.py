@@ -25,7 +25,7 @@ from tests.energies import (
 )
 from tests.reading import read, read_solved
 
-# no oscillator describes these runs, and none is sought: the level alone is poor
+# The level alone is poor here: no oscillator describes these runs, and none is searched.
 PLAIN = Settings(replay=False, min_quality="poor")
 BOX = Selection(parts=("box",))
 
@@ -202,7 +202,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(
     ]
     assert [row.number for row in resting] == [
         1
-    ]  # after it there is plastic work, and little vibration above it
+    ]  # after it there is plastic work, with little vibration above it
     for row in resting:
         room = max(row.margin.time, 2 * (row.margin.spread or 0.0))
         assert require(row.window)[1] == pytest.approx(row.end - room, abs=1e-5)
@@ -225,7 +225,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(
 
 @pytest.mark.slow
 def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> None:
-    window = (0.31, 0.36)  # on the ground all the time
+    window = (0.31, 0.36)  # the box stands on the ground all the time
     planned = plan_run(
         read(write_run_files(drop(window), tmp_path), BOX), PLAIN, done=[window]
     )
@@ -276,7 +276,7 @@ def test_the_flights_and_windows_of_the_computed_box() -> None:
     ]
     assert planned.flights[4].rigid_time == pytest.approx(
         0.0888, abs=4e-4
-    )  # a state each 0.4 ms
+    )  # one state each 0.4 ms
 
 
 def test_a_landing_while_rigid_is_told() -> None:
@@ -288,7 +288,7 @@ def test_a_landing_while_rigid_is_told() -> None:
     assert moved == pytest.approx([0.0, -1.6e-3, -5.4e-3], abs=3e-4)
     again = plan_run(
         read(legs), PLAIN, done=done, before=read(legs)
-    )  # rigid times of that run are no flights
+    )  # rigid times of that run are not flights
     assert [row.done.moved for row in again.flights if row.done] == [0.0, 0.0, 0.0]
     assert [row.done.landed_rigid for row in planned.flights if row.done] == [
         False,
@@ -299,7 +299,7 @@ def test_a_landing_while_rigid_is_told() -> None:
     assert "landed-rigid" in [caution.code for caution in planned.cautions]
     alone = plan_run(
         read(legs), PLAIN
-    )  # recognised by the kinetic energy that the parts lack
+    )  # recognised by the missing kinetic energy of the parts
     recognised = [row.window for row in alone.flights if row.done and row.window]
     assert [time for pair in recognised for time in pair] == pytest.approx(
         [t for pair in done for t in pair], abs=1e-3
@@ -353,7 +353,7 @@ def make_bouncing_energy(seed: int) -> Reference:
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 100_000))
-@example(seed=204)  # at the end of this flight the energy shows none
+@example(seed=204)  # the energy shows no end of the flight here
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
     """The energy shows another flight start for each td; a window must not begin before the flight of its row."""
     reference = make_bouncing_energy(seed)

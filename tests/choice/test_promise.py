@@ -12,7 +12,7 @@ from tests.benchmarks.promise import BAD, CLASSES, KEEPS_NOTHING, ask_for_pair
 from tests.benchmarks.promise_parts import (
     CLASSES as CLASSES_OF_PARTS,
     Motion,
-    Record,
+    PartsRecord,
     draw_records,
     make_history_of_parts,
     recommend_pair,
@@ -80,7 +80,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     records = [
         record._replace(window=record.window[:1] * 2)
         for record in draw_records(kind, 1, 2)
-    ]  # one td is cheap
+    ]  # a single td is cheap
     pairs = [pair for record in records if (pair := recommend_pair(record))]
     assert pairs
     assert all(pair.kept is not False for pair in pairs)
@@ -108,7 +108,7 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
     time = np.arange(0, 0.4, 4e-4)
     pair = require(
         recommend_pair(
-            Record(
+            PartsRecord(
                 make_history_of_parts(time, truth.energies(time)),
                 Settings(after=0.0),
                 (0.2, 0.38),

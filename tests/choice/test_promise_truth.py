@@ -101,7 +101,7 @@ def test_both_ways_to_the_truth_agree() -> None:
     integrated = IntegratedRun(structure, structure.move(0.0, END, np.zeros(4)))
     first, second = Truth(modes, (1.0, END)), Truth(integrated, (1.0, END))
     for tr, td in ((1.2, 2.0), (1.9, 3.1), (2.5, 3.95)):
-        # The kinetic and the elastic energy of the difference share its sum unevenly over the times that are compared.
+        # Over the compared times, the sum is split unevenly between kinetic and elastic energy of the difference.
         assert second.compute_residual(tr, td) == pytest.approx(
             first.compute_residual(tr, td), rel=0.02
         )
@@ -144,7 +144,7 @@ def test_of_a_slow_stretch_only_its_change_makes_an_error(draw_stretch: Any) -> 
     time = still.loaded_until + np.array([0.5, 1.5]) / still.rate[0]
     assert stretched.follow(time)[1] == pytest.approx(
         still.follow(time)[1]
-    )  # the vibration is as large
+    )  # the vibration has the same size
     change = np.ptp(stretch.course(time)) * stretch.heights
     between = np.diff(stretched.release(time), axis=0) - np.diff(
         still.release(time), axis=0
@@ -171,7 +171,7 @@ def test_the_parts_of_an_exchange_share_one_energy_that_only_damping_takes() -> 
     whole = elastic.sum(axis=1) + kinetic
     assert whole == pytest.approx(np.full_like(whole, whole[0]))
     early, late = (elastic[part] for part in (slice(0, 60), slice(None)))
-    assert early[:, 0].max() > 3 * early[:, 1].max()  # the frame alone was hit
+    assert early[:, 0].max() > 3 * early[:, 1].max()  # only the frame was hit
     assert late[:, 1].max() > 3 * early[:, 1].max()
 
 

@@ -42,6 +42,13 @@ rows = st.lists(
     max_size=12,
 )
 
+RECORD = make_energy_history(ENERGY, TIME)
+ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
+UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
+DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
+STATES = np.arange(400)
+EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
+
 
 def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     settings_asked = Settings(max_residual=10.0, replay=False)
@@ -59,7 +66,7 @@ def test_the_order_of_candidates(
         np.array([row[0] for row in candidate_rows]),
         np.array([row[1] for row in candidate_rows]),
     )
-    # what they differ by in further decimals is rounding
+    # differences in further decimals are rounding
     candidate_rows = [
         (row[0], float(np.round(row[1], 4)), *row[2:]) for row in candidate_rows
     ]
@@ -165,10 +172,6 @@ def test_candidates_are_kept_together_as_one_by_one(
     assert ranked[-1].tr == ranked.tr[-1]
 
 
-RECORD = make_energy_history(ENERGY, TIME)
-ALL_GOOD = Quality(Grade("good"), Grade("good"), Grade("good"))
-
-
 def find_grade(history: History, td: float, **arguments: float | bool) -> str | None:
     """Return the grade of the recommendation at a td."""
     suggestion = suggest_in_history(history, td, Settings(**arguments)).quality  # type: ignore[arg-type]
@@ -268,7 +271,7 @@ def test_states_per_period_are_counted_over_whole_periods(
     noisy = count_states_per_period(wave + noise)
     assert noisy == pytest.approx(
         states, rel=2 / periods
-    )  # noise about the mean is not taken for periods
+    )  # noise about the mean must not be treated as periods
 
 
 def test_without_a_period_there_are_no_states_of_one() -> None:
@@ -296,12 +299,6 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert (quality.grade, quality.reasons) == ("fair", ("the flight is not certain",))
 
 
-UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
-DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
-STATES = np.arange(400)
-EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
-
-
 def make_crushed_energy(vibration: float) -> np.ndarray:
     """Return 100 J with little vibration: the level says nothing, and a frozen tr may lose the whole vibration."""
     swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
@@ -318,7 +315,7 @@ def make_crushed_energy(vibration: float) -> np.ndarray:
         (make_crushed_energy(0.05), UNIT, 0.9, 0.15, False), (make_crushed_energy(2.6), UNIT, 0.9, 0.15, False),
         (make_crushed_energy(0.0), UNIT, 0.9, 0.15, True),
         (DAMPED, FINE, 0.9, 0.5, True), (DAMPED, FINE, 0.9, 0.05, False),
-        # one state and td in the same output interval say nothing of what happens between them
+        # One state, with td in the same output interval, says nothing about the time between them.
         (np.tile([1.5, 2.5, 1.0, 2.5], 10), np.linspace(0, 3.9, 40), 2.2, 2.15, False),
         (EARLY, 0.1 * STATES, 0.85, 0.0, False), (EARLY, 0.1 * STATES, 1.05, 0.0, True),
     ],
@@ -380,7 +377,7 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
     quiet = suggest_in_history(
         make_energy_history(energy, time), 0.4, Settings(after=0.25)
     ).situation
-    assert quiet.at_rest  # of what comes after td nothing is known
+    assert quiet.at_rest  # nothing after td is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
     assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
 

@@ -42,6 +42,12 @@ from tests.text_files import make_matsum_text
 
 opened = cache(lambda history: open_run([history]))
 
+STEP = "step\n         2         2         1"
+TIMES = (0.1, 0.37)
+PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
+CAR = "1-6"
+TR, TD = "0.02", "0.14"
+
 
 def rank_sets(history: str, deck: str | None = None, **options: object) -> Parts:
     model = CostModel(read_inventory(deck)) if deck else None
@@ -93,11 +99,6 @@ def write_variant(folder: Path, *changes: tuple[str, str]) -> str:
 def rank_sets_of_variant(folder: Path, *changes: tuple[str, str]) -> Parts:
     """Rank the sets with a changed deck, in a given window so that none is searched."""
     return rank_sets(MATSUM, write_variant(folder, *changes), times=TIMES)
-
-
-STEP = "step\n         2         2         1"
-TIMES = (0.1, 0.37)
-PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
 
 
 @pytest.mark.parametrize(
@@ -163,7 +164,7 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
     assert part_answer.rows[1].verdict == "unknown"
     assert (
         part_answer.recommended is None
-    )  # elements of a part that no *PART defines: the cost is not known
+    )  # a part without *PART has elements: the cost is unknown
     with pytest.raises(FormatError, match="no set of parts can be recommended"):
         recommend_parts(
             open_run([MATSUM]),
@@ -206,7 +207,7 @@ def test_the_step_grows_by_what_stays_deformable() -> None:
     assert compute_step_growth([first_row, two, three], {1, 2, 3}) == float("inf")
     assert (
         compute_step_growth([first_row, two, four], {1}) is None
-    )  # the step of part 4 is not known
+    )  # the time step of part 4 is unknown
     assert compute_step_growth([first_row, two, four], {1, 4}) == 3.0
     assert compute_step_growth([first_row, four._replace(kind="rigid")], {1}) == float(
         "inf"
@@ -255,7 +256,7 @@ def test_savings_of_the_car_are_within_five_points_and_in_order(car: Parts) -> N
         "given": (0.20, 0.075),
     }
     sets_by_name = {part_set.name: part_set for part_set in car.sets}
-    run = (0.1464 - 0.0496) / 0.24  # the runs that were measured ended at 0.24
+    run = (0.1464 - 0.0496) / 0.24  # the measured runs ended at 0.24
     predicted = {}
     for name, (per_step, saving) in measured.items():
         share = require(sets_by_name[name].cost_share)
@@ -274,8 +275,8 @@ def test_where_the_car_comes_to_rest(car: Parts) -> None:
     sets_by_name = {part_set.name: part_set for part_set in car.sets}
     assert sets_by_name["all that may"].position_error == pytest.approx(
         2.2e-3, abs=0.7e-3
-    )  # as the solver found, 30 %
-    given_set = sets_by_name["given"]  # six bodies, which the solver found 0.16 mm off
+    )  # as computed by the solver, within 30 %
+    given_set = sets_by_name["given"]  # six bodies; computed, they are 0.16 mm off
     assert (
         given_set.position_error,
         given_set.position_part,
@@ -288,7 +289,7 @@ def test_where_the_car_comes_to_rest(car: Parts) -> None:
     assert {part_set.position_assumes for part_set in car.sets} == {None}
     assert sets_by_name["all that may"].angle_error == pytest.approx(
         0.235, rel=0.3
-    )  # degrees, as the solver found
+    )  # degrees, as computed by the solver
     stopped = sets_by_name["stopped deforming"]
     assert stopped.position_error == pytest.approx(0.87e-3, abs=0.3e-3)
     assert stopped.angle_error == pytest.approx(0.145, abs=0.1)
@@ -334,21 +335,27 @@ def make_row(part: int, landing: float | None, cost: float | None) -> PartRow:
         (
             [make_row(1, 1.0, 0.85), make_row(2, 19.0, 0.15)],
             None,
-        ),  # to leave it deformable costs too much
+        ),  # leaving it deformable costs too much
         (
             [make_row(1, 3.0, 0.95), make_row(2, 17.0, 0.05)],
             None,
-        ),  # another takes its share
+        ),  # another part takes up the energy
         (
             [make_row(1, -50.0, 0.95), make_row(2, 19.0, 0.05)],
             2,
-        ),  # what others give back is not what they take
-        ([make_row(1, 0.0, 0.95), make_row(2, 0.0, 0.05)], None),  # nothing is taken up
+        ),  # energy given back by others is not energy taken up
+        (
+            [make_row(1, 0.0, 0.95), make_row(2, 0.0, 0.05)],
+            None,
+        ),  # no energy is taken up
         (
             [make_row(1, None, 0.95), make_row(2, None, 0.05)],
             None,
         ),  # the record ends in the flight
-        ([make_row(1, 1.0, None), make_row(2, 19.0, None)], None),  # no cost is known
+        (
+            [make_row(1, 1.0, None), make_row(2, 19.0, None)],
+            None,
+        ),  # the cost is unknown
         (
             [make_row(1, 1.0, 0.95), make_row(2, 19.0, 0.05)._replace(kind="spring")],
             None,
@@ -441,10 +448,6 @@ def test_ties_that_may_join_parts_are_told_where_these_are_several_bodies(
     assert "ties-not-followed" not in [caution.code for caution in whole.cautions]
 
 
-CAR = "1-6"
-TR, TD = "0.02", "0.14"
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write the car with wheels and an engine that oscillates three times before the landing, and its decks."""
@@ -493,7 +496,7 @@ def test_a_set_without_what_moves_is_offered_where_wheels_hang_loose(
     assert sets["all but what moves"].parts == made_car.BODY
     assert [
         part_set.name for part_set in d2.parts(run, **arguments, given=CAR).sets
-    ] == [*sets]  # no set twice
+    ] == [*sets]  # no set is listed twice
 
 
 @pytest.mark.slow

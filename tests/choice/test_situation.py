@@ -50,7 +50,7 @@ def test_every_model_answers_alike() -> None:
             == (vibration.unknown is not None)
             == (not compared.any())
         )
-        # what a tolerance is held against is the lock-in error, where the sign is right
+        # The tolerance limits the lock-in error, if the sign is right.
         wanted = np.where(
             measured["sign_match"] > 0, measured["lock_in_error"], np.inf
         )[compared]
@@ -146,9 +146,9 @@ def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_an
 ):
     history, fits = make_one_mode(), CountedFits()
     first = examine_td(history, 0.6, PLAIN, fits, quick=True)
-    fits_made = fits.made
+    fits_made = fits.computed
     quick = examine_td(history, 0.8, PLAIN, fits, quick=True)
-    assert fits.made == fits_made
+    assert fits.computed == fits_made
     assert quick.sees_as(first)
     anew = examine_td(history, 0.8, PLAIN)
     assert (quick.basis, quick.flight) == (anew.basis, anew.flight)

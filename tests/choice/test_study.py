@@ -479,7 +479,9 @@ def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
     assert find_outliers(near) == ()
     assert find_outliers([none]) == (none,)
     assert find_outliers([]) == ()
-    other_row = make_chosen_row("other", 2.1)  # equal times let any other stand out
+    other_row = make_chosen_row(
+        "other", 2.1
+    )  # if all times are equal, any other time is an outlier
     assert find_outliers(
         [*(make_chosen_row("same", 2.0) for _ in range(9)), other_row]
     ) == (other_row,)

@@ -44,14 +44,14 @@ def test_both_times_of_the_published_oscillator() -> None:
     assert suggestion.td_window == (0.06, 0.07)
     assert all(
         candidate.rigid_time > 1e-4 for candidate in suggestion.candidates
-    )  # td itself is none
+    )  # td itself is not a candidate
 
 
 def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
     time = np.arange(0, 4, 0.01)
     history = make_energy_history(np.sin(2 * np.pi * time) ** 2, time)
     suggestion = suggest_in_window(history, (2.1, 3.6), PLAIN)
-    # peaks at 2.25, 2.75, 3.25; the first with the sign of each at 0.25, 0.75, 0.25
+    # Peaks at 2.25, 2.75 and 3.25; the first tr with the sign of each is 0.25, 0.75 and 0.25.
     assert (
         require(suggestion.recommended).tr,
         require(suggestion.recommended).td,
@@ -138,10 +138,10 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> N
     for td in (0.30, 0.3175, 0.335):
         suggest_at(examine_td(history, td, late, fits))
         examine_td(history, td, late, fits, quick=True)
-    fits_made = fits.made
+    fits_made = fits.computed
     assert fits_made > 0
     assert suggest_in_window(history, (0.30, 0.335), late, fits).recommended is None
-    assert fits.made == fits_made
+    assert fits.computed == fits_made
 
 
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
@@ -152,7 +152,7 @@ def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     )
     energy = np.asarray(energy) + 30 * np.exp(
         -(((time - 8.5) / 0.1) ** 2)
-    )  # a burst that is no vibration
+    )  # a burst that is not a vibration
     history = make_energy_history(energy, time)
     suggestion = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
     for t in (require(suggestion.recommended).tr, require(suggestion.recommended).td):

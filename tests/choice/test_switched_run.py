@@ -65,5 +65,5 @@ def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
     assert [caution.code for caution in cautions] == codes_expected
     if done is False:
         assert "these parts were rigid: engine; others deform" in cautions[0].message
-    # where a rigid body has taken momenta over, those of the parts tell no flight
+    # If a rigid body has taken over the momenta, those of its parts show no flight.
     assert (history.evidence is reference.history.evidence) == (done is None)

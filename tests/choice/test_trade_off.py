@@ -47,7 +47,7 @@ def check(
 
 def check_unbeaten(exploration: TradeOff) -> None:
     """Compare the Pareto marks with all other offers."""
-    for is_rigid_time_known in (True, False):
+    for is_vibration_known in (True, False):
         pairs = [
             (
                 offer.unbeaten,
@@ -58,7 +58,7 @@ def check_unbeaten(exploration: TradeOff) -> None:
             if offer.best
             and offer.error is not None
             and not offer.best.same_swing
-            and (offer.basis != "energy") == is_rigid_time_known
+            and (offer.basis != "energy") == is_vibration_known
         ]
         for marked, error, rigid in pairs:
             beaten = any(
@@ -280,4 +280,4 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
         for offer in exploration.offers
         if offer.quality and offer.best and not offer.best.same_swing
     }
-    assert grades == {"poor"}  # nothing tells the deformation
+    assert grades == {"poor"}  # no evidence of the deformation

@@ -20,7 +20,7 @@ from d2rpick.rules.judgement import find_faults
 from tests.energies import make_energy_history, require
 
 TIME = np.linspace(0, 1, 2001)
-# Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.
+# Two modes in flight up to 0.8, then an unreported crash; the mean before td is far below the energy after it.
 ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(
     TIME > 0.8, 50.0, 1.0
 )

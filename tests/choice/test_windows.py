@@ -48,6 +48,12 @@ from tests.records import ENERGY, MODE, TIME, add_noise, sum_energies
 
 positive = st.floats(0.1, 10.0)
 
+TD = 0.064
+PAPER = make_energy_history(ENERGY, TIME)
+WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
+    lambda ends: np.array(sorted(ends)[: len(ends) // 2 * 2], float).reshape(-1, 2)
+)
+
 
 def make_flying_oscillator(
     omega: float, amplitude: float, speed: float, mass: float, periods: int = 20
@@ -155,7 +161,9 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     margin = compute_margin(history, flight, place=0.02)
     assert is_grazing(history, flight, 0.02) is grazed
     assert (margin.source == "grazing") is grazed
-    if grazed:  # gravity alone opens a gap of 20 mm, and of the vibration, in that time
+    if (
+        grazed
+    ):  # in that time, gravity alone opens a gap of 20 mm, and the vibration another
         assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
         assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
 
@@ -175,11 +183,11 @@ def make_tapped_body(impulse: float, length: float) -> tuple[History, Flight]:
 @pytest.mark.parametrize(
     ("impulse", "length", "grazed"),
     [
-        (0.5, 0.004, True),  # 125 of force, above a hundredth of 2000
+        (0.5, 0.004, True),  # a force of 125, above 1 % of 2000
         (1.1, 0.004, True),
         (1.3, 0.004, False),
-        (11.8, 0.004, False),  # it stops
-        (11.8, 0.1, False),  # softly, in much longer than the margin
+        (11.8, 0.004, False),  # the body stops
+        (11.8, 0.1, False),  # softly, over a time much longer than the margin
     ],
 )
 def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
@@ -287,7 +295,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     assert max(moved) == pytest.approx(1.1e-3, abs=1e-4)
     assert max(moved) < margin.time
     assert require(margin.spread) == pytest.approx(1.25e-3, abs=1e-5)
-    assert max(moved) < require(margin.spread)  # by the formula alone, too
+    assert max(moved) < require(margin.spread)  # the formula alone covers them too
 
 
 @pytest.mark.parametrize(
@@ -305,10 +313,6 @@ def test_the_landings_of_the_switched_box_lie_within_the_margin(
     )
     moved = abs(dict(read_landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < compute_margin(history, flight).time
-
-
-TD = 0.064
-PAPER = make_energy_history(ENERGY, TIME)
 
 
 def find_windows_of(answer: PairSuggestion) -> Samples:
@@ -342,7 +346,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert all(
         verify_at(situation, t).admissible for t in [*ends.ravel(), *inside.ravel()]
     )
-    # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
+    # Other times that ``verify`` accepts lie on the cycle of td, where no time outside the tolerance is listed.
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
     anywhere = (
         rng.uniform(history.time[0], last, 8) if last > history.time[0] else np.zeros(0)
@@ -354,7 +358,7 @@ def check(answer: PairSuggestion, seed: int) -> None:
     assert [verify_at(situation, t).admissible for t in clear] == are_in_windows(
         windows, clear
     ).tolist()
-    # the errors in the windows are those of ``verify``; where nothing vibrates there are none
+    # The errors in the windows are those of ``verify``; there are none if nothing vibrates.
     profile = make_error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
         error = 0.0 if situation.at_rest else verify_at(situation, t).candidate.error
@@ -479,7 +483,7 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
 @pytest.mark.parametrize(
     "settings_asked",
     [
-        Settings(max_kinetic_share=0.5),  # 0.917 there
+        Settings(max_kinetic_share=0.5),  # it is 0.917 there
         Settings(max_residual=0.9),
         Settings(tolerance=0.0, replay=False),
     ],
@@ -560,11 +564,6 @@ def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     ]
     assert are_in_windows(shared_windows, times).tolist() == expected
     assert any(expected)
-
-
-WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
-    lambda ends: np.array(sorted(ends)[: len(ends) // 2 * 2], float).reshape(-1, 2)
-)
 
 
 @given(st.lists(WINDOWS, min_size=1, max_size=5))

@@ -38,7 +38,7 @@ def replace_line(number: int, line: str) -> bytes:
     return "\n".join(lines).encode()
 
 
-# Files that are no history: content, further arguments, and what the message has to say.
+# Files that are not histories: content, further arguments, and parts of the message.
 FILES = {
     "empty": (b"", (), ["input: the file is empty", "has the run been started?"]),
     "binary": (bytes(range(256)) * 20, (), ["input: binary data", "csv", "glstat", "export"]),
@@ -105,12 +105,12 @@ def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
     ],
 )
 def test_a_number_of_any_size_has_an_answer(line: str, code: int) -> None:
-    result = run(*shlex.split(line), ENERGY)  # a warning of numpy would be raised here
+    result = run(*shlex.split(line), ENERGY)  # numpy would warn here
     assert result.exit_code == code, result.stderr
     assert "error" not in result.stderr
 
 
-# Records that can be read but hold no answer: content, arguments, and the warning that says why.
+# Readable records without an answer: content, arguments, and the warning that gives the reason.
 OBJECTIONS = {
     "constant": (tabulate(lambda _: 5.0), (), "no-candidate"),
     "zero": (tabulate(lambda _: 0.0), (), "no-energy"),
@@ -154,7 +154,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> N
         ]
         in_table = (
             {"no-candidate"} if form == "table" else {}
-        )  # the reason stands there
+        )  # the reason is in the warning
         assert messages == [
             warning["code"]
             for warning in suggestion["warnings"]

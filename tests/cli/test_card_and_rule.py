@@ -352,7 +352,7 @@ def test_several_windows_are_one_card() -> None:
         == result.stdout
     )
     judged = run("card", *pairs, "--part", "1", "--history", ENERGY)
-    assert judged.exit_code == 2  # 0.3 lies outside the record
+    assert judged.exit_code == 2  # 0.3 is outside the record
     two = ("--tr", "0.0135867", "--td", "0.0687534", "--tr", "0.0939", "--td", "0.119")
     assert (
         join_comments(

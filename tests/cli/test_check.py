@@ -30,6 +30,9 @@ COARSE = GOOD.replace("    0.0001", "      0.01")
 
 pytestmark = pytest.mark.usefixtures("here")
 
+RUN_EXAMPLE = RULES["D2R401"].passing[0]
+TIMES = np.linspace(0.001, 0.149, 12).tolist()
+
 
 def place(name: str, deck: str) -> str:
     """Write a deck below the working folder."""
@@ -65,7 +68,7 @@ def check_output(form: str, text: str) -> None:
         check_junit(text)
 
 
-# The job it is for.
+# Use in a CI job.
 
 
 def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
@@ -113,7 +116,7 @@ def test_json_says_where_and_by_what() -> None:
             HEAD + PARTS + THERE + END,
             ("--fail-on", "warning"),
             0,
-        ),  # an info is never an objection
+        ),  # an info is never a problem
     ],
 )
 def test_the_exit_code_is_the_same_in_every_format(
@@ -249,9 +252,6 @@ def test_ndjson_is_a_line_for_each_deck() -> None:
         check_output("json", line)
 
 
-RUN_EXAMPLE = RULES["D2R401"].passing[0]
-
-
 def place_run(folder: str = ".") -> list[str]:
     """Write the starter deck and the engine files of a run."""
     files = {RUN_EXAMPLE.name: RUN_EXAMPLE.deck, **RUN_EXAMPLE.files}
@@ -291,7 +291,7 @@ def test_printed_engine_files_pass() -> None:
     ]
 
 
-# Which rules count.
+# Selection of rules.
 
 
 def test_options_and_configuration_select_rules() -> None:
@@ -466,10 +466,7 @@ def test_the_result_never_replaces_an_input() -> None:
     check_junit(Path("report.xml").read_text())
 
 
-# Judged by a history.
-
-
-TIMES = np.linspace(0.001, 0.149, 12).tolist()
+# Decks judged by a history.
 
 
 @pytest.mark.parametrize(

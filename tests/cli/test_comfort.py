@@ -26,6 +26,8 @@ from tests.command import (
     run_json,
 )
 
+ASKED = ("suggest", "--td", "0.064", ENERGY)
+
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -119,7 +121,9 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
     ]
     assert complete("suggest", "absent", "--energy", "") == []
     (offered,) = complete("suggest", GLSTAT, "--energy", "int")
-    assert offered == "internal_energy"  # one word for the shell, and yet the channel
+    assert (
+        offered == "internal_energy"
+    )  # one word for the shell, but still the name of the channel
     by_short_name, by_long_name = (
         run_json("suggest", "--td", "0.064", "--energy", name, GLSTAT)
         for name in (offered, "internal energy")
@@ -183,7 +187,7 @@ def test_a_time_in_s_is_not_taken_for_one_in_ms(
 
 
 def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
-    # a flight may begin at once, and so may a tr; of 0.4 the thousandfold is no time of the record
+    # A flight, and tr, may begin at once; 1000 times 0.4 is outside the record.
     for args in (
         ("suggest", "--td", "64", "--after", "0"),
         ("verify", "--tr", "0.0129", "--td", "64"),
@@ -191,16 +195,14 @@ def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
         assert run(*args, in_ms).exit_code in (0, 1)
     assert run("suggest", "--td", "0.4", in_ms).exit_code in (0, 1)
     named_table = Path(in_ms).read_text().replace("time,", "time [s],")
-    Path(in_ms).write_text(
-        named_table
-    )  # there is no larger unit that a time would be given in
+    Path(in_ms).write_text(named_table)  # times are never given in a larger unit
     assert run("suggest", "--td", "0.064", in_ms).exit_code in (0, 1)
 
 
 def test_a_deck_in_s_is_not_judged_by_a_history_in_ms(in_ms: str) -> None:
     result = run("check", str(ROOT / "sample_data/switching.k"), "--history", in_ms)
     assert result.exit_code == 1
-    assert "error D2R207" in result.stdout  # one finding for one mistake
+    assert "error D2R207" in result.stdout  # one finding per mistake
     assert "about 1000 times earlier: seconds for milliseconds" in result.stdout
     assert "1 error, 0 warnings" in result.stdout
 
@@ -232,7 +234,7 @@ def test_a_pair_may_be_asked_to_be_good(
     result = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
     assert (plain.exit_code, result.exit_code) == (0, code)
     assert result.stdout == plain.stdout
-    if args[0] == "verify" and wanted == "fair":  # by default
+    if args[0] == "verify" and wanted == "fair":  # the default
         assert run(*args, "-q", ENERGY).exit_code == code
     assert (
         args[0] != "verify"
@@ -296,9 +298,6 @@ def test_the_manual_is_roff_without_warnings() -> None:
     )
     assert not manual_page.stderr
     assert "d2rpick" in manual_page.stdout
-
-
-ASKED = ("suggest", "--td", "0.064", ENERGY)
 
 
 @pytest.fixture
@@ -369,8 +368,8 @@ def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_t
     } - {"td", "history"}
     assert (
         "../site.json" in read_settings_in_use(*ASKED, "--deck", DECK)["weights"]
-    )  # files lie where the settings do
-    assert run("check", DECK).exit_code == 0  # without a history nothing is judged
+    )  # paths are relative to the settings file
+    assert run("check", DECK).exit_code == 0  # without a history, nothing is judged
     assert "node" in read_settings_in_use(
         "card", "--solver", "radioss", "--tr", "1", "--td", "2"
     )
@@ -400,7 +399,7 @@ def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(
     result = run("check", DECK)
     assert result.exit_code == 1
     assert "D2R203" in result.stdout
-    assert "D2R202" in result.stdout  # rules are set beside the deck
+    assert "D2R202" in result.stdout  # the rules are configured next to the deck
 
 
 @pytest.mark.parametrize(

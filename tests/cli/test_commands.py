@@ -31,11 +31,13 @@ from tests.command import (
 from tests.reading import read_history
 
 SUGGEST = ("suggest", "--td", "0.064")
-# Of these commands the examples compute runs, or plan and compare many.
+# Commands whose examples compute runs, or plan and compare many.
 SLOW = ("rollover", "reproduce", "plan", "study", "follow", "explore")
-# A page by the level alone takes longer: it tells the windows of acceptable tr of every td.
+# A page by the level alone takes longer, because it contains the windows of acceptable tr of every td.
 BY_VIBRATION = dict.fromkeys(("D2RPICK_SUGGEST_NO_VERIFY", "D2RPICK_VERIFY_NO_VERIFY"))
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+
+GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
 
 
 def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
@@ -51,7 +53,7 @@ def run_program(*args: str, **options: Any) -> CompletedProcess[str]:
     return subprocess.run(command, check=False, **popen_options)
 
 
-# What the tool is for.
+# The purpose of the tool.
 
 
 @pytest.mark.parametrize(("source", "digits"), [(ENERGY, 1e-10), (GLSTAT, 1e-5)])
@@ -393,9 +395,6 @@ def test_options_come_from_the_environment_too() -> None:
     )
     assert float(result.stdout) == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-10)
     assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
-
-
-GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
     tmp_path: Path,
 ) -> None:
     time = np.linspace(0, 1, 501)
-    later = np.maximum(time - 0.2, 0.0)  # at rest, then two modes of their own
+    later = np.maximum(time - 0.2, 0.0)  # static energy, then two independent modes
     energy = 1 + 0.3 * np.sin(41 * later) ** 2 + 0.2 * np.sin(97 * later) ** 2
     file = tmp_path / "run.csv"
     pd.DataFrame({"time": time, "internal_energy": energy}).to_csv(file, index=False)
@@ -188,7 +188,7 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
     assert document["td_window"] == [
         0.0,
         1.0,
-    ]  # no flight is seen, so that all of the record is explored
+    ]  # no flight is found, so the whole record is explored
     (offer_at_td,) = (offer for offer in document["offers"] if offer["td"] == 0.5)
     assert offer_at_td["reason"] in " ".join(run_result.stdout.split())
     assert document["recommended"] is None

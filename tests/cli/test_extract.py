@@ -28,8 +28,14 @@ from tests.command import (
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]
-# all but the sign of zeros, which sums lose
+# Equal except for the sign of zeros, which sums lose.
 NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
+
+BOX = {"csv": (), "h5": (), "glstat": (), "matsum": ("--part", "box")}
+QUANTITIES = ("kinetic_energy", "total_energy", "external_work", "contact_energy")
+UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(
+    f"{i},{i % 3},{i},1,2,{-i}\n" for i in range(30)
+)
 
 
 def is_same(first_history: History, second_history: History) -> bool:
@@ -111,10 +117,7 @@ def test_one_part_needs_no_column_beside_the_energy() -> None:
     )
 
 
-# What a flight is seen by goes with the energy.
-
-BOX = {"csv": (), "h5": (), "glstat": (), "matsum": ("--part", "box")}
-QUANTITIES = ("kinetic_energy", "total_energy", "external_work", "contact_energy")
+# Evidence of flights is extracted with the energy.
 
 
 @pytest.fixture(scope="module")
@@ -207,11 +210,6 @@ def test_quantities_of_the_whole_model_are_extracted_under_one_name(
             expected.channel(expected.quantities[quantity]),
         )
         np.testing.assert_array_equal(*numbers)
-
-
-UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(
-    f"{i},{i % 3},{i},1,2,{-i}\n" for i in range(30)
-)
 
 
 def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:

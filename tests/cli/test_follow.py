@@ -32,7 +32,7 @@ def test_once_says_what_there_is_and_whether_it_flies() -> None:
         "state",
     ]
     assert run("follow", "--once", "--exit-zero", CAR).exit_code == 0
-    assert run("follow", CAR).exit_code == 0  # it has ended
+    assert run("follow", CAR).exit_code == 0  # the run has ended
 
 
 def test_lines_of_json_are_those_of_python() -> None:

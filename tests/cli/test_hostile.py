@@ -32,6 +32,19 @@ from tests.made_binout import make_binout as made_binout
 from tests.made_t01 import make_t01, make_value
 from tests.text_files import make_glstat_text, make_matsum_text
 
+SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
+ODD = {
+    "binout": bytes(made_binout(range(1, 9)).data).replace(
+        np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
+    ),  # a time
+    "T01": bytes(make_t01(8).data).replace(
+        np.array(make_value(3, 0, 1), ">f4").tobytes(), SIGNALLING
+    ),  # an energy
+    "matsum": make_matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
+        b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
+    ),
+}
+
 
 def run_in_shell(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
     """Call the program in a shell, which can close streams and limit memory; ``$@`` are the arguments."""
@@ -364,7 +377,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         "deep.h5": make_deep_file(100),
         "still.gz": gzip.compress(
             small + (b"#" * 4095 + b"\n") * (1 << 11)
-        ),  # 1,000 times as many bytes, few all the same
+        ),  # 1,000 times as many bytes, but still few
         "line.csv": small + b"#" * 1_000_000,
     }.items():
         (tmp_path / name).write_bytes(content)
@@ -471,7 +484,7 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
         "other": make_glstat_text(times, [0, 10, 21, 30, 40]),
         "restart": make_glstat_text(
             times[2:], [20, 35, 45]
-        ),  # another way from the state it begins with
+        ),  # continues differently from its first state
         "restart of another": make_glstat_text(times[2:], [25, 35, 45]),
         "parts": make_matsum_text(
             times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]
@@ -510,20 +523,6 @@ def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> N
         "info", first_file, second_file
     )
     assert run("info", first_file, leg).exit_code == 0
-
-
-SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
-ODD = {
-    "binout": bytes(made_binout(range(1, 9)).data).replace(
-        np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
-    ),  # a time
-    "T01": bytes(make_t01(8).data).replace(
-        np.array(make_value(3, 0, 1), ">f4").tobytes(), SIGNALLING
-    ),  # an energy
-    "matsum": make_matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
-        b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
-    ),
-}
 
 
 @pytest.mark.parametrize("name", ODD)

@@ -89,7 +89,7 @@ def test_a_shell_gives_back_the_words_of_a_command() -> None:
     assert line.isprintable()
     assert not re.search(
         r"(?<!\\)(\\\\)*\\x", line
-    )  # whose end not all shells see alike where a digit follows
+    )  # shells disagree on the end of this escape before a digit
     assert split_by_shell(line) == [os.fsencode(word) for word in words]
 
 

@@ -43,7 +43,7 @@ from tests.json_schemas import check_by_schema, run_json_checked
 SUGGEST = ("suggest", "--td", "0.064")
 VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")
 ALONE = ("--no-verify", "--energy", "boxIE_J", ROLLOVER)  # judged by the energy alone
-NOTHING = (*SUGGEST, "--max-residual", "0.5", ENERGY)  # an objection
+NOTHING = (*SUGGEST, "--max-residual", "0.5", ENERGY)  # reported as a problem
 ANSWERS = [
     (*SUGGEST, ENERGY),
     (*SUGGEST, GLSTAT),
@@ -56,6 +56,13 @@ FORMATS = {
     "suggest": ("table", "json", "csv", "markdown", "value"),
     "verify": ("table", "json", "csv", "markdown"),
 }
+
+TEXTS = (
+    *("kind", "notes", "reasons", "quality"),
+    *("verdict", "verdict_reason", "cure", "expected_after_td", "worst_case"),
+)
+FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
+PERIOD = 0.02
 
 
 def read_rows(text: str) -> list[dict[str, Any]]:
@@ -70,12 +77,6 @@ def _convert_cell(key: str, cell: str) -> Any:
     if key in TEXTS:
         return cell
     return json.loads(cell) if cell else None
-
-
-TEXTS = (
-    *("kind", "notes", "reasons", "quality"),
-    *("verdict", "verdict_reason", "cure", "expected_after_td", "worst_case"),
-)
 
 
 # Formats.
@@ -241,7 +242,7 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "terminal", [False, True]
-)  # for which the colour of CliRunner stands
+)  # CliRunner's colour option stands in for a terminal
 @pytest.mark.parametrize(
     ("args", "line"),
     [
@@ -370,8 +371,6 @@ def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
 
 # Figures.
 
-FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -443,7 +442,7 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
     )
     assert (
         run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""
-    )  # which has no ndjson
+    )  # it has no ndjson
     assert (
         run(
             "replay",
@@ -474,7 +473,6 @@ def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(
 
 
 pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")
-PERIOD = 0.02
 
 
 class Terminal(io.StringIO):
@@ -487,7 +485,7 @@ class Terminal(io.StringIO):
 def read_rest(terminal: int) -> bytes:
     """Read what is left in a terminal that nobody writes to any more."""
     output = b""
-    with suppress(OSError):  # how Linux tells that the other end is closed
+    with suppress(OSError):  # Linux reports a closed other end this way
         while piece := os.read(terminal, 1000):
             output += piece
     os.close(terminal)
@@ -557,7 +555,7 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
         "info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave
     ) as process:
         os.close(slave)
-        first = os.read(master, 1000)  # blocks until there is something
+        first = os.read(master, 1000)  # blocks until there is output
         result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)
     output = read_rest(master)
     assert first.startswith(b"\rreading standard input ... 1 s")
@@ -577,10 +575,10 @@ def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> 
         os.close(slave)
         terminal_text = b""
         if quiet:
-            time.sleep(2.5)  # others have told something by now
+            time.sleep(2.5)  # other commands have reported progress by now
         while not quiet and b" runs" not in terminal_text:
             terminal_text += os.read(master, 1000)
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        os.killpg(process.pid, signal.SIGINT)  # like a terminal, to the children too
         process.communicate(timeout=30)
     terminal_text += read_rest(master)
     assert process.returncode == -signal.SIGINT
@@ -606,7 +604,7 @@ def test_runs_are_counted_with_the_time_that_is_left(
     assert "\r3 of 9 runs\r" in stream.getvalue()
     assert "\r5 of 9 runs, 0:00 left\r" in stream.getvalue()
     assert stream.getvalue().endswith(" \r")
-    # two runs took 60 s, so do the next two
+    # Two runs took 60 s, so the next two will take as long.
     count = progress.Count(total=9)
     count.tell(3)
     count.tell(5)
@@ -664,7 +662,7 @@ def test_an_error_ends_where_the_terminal_does() -> None:
     args = ("suggest", "--td", "0.06", "--part", "1", ENERGY)
     assert (
         run(*args, env={"COLUMNS": "80"}).stderr.count("\n") == 1
-    )  # a log is no terminal
+    )  # a log is not a terminal
     master, slave = pty.openpty()
     with start_program(
         *args, stderr=slave, env={**os.environ, "COLUMNS": "80"}

@@ -65,7 +65,9 @@ def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
 def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
     for args in (WITH_DECK, (MATSUM,)):
         table = run("parts", "-q", *args).stdout
-        assert max(map(len, table.splitlines()[3:])) <= 110  # below the names of files
+        assert (
+            max(map(len, table.splitlines()[3:])) <= 110
+        )  # lines below the file names
     markdown = run("parts", "-q", "-f", "markdown", *WITH_DECK).stdout
     assert all(f"| {name} |" in markdown for name in (*COLUMNS, *SET_COLUMNS))
 
@@ -187,7 +189,7 @@ def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
     whole = run_json("suggest", "--td", "0.37", *WITH_DECK)
     assert "cost-unknown" in [
         warning["code"] for warning in whole["warnings"]
-    ]  # no parts are named
+    ]  # no parts are selected
 
 
 def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:

@@ -18,6 +18,10 @@ pytestmark = pytest.mark.usefixtures("by_level")
 
 DATABASES = "*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n"
 
+FLYING = ("--part", "flying")
+MAIN, OTHER = 101, 102  # main nodes
+BODIED = "/RBODY/{}\nbody\n{}{:20g}{}" + 2 * pad(0.0, 0.0, 0.0, width=20) + pad(0, 0, 0)
+
 
 def write_node_set(number: int, *nodes: int) -> str:
     return f"*SET_NODE_LIST\n{pad(number)}{pad(*nodes)}"
@@ -113,7 +117,6 @@ LS_DYNA: Mapping[str, Callable[[Path], Path]] = {
     "no end": drop_end,
     "switch sets of another part": add_switches,
 }
-FLYING = ("--part", "flying")
 
 
 def paste_and_check(main: Path, card: str) -> str:
@@ -133,10 +136,6 @@ def test_a_card_of_ls_dyna_is_clean_in_its_deck(name: str, tmp_path: Path) -> No
     check_text = paste_and_check(main, result.stdout)
     assert "parts 1, 2: rigid" in check_text
     assert "0 errors, 0 warnings" in check_text, check_text
-
-
-MAIN, OTHER = 101, 102  # main nodes
-BODIED = "/RBODY/{}\nbody\n{}{:20g}{}" + 2 * pad(0.0, 0.0, 0.0, width=20) + pad(0, 0, 0)
 
 
 def write_body(number: int, node: int, group: int) -> str:

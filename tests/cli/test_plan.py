@@ -13,12 +13,28 @@ from tests.drops import drop, write_run_files
 from tests.json_schemas import check_by_schema, run_json_checked
 
 pytestmark = pytest.mark.slow
-FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
+FINE = 4e-4  # time between states [s], fine enough to show a landing that comes slightly later
 PART = (
     "--part",
     "box",
     "--no-verify",
-)  # no oscillator describes it, and none is sought
+)  # no oscillator describes the run, and none is searched
+
+DECK = """*KEYWORD
+*CONTROL_TERMINATION
+       1.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+*PART
+box
+         1         1         1
+*PART
+step
+         2         1         1
+*END
+"""
 
 
 @pytest.fixture(scope="module")
@@ -321,23 +337,6 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         "/RBODY with main node 536 is new, for parts 1-5" in result.stderr,
     ) == (0, True)
     assert "parts 1-5: rigid from" in result.stdout
-
-
-DECK = """*KEYWORD
-*CONTROL_TERMINATION
-       1.2
-*DATABASE_GLSTAT
-    0.0001
-*DATABASE_MATSUM
-    0.0001
-*PART
-box
-         1         1         1
-*PART
-step
-         2         1         1
-*END
-"""
 
 
 def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(

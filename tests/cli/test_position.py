@@ -76,7 +76,7 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     assert early
     assert all(
         candidate_row["position_error"] is None for candidate_row in early
-    )  # in the load
+    )  # before the end of the load
     assert "out-of-place" not in {warning["code"] for warning in document["warnings"]}
     table = chosen.text("table", DisplayOptions(limit=1))
     assert "off by 0.00" in table
@@ -169,7 +169,7 @@ def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
         None,
         None,
         None,
-    ]  # the solver found 0.16 mm
+    ]  # computed by the solver: 0.16 mm
     check_by_schema(document)
     table = join_wrapped_lines(
         run(
@@ -232,7 +232,7 @@ def test_a_deck_makes_one_body_of_the_car_and_the_assumption_goes(deck: str) -> 
     alone, document = run_json(*arguments), run_json(*arguments, "--deck", deck)
     assert document["position_error"] == pytest.approx(
         7.47e-3, rel=0.05
-    )  # as the solver found at the watched nodes
+    )  # as computed at the watched nodes
     assert alone["position_error"] == pytest.approx(7.47e-3, rel=0.2)
     assert (alone["position_error_assumes"], document["position_error_assumes"]) == (
         ONE_BODY,
@@ -356,6 +356,6 @@ def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
     assert "         1         0      PART\n         2         1      PART" in result
     assert (
         result.count("         1      PART") == 10
-    )  # led by part 1, and its own row to switch back
+    )  # merged into lead part 1, with a row of its own to switch back
     run_result = run(*arguments, "--part", "1-14").stdout
     assert "14 parts are one rigid body by the deck, led by part 1 (LRB)" in run_result

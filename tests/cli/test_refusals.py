@@ -21,7 +21,7 @@ from tests.sample_deck import DECK as SAMPLE
 CAR = locate_stored("carT01.gz")
 GIVEN = shlex.join(OSCILLATOR)
 ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
-# A command in a line, and parts of what it is told, $ where that ends.
+# Command lines, and parts of their message; $ marks the end of the message.
 REFUSALS = f"""
 sugest --td 1 x | No such command 'sugest' | Did you mean 'suggest'? | d2rpick --help
 dance | No such command 'dance' | plan, suggest

@@ -58,7 +58,7 @@ def test_every_format_is_read_back_with_the_energies_of_the_run(
     np.testing.assert_allclose(table_read["time"], table["time"], rtol=1e-4)
     step = (
         10.0 if name.endswith("glstat") else 1e-3
-    )  # the glstat has the energy of the step as well
+    )  # the glstat includes the energy of the step
     np.testing.assert_allclose(
         table_read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step
     )
@@ -144,7 +144,7 @@ def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     boxes = [outline for outline in drawn if len(outline) > 2]
     assert len(boxes) == 16
     np.testing.assert_array_equal(boxes[8][0], boxes[8][-1])
-    assert len(outlines.patches) == 4  # floor and curb, at the start and at the end
+    assert len(outlines.patches) == 4  # ground and curb, at the start and at the end
     assert [text.get_text() for text in outlines.texts][0::7] == ["0", "250"]
     for axes in (roll, height):
         labels = axes.get_legend_handles_labels()[1]

@@ -19,6 +19,8 @@ NODAL_BODY = (
     "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
 )
 
+ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
+
 
 def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
     """Write the sample run with its deck."""
@@ -37,9 +39,9 @@ def box(tmp_path: Path) -> Path:
     return write_run_folder(tmp_path / "run")
 
 
-def print_card(folder: Path, *extra_keywords: str) -> tuple[str, str]:
+def print_card(folder: Path, *options: str) -> tuple[str, str]:
     """Return the card of a plan, and the messages on stderr."""
-    result = run("plan", str(folder), "--part", "flying", "-f", "card", *extra_keywords)
+    result = run("plan", str(folder), "--part", "flying", "-f", "card", *options)
     assert result.exit_code == 0
     return result.stdout, result.stderr
 
@@ -99,7 +101,7 @@ def test_python_uses_the_same_deck(box: Path) -> None:
     )
     assert "deck-in-folder" not in [warning.code for warning in without.warnings]
     assert "--no-deck" in without.command
-    assert "--deck" in planned.command  # since the command names the files of the run
+    assert "--deck" in planned.command  # because the command names the files of the run
 
 
 def test_the_overview_reads_the_same_deck(box: Path) -> None:
@@ -110,7 +112,9 @@ def test_the_overview_reads_the_same_deck(box: Path) -> None:
         flight_row["start"] for flight_row in by_command["flights"]
     ]
     shutil.copy(box / "main.k", box / "other.k")
-    assert d2.read(box).overview().flights  # nothing is asked here: none is read
+    assert (
+        d2.read(box).overview().flights
+    )  # no question needs a deck here, so none is read
 
 
 def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(
@@ -147,7 +151,7 @@ def test_what_check_would_say_is_said_when_the_card_is_printed(tmp_path: Path) -
     assert by_python.code == "card-objection"
     assert (
         str(tmp_path) not in by_python.message
-    )  # the folder in which it was tried is nobody's business
+    )  # the message must not name the temporary folder
 
 
 def test_ids_of_the_deck_are_not_used_again(tmp_path: Path) -> None:
@@ -220,9 +224,6 @@ def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> No
     )
 
 
-ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
-
-
 def write_radioss_run(path: Path, root: str) -> Path:
     """Write a falling box of two plates, with the history of the sample box."""
     path.mkdir()
@@ -255,5 +256,7 @@ def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(
     times = ("--tr", "0.1", "--td", "0.37", "--part", "1,2", "--after", "0.09")
     result = run("card", *times, "--history", str(box))
     assert "# ---- BOX_0003.rad\n/RUN/BOX/3\n                0.43\n" in result.stdout
-    assert "is new, for parts 1, 2" in result.stderr  # one body, as they share nodes
+    assert (
+        "is new, for parts 1, 2" in result.stderr
+    )  # one body, because they share nodes
     assert "card-objection" not in result.stderr

@@ -15,7 +15,7 @@ from d2rpick.cli.values import spell_option
 from tests.command import ENERGY, put, read_refusal, run
 
 ASKED: Final = ("suggest", "--td", "0.0687534", ENERGY)
-# Arguments that a command needs before it looks at its settings.
+# Arguments that a command needs before it reads its settings.
 NEEDED: Final[dict[str, tuple[str, ...]]] = {
     "drive": ("x", "-o", "y"),
     "verify": ("--tr", "1", "x"),
@@ -47,7 +47,7 @@ FORBIDDEN: Final = {
     **dict.fromkeys(("starter", "engine", "scheduler"), "'x'"),
     **dict.fromkeys(("overwrite", "debug", "verbose", "show-settings"), "true"),
 }
-# One or more values of every type that TOML has.
+# Values of every type of TOML.
 VALUES: Final = (
     *(
         "'text'",
@@ -198,7 +198,7 @@ def test_a_byte_order_mark_before_the_settings_is_no_part_of_them() -> None:
     assert "valid TOML was expected" in read_refusal(*ASKED)
 
 
-# Whose file it is, and where it lies.
+# Owner and folder of the settings file.
 
 
 @pytest.fixture
@@ -318,7 +318,7 @@ def test_a_link_to_a_file_of_another_user_is_not_used(inner: Path) -> None:
     (inner / "d2rpick.toml").symlink_to(elsewhere)
     result = run(*ASKED)
     assert result.stderr.startswith(f"note: {inner / 'd2rpick.toml'}: not used")
-    assert "--margin 0.001 by" in result.stderr  # the next file above
+    assert "--margin 0.001 by" in result.stderr  # the next settings file above
 
 
 def test_the_values_of_these_tests_are_toml() -> None:

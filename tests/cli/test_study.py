@@ -105,7 +105,7 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
         assert f"{document['common_tr']:g}, acceptable in 3 of 3 runs" in text
         assert form == "table" or all(
             source in text for source in sources
-        )  # a table folds long names
+        )  # a table wraps long names
 
 
 @pytest.mark.slow
@@ -156,13 +156,13 @@ def test_options_of_suggest_hold_for_each_run() -> None:
         ((), 0),
         (("absent.csv",), 1),
         (("--max-residual", "0.001"), 1),
-        (("--tolerance", "0.001"), 1),  # each has a tr, all have none in common
+        (("--tolerance", "0.001"), 1),  # each run has a tr, but none is common to all
         (("--td", "7"), 2),
         (("--td", "x"), 2),
         (("--jobs", "0"), 2),
         (("--from", "absent.txt"), 2),
         (("-",), 2),
-        (("--scheduler", "tcp://127.0.0.1:9"), 2),  # beside --jobs
+        (("--scheduler", "tcp://127.0.0.1:9"), 2),  # together with --jobs
         (("--energy", "a", "--part", "1"), 2),
     ],
 )
@@ -236,7 +236,7 @@ def wait_for(ledger: Path, lines: int) -> None:
     for _ in range(1000):
         with suppress(
             FileNotFoundError
-        ):  # it is tried whether it can be written before the first line is
+        ):  # d2rpick tests if the ledger can be written before it writes the first line
             if ledger.read_bytes().count(b"\n") >= lines:
                 return
         time.sleep(0.02)
@@ -298,9 +298,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(
         )  # no process of the pool keeps the streams open
     assert (process.returncode, text) == (-signal.SIGKILL, "")
     with ledger.open("ab") as file:
-        file.write(
-            ledger.read_bytes().splitlines()[0][:200]
-        )  # as if it had been writing
+        file.write(ledger.read_bytes().splitlines()[0][:200])  # as if it were writing
     slow.unlink()
     variants.write(slow, variants.make_variant(1.0005))
     again = run(*args)
@@ -337,7 +335,7 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
 def test_a_run_that_kills_its_process_is_a_row(
     runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # as the system does when memory runs out
+    # As the system does if memory runs out.
     (tmp_path / "sitecustomize.py").write_text(
         "import os, d2rpick.choice.runs.study as study\n"
         "ask = study.ask\n"
@@ -378,7 +376,7 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
     assert process.returncode == 2
 
 
-# Taking up where it ended.
+# Resuming.
 
 
 def count_taken(args: Sequence[str]) -> str:
@@ -462,7 +460,7 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
 def test_a_file_in_the_folder_of_a_run_is_never_written_to(
     tmp_path: Path, option: str
 ) -> None:
-    # a database by its content; its name is none that a plot would have
+    # A database is recognised by its content; its name would not fit a plot.
     (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
     (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
     content_before = (tmp_path / "glstat").read_bytes()
@@ -473,7 +471,7 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(
     assert (tmp_path / "glstat").read_bytes() == content_before
 
 
-# Svg grows most with the number of curves; from eleven runs on they are drawn as many.
+# The svg grows mostly with the number of curves; from eleven runs on, their number is constant.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")]
@@ -488,7 +486,7 @@ def test_a_plot_shows_the_runs(
     assert content.startswith(
         {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
     )
-    if suffix == "svg":  # few have a name beside their curve, many are told together
+    if suffix == "svg":  # few runs have a name beside their curve, many have one legend
         label = (
             f"internal energy of {number} runs"
             if number > 10

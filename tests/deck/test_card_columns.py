@@ -15,6 +15,11 @@ from d2rpick.deck.printing import print_cards
 
 WIDTH = 10  # columns of a field
 
+GAPS = st.lists(st.floats(1e-3, 10.0), min_size=1, max_size=7).filter(
+    lambda gaps: len(gaps) % 2 == 1
+)
+FIXED = ("CODE", "TIME2", "TIME3", "ENTNO", "RELSW", "PAIRED", "RWF", "OFFSET")
+
 
 class Column(NamedTuple):
     """A field: its name, its place from 0, its type, and what a blank means."""
@@ -111,11 +116,6 @@ def starts_of(gaps: list[float]) -> list[float]:
     return times
 
 
-GAPS = st.lists(st.floats(1e-3, 10.0), min_size=1, max_size=7).filter(
-    lambda gaps: len(gaps) % 2 == 1
-)
-
-
 @settings(max_examples=120)
 @given(printing=printings(), gaps=GAPS)
 def test_sets_by_time_have_every_field_in_its_columns(
@@ -137,9 +137,6 @@ def test_sets_by_time_have_every_field_in_its_columns(
         assert not there.deformable
         assert not back.rigid
         check_lines(there, back, printing)
-
-
-FIXED = ("CODE", "TIME2", "TIME3", "ENTNO", "RELSW", "PAIRED", "RWF", "OFFSET")
 
 
 def check_lines(there: SetRead, back: SetRead, printing: Printing) -> None:

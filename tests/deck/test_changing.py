@@ -41,6 +41,11 @@ TWICE = ONCE.replace(
 # threads and read in pieces.
 SIZES = {"small": 0, "big": 300_000, "big, by threads": 5_000_000}
 
+THREADED = (
+    "deck",
+    "elements",
+)  # the reads of one file do not depend on the number of files
+
 
 def grow_text(text: str, size: str) -> str:
     """Return a deck with comments of this size in its middle, so that a cut leaves half of the deck."""
@@ -145,10 +150,6 @@ CASES = {
     "elements": (read_parts_of, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT",
     "$\n*ELEMENT")[:9000]),
 }  # fmt: skip
-THREADED = (
-    "deck",
-    "elements",
-)  # the reads of one file do not depend on the number of files
 
 
 @pytest.mark.slow

@@ -17,6 +17,8 @@ PUSHES = Pushes(
     ((0.0, 0.01), (0.05, 0.06), (0.062, 0.07), (0.12, 0.13), (0.2, 0.21)), speed=3.0
 )
 
+BY_CONTACT = ("--solver", "ls-dyna-contact", "--contact", "7")
+
 
 def flatten_windows(windows: Sequence[tuple[float, float]]) -> list[float]:
     return [time for window in windows for time in window]
@@ -97,9 +99,6 @@ def falls(tmp_path_factory: pytest.TempPathFactory) -> str:
         == 0
     )
     return path
-
-
-BY_CONTACT = ("--solver", "ls-dyna-contact", "--contact", "7")
 
 
 def test_the_printed_pair_is_read_back_with_its_windows(

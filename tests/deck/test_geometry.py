@@ -40,6 +40,12 @@ SHELL = (
 IN_SHELLS = SPEED / math.sqrt(1 - NU**2)
 IN_SOLIDS = SPEED * math.sqrt((1 - NU) / ((1 + NU) * (1 - 2 * NU)))
 
+ALONG, ACROSS = 12, 5
+PART = f"/PART/1\na\n{pad(1, 1)}/SHELL/1\n{pad(1, 1, 2, 4, 6)}{rad.PROPS}"
+WATCHED = "/TH/NODE/7\nthree points\nDX        VX\n         2         0first\n        99         0no node\n         4\n"
+PLATE = "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 4, 3)
+PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}"
+
 
 @pytest.mark.parametrize(
     ("section", "elements", "mass", "step"),
@@ -111,9 +117,6 @@ def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> 
         )
 
 
-ALONG, ACROSS = 12, 5
-
-
 def make_plate(far: float = 0.0) -> Inventory:
     """Return a deck with a plate of shells, 3.6 x 1.5, in the plane x = far, and a part of two springs."""
     y, z = np.meshgrid(
@@ -174,11 +177,6 @@ def test_where_elements_are_missing_no_part_is_placed() -> None:
     assert Placement(replace(make_plate(), complete=False)).parts == {}
 
 
-PART = f"/PART/1\na\n{pad(1, 1)}/SHELL/1\n{pad(1, 1, 2, 4, 6)}{rad.PROPS}"
-WATCHED = "/TH/NODE/7\nthree points\nDX        VX\n         2         0first\n        99         0no node\n         4\n"
-PLATE = "*ELEMENT_SHELL\n" + make_row(1, 7, 1, 2, 4, 3)
-
-
 def list_coordinates(inventory: Inventory) -> list[list[float]]:
     return [
         where.tolist() for where in inventory.coordinates[np.sort(inventory.watched)]
@@ -204,9 +202,6 @@ def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> 
     inventory = dyna.read_text(tmp_path, text)
     assert len(list_coordinates(inventory)) == (0 if keyword == "_SET" else 2)
     assert inventory.complete
-
-
-PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}"
 
 
 @pytest.mark.parametrize(

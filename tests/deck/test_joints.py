@@ -36,6 +36,11 @@ JOINTS = {
     "tied contact of nodes": SET + "*CONTACT_TIED_NODES_TO_SURFACE\n" + pad(5, 9, 4, 3),
 }
 
+RADIOSS = "".join(
+    f"/PART/{n}\np{n}\n{pad(1, 1)}/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}"
+    for n in (1, 2, 3)
+)
+
 
 def read_with_mesh(folder: Path, text: str) -> Inventory:
     return read_text(folder, MESH + text + "*END\n")
@@ -125,12 +130,6 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
     assert find_rigid_bodies(inventory, [7, 9]) == ()
     assert find_rigid_bodies(inventory, [7]) == (RigidBody((7,)),)
     assert inventory.complete  # its cost is known
-
-
-RADIOSS = "".join(
-    f"/PART/{n}\np{n}\n{pad(1, 1)}/SHELL/{n}\n{pad(n, *range(4 * n - 3, 4 * n + 1))}"
-    for n in (1, 2, 3)
-)
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,10 @@ BODY, WHEEL, OTHER = (
     {7, 9},
 )  # both wheels have hubs of one part
 
+RAMP = "/FUNCT/1\nramp\n" + "".join(
+    pad(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1))
+)
+
 
 def write_group(number: int, *nodes: int) -> str:
     return f"/GRNOD/NODE/{number}\nnodes\n{pad(*nodes)}"
@@ -181,11 +185,6 @@ def write_gravity(
 def find_surroundings(inventory: Inventory) -> Surroundings:
     """Return the surroundings that a deck defines, for a run without other information."""
     return add_surroundings(OpenedRun((), ()), inventory).surroundings
-
-
-RAMP = "/FUNCT/1\nramp\n" + "".join(
-    pad(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1))
-)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,10 @@ from tests.sample_deck import DECK, FLYING, make_deck, make_radioss_files
 
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 
+SHELLS = make_row(1, 7, 1, 2, 4, 3) + make_row(2, 7, 5, 6, 8, 7)
+WIDE = make_row(1, 7, 1, 2, 4, 3, width=10) + make_row(2, 7, 5, 6, 8, 7, width=10)
+LINES = SHELLS.splitlines(keepends=True)
+
 
 def write_nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
     """Return the node lines of a row of unit cubes."""
@@ -35,11 +39,6 @@ def read_text(folder: Path, text: str, **files: str) -> Inventory:
 
 def count_elements(deck_inventory: Inventory) -> dict[int, dict[str, int]]:
     return {part: dict(counts) for part, counts in deck_inventory.counts.items()}
-
-
-SHELLS = make_row(1, 7, 1, 2, 4, 3) + make_row(2, 7, 5, 6, 8, 7)
-WIDE = make_row(1, 7, 1, 2, 4, 3, width=10) + make_row(2, 7, 5, 6, 8, 7, width=10)
-LINES = SHELLS.splitlines(keepends=True)
 
 
 def insert_after_each(line: str) -> str:

@@ -27,6 +27,8 @@ DISCRETE = (
     f"*PART\nmount\n{pad(15, 2)}*SECTION_DISCRETE\n{pad(2)}\n\n*ELEMENT_DISCRETE\n"
 )
 
+FIRST, SECOND, THIRD = range(1, 41), range(41, 45), range(45, 49)
+
 
 def read_radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
     if engine:
@@ -40,9 +42,6 @@ def write_body(number: int, *nodes: int) -> str:
     group = "".join(pad(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
     line = f"{48 + number:10d}{0:10d}{0:10d}{0:10d}{'0':>20}{number:10d}\n"
     return f"/RBODY/{number}\nrb\n{line}/GRNOD/NODE/{number}\ng\n{group}"
-
-
-FIRST, SECOND, THIRD = range(1, 41), range(41, 45), range(45, 49)
 
 
 def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> None:

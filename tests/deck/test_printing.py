@@ -27,6 +27,29 @@ ALL = Printing(
     pushed=((0.09, 0.2), (0.3, 0.5), (0.75, 0.8)),
 )
 
+PARTS = Printing(part=(11, 12))
+MERGED = PARTS._replace(merge=11)
+CARD = """\
+*DEFORMABLE_TO_RIGID_AUTOMATIC
+$#   swset      code     time1     time2     time3     entno     relsw    paired
+       901         0      0.02       0.0       0.0         0         0         0
+$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
+         0         0         0    7.0e-5         2         0       0.0
+$#     pid       lrb     ptype
+        11         0      PART
+        12        11      PART
+*DEFORMABLE_TO_RIGID_AUTOMATIC
+$#   swset      code     time1     time2     time3     entno     relsw    paired
+       902         0      0.09       0.0       0.0         0         0         0
+$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
+         0         0         0       0.0         0         2       0.0
+$#     pid     ptype
+        11      PART
+        12      PART
+"""
+BOX = Printing(node=tuple(range(1, 13)), end=0.15, name="run")
+ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
+
 
 @given(st.integers(-9999, 99999), st.integers(-3, 3))
 def test_few_digits_read_back(digits: int, exponent: int) -> None:
@@ -145,28 +168,6 @@ def test_what_is_not_a_file_of_windows(text: str, message: str) -> None:
         read_windows(text, "w.txt")
 
 
-PARTS = Printing(part=(11, 12))
-MERGED = PARTS._replace(merge=11)
-CARD = """\
-*DEFORMABLE_TO_RIGID_AUTOMATIC
-$#   swset      code     time1     time2     time3     entno     relsw    paired
-       901         0      0.02       0.0       0.0         0         0         0
-$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
-         0         0         0    7.0e-5         2         0       0.0
-$#     pid       lrb     ptype
-        11         0      PART
-        12        11      PART
-*DEFORMABLE_TO_RIGID_AUTOMATIC
-$#   swset      code     time1     time2     time3     entno     relsw    paired
-       902         0      0.09       0.0       0.0         0         0         0
-$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
-         0         0         0       0.0         0         2       0.0
-$#     pid     ptype
-        11      PART
-        12      PART
-"""
-
-
 def list_rows(text: str) -> list[str]:
     """Return the data lines of a card."""
     return [line for line in text.splitlines() if line[0] not in "$*"]
@@ -237,7 +238,6 @@ def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
 
 
 radioss_cards = partial(print_cards, solver="radioss")
-BOX = Printing(node=tuple(range(1, 13)), end=0.15, name="run")
 
 
 def test_three_engine_files() -> None:
@@ -269,9 +269,6 @@ def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
         ("3", "0.09", "ON"),
         ("4", "0.15", "OFF"),
     ]
-
-
-ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
 
 
 @pytest.mark.parametrize(

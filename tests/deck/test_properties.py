@@ -15,9 +15,20 @@ from tests.decks import list_spans, read, write
 
 TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)
 
+PIECES = [
+    *("*DEFORMABLE_TO_RIGID_AUTOMATIC\n", "*DEFORMABLE_TO_RIGID\n", "*PARAMETER\n", "*PARAMETER_EXPRESSION\n"),
+    *("*DEFORMABLE_TO_RIGID_INERTIA\n", "*RIGID_DEFORMABLE_CONTROL\n", "*INCLUDE\n", "*INCLUDE_TRANSFORM\n"),
+    *("*PART\n", "*PART_INERTIA\n", "*SET_PART_LIST_GENERATE\n", "*SET_PART_ADD\n", "*CONTROL_TERMINATION\n"),
+    *("*DATABASE_GLSTAT\n", "*MAT_RIGID\n", "*ELEMENT_SHELL\n", "*COMMENT ", "*KEYWORD LONG=Y\n", "*\n", "main.k\n"),
+    *("R a       &b+1\n", "R b       &a\n", "&a", "<1/0>", "-&a", "1e999", "PSET", "\xe9"),
+    *("-----BEGIN PGP MESSAGE\n", "\0"),
+    *("         1", "         2", "       0.5", "        -1", "9999999999", "    1.e300"),
+    *("\n", "\r\n", ",", "$", " +\n", "&"),
+]  # fmt: skip
+
 
 @dataclass(frozen=True)
-class Written:
+class DeckWithWindows:
     """Windows, and how their deck is written."""
 
     windows: list[tuple[int, float, float | None]] = field(default_factory=list)
@@ -30,13 +41,13 @@ class Written:
 
 
 @st.composite
-def draw_deck(draw: st.DrawFn) -> Written:
+def draw_deck(draw: st.DrawFn) -> DeckWithWindows:
     windows: list[tuple[int, float, float | None]] = []
     for part in sorted(draw(st.sets(st.integers(1, 9999), max_size=4))):
         times = sorted(draw(st.sets(TIMES, min_size=1, max_size=6)))
         pairs = list(zip(times[::2], [*times[1::2], None], strict=False))
         windows += [(part, tr, td) for tr, td in pairs]
-    return Written(
+    return DeckWithWindows(
         windows,
         draw(st.sampled_from(["fixed", "comma", "long"])),
         draw(st.sampled_from(["\n", "\r\n"])),
@@ -47,7 +58,7 @@ def draw_deck(draw: st.DrawFn) -> Written:
     )
 
 
-def write_text(written: Written) -> str:
+def write_text(written: DeckWithWindows) -> str:
     """Return the deck with one card per switch."""
     width = 20 if written.style == "long" else 10
     lines = ["*KEYWORD" + (" LONG=Y" if written.style == "long" else "")]
@@ -79,7 +90,7 @@ def write_text(written: Written) -> str:
 
 
 @given(draw_deck())
-def test_what_is_written_is_read(written: Written) -> None:
+def test_what_is_written_is_read(written: DeckWithWindows) -> None:
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), write_text(written))
         assert list_spans(deck) == written.windows
@@ -88,7 +99,7 @@ def test_what_is_written_is_read(written: Written) -> None:
 
 
 @given(draw_deck())
-def test_offsets_move_every_window(written: Written) -> None:
+def test_offsets_move_every_window(written: DeckWithWindows) -> None:
     outer = f"*INCLUDE_TRANSFORM\ninner.k\n{0:10d}{0:10d}{written.offset:10d}\n"
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), outer, {"inner.k": write_text(written)})
@@ -110,18 +121,6 @@ def check_survives(content: bytes) -> None:
 @given(st.binary(max_size=400))
 def test_any_bytes(content: bytes) -> None:
     check_survives(content)
-
-
-PIECES = [
-    *("*DEFORMABLE_TO_RIGID_AUTOMATIC\n", "*DEFORMABLE_TO_RIGID\n", "*PARAMETER\n", "*PARAMETER_EXPRESSION\n"),
-    *("*DEFORMABLE_TO_RIGID_INERTIA\n", "*RIGID_DEFORMABLE_CONTROL\n", "*INCLUDE\n", "*INCLUDE_TRANSFORM\n"),
-    *("*PART\n", "*PART_INERTIA\n", "*SET_PART_LIST_GENERATE\n", "*SET_PART_ADD\n", "*CONTROL_TERMINATION\n"),
-    *("*DATABASE_GLSTAT\n", "*MAT_RIGID\n", "*ELEMENT_SHELL\n", "*COMMENT ", "*KEYWORD LONG=Y\n", "*\n", "main.k\n"),
-    *("R a       &b+1\n", "R b       &a\n", "&a", "<1/0>", "-&a", "1e999", "PSET", "\xe9"),
-    *("-----BEGIN PGP MESSAGE\n", "\0"),
-    *("         1", "         2", "       0.5", "        -1", "9999999999", "    1.e300"),
-    *("\n", "\r\n", ",", "$", " +\n", "&"),
-]  # fmt: skip
 
 
 @given(st.lists(st.sampled_from(PIECES), max_size=40))

@@ -19,6 +19,12 @@ OFF, ON = f"/RBODY/OFF\n{MAIN}\n", f"/RBODY/ON\n{MAIN}\n"
 ALL = f"/GRNOD/NODE/7\nall\n{pad(*range(1, 11))}{pad(MAIN)}"
 SENSOR = f"/SENSOR/TIME/5\nclock\n{pad(0.001, 0.002, width=WIDE)}"
 
+LISTED = "/INIVEL/NODE/1\nlist\n" + "".join(
+    f"{pad(node, 0)[:-1]}{pad(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
+)
+MAINS = f"/GRNOD/NODE/98\nmain\n{pad(MAIN)}"
+CAP = "/DTIX\n1e-5 1e-5\n"
+
 
 def find_run_flaws(
     folder: Path, further_cards: str = "", *legs: str, deck: str = ""
@@ -167,12 +173,6 @@ def write_spin(group: int) -> str:
     return f"/INIVEL/AXIS/1\nspin\n{pad('Z', 0, group)}{pad(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
 
 
-LISTED = "/INIVEL/NODE/1\nlist\n" + "".join(
-    f"{pad(node, 0)[:-1]}{pad(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
-)
-MAINS = f"/GRNOD/NODE/98\nmain\n{pad(MAIN)}"
-
-
 @pytest.mark.parametrize(
     ("text", "moves"),  # whether the kinetic energy at the start was above 0 in OpenRadioss
     [
@@ -208,9 +208,6 @@ def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(
 
 def write_start(*nodes: int, type_: int = 1) -> str:
     return f"/INIV/TRA/X/{type_}\n10.0\n{' '.join(map(str, nodes))}\n"
-
-
-CAP = "/DTIX\n1e-5 1e-5\n"
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,35 @@ GROUP = "/GRNOD/PART/7\nbox\n         1\n"
 BODY = "      1808         0         0         0                   0         7\n"
 Spans = list[tuple[int, str, float, float | None]]
 
+SHELLS = "/SHELL/2\n" + "".join(f"{n:10d}" for n in (2, 3, 4, 5, 6)) + "\n"
+ON, OFF = "/RBODY/ON\n1808\n", "/RBODY/OFF\n1808\n"
+SOLID = (
+    "/PROP/SOLID/1\nsolid\n"
+    + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0))
+    + "\n"
+)
+BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
+FIELDS = b"".join(b"%20d" % n for n in (1, 2, 3)) + b"\n"
+BEHIND = [
+    *(
+        b"/BEGIN\n",
+        b"/RUN/x/1\n",
+        b"/RBODY/ON\n",
+        b"/PART/\xb2\n",
+        b"/INIV/TRA/X/1\n",
+        b"/INIV\n",
+        b"/INIVEL/TRA/1\nv\n",
+    ),
+    *(
+        b"/INIVEL\n",
+        b"/INIVEL/AXIS/1\nv\n",
+        b"/INIVEL/NODE/1\nv\n",
+        b"/RWALL/CYL/1\nw\n",
+        b"/RWALL\nw\n\n" + FIELDS,
+    ),
+    b"/NODE\n         1" + FIELDS + b"/RWALL/PLANE/1\nw\n\n" + FIELDS + FIELDS,
+]
+
 
 def write_run(
     folder: Path,
@@ -42,9 +71,6 @@ def read_spans(path: str) -> Spans:
         (window.unit.id, window.unit.kind, window.tr, window.td)
         for window in run_windows
     ]
-
-
-SHELLS = "/SHELL/2\n" + "".join(f"{n:10d}" for n in (2, 3, 4, 5, 6)) + "\n"
 
 
 @pytest.mark.parametrize(
@@ -83,9 +109,6 @@ def test_a_body_whose_parts_are_not_known_is_named_by_its_main_node(
 ) -> None:
     starter = EXAMPLE.deck.replace(GROUP, group)
     assert read_spans(write_run(tmp_path, starter)) == [(1808, "main node", 0.02, 0.09)]
-
-
-ON, OFF = "/RBODY/ON\n1808\n", "/RBODY/OFF\n1808\n"
 
 
 @pytest.mark.parametrize(
@@ -235,16 +258,6 @@ def test_printed_sensors_hold_their_windows(
     assert read_spans(path) == [(1, "part", tr, td) for tr, td in windows]
 
 
-SOLID = (
-    "/PROP/SOLID/1\nsolid\n"
-    + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0))
-    + "\n"
-)
-
-
-BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
-
-
 @pytest.mark.parametrize(
     ("more", "found"),
     [
@@ -380,28 +393,6 @@ def test_a_run_cut_anywhere_is_checked_or_refused() -> None:
                 continue
             for window in checked.windows:
                 assert window.tr in {0.0, 0.02}
-
-
-FIELDS = b"".join(b"%20d" % n for n in (1, 2, 3)) + b"\n"
-BEHIND = [
-    *(
-        b"/BEGIN\n",
-        b"/RUN/x/1\n",
-        b"/RBODY/ON\n",
-        b"/PART/\xb2\n",
-        b"/INIV/TRA/X/1\n",
-        b"/INIV\n",
-        b"/INIVEL/TRA/1\nv\n",
-    ),
-    *(
-        b"/INIVEL\n",
-        b"/INIVEL/AXIS/1\nv\n",
-        b"/INIVEL/NODE/1\nv\n",
-        b"/RWALL/CYL/1\nw\n",
-        b"/RWALL\nw\n\n" + FIELDS,
-    ),
-    b"/NODE\n         1" + FIELDS + b"/RWALL/PLANE/1\nw\n\n" + FIELDS + FIELDS,
-]
 
 
 @given(st.binary(max_size=300), st.sampled_from(BEHIND))

@@ -87,6 +87,8 @@ SAME = {
     + BACK,
 }
 
+CARDS = {"cards.k": THERE + BACK}
+
 
 @pytest.mark.parametrize("deck", SAME.values(), ids=SAME.keys())
 def test_the_same_window_however_it_is_written(tmp_path: Path, deck: str) -> None:
@@ -136,7 +138,6 @@ def write_transform(
     return f"*INCLUDE_TRANSFORM\ncards.k\n{offsets}\n{further_offsets}\n{factors}\n{'0':>10s}\n"
 
 
-CARDS = {"cards.k": THERE + BACK}
 INCLUDES = {
     "beside": ("*INCLUDE\ncards.k\n", CARDS, WINDOW),
     "names between blank lines": (

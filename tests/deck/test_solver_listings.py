@@ -21,6 +21,9 @@ STEP = 1e-5  # duration of a cycle
 OFF, ON, RESET = "/RBODY/OFF\n", "/RBODY/ON\n", "/SENS/RESET\n"
 Spans = Mapping[int, Sequence[tuple[float, float | None]]]
 
+MIDDLE = [(0.002, 0.004)]
+BOTH = f"/GRNOD/PART/9\nboth\n{pad(1, 2)}"
+
 
 class Listed(NamedTuple):
     """A run: its starter cards besides three plates, the cards of its legs, and when each part is rigid."""
@@ -95,7 +98,6 @@ def write_rigid_part(node: int = 0, sensor: int = 0) -> str:
 
 THREE = write_body(1, 101, 1) + write_body(2, 102, 2) + write_body(3, 103, 3)
 TWICE = write_clock(5, 0.0, 0.002) + write_clock(6, 0.004) + write_logic("OR", 7, 5, 6)
-MIDDLE = [(0.002, 0.004)]
 ALONE = write_body(1, 101, 1, 5)
 
 
@@ -104,7 +106,6 @@ def write_fourth(*nodes: int) -> str:
     return f"/PART/4\nfurther\n{pad(1, 1)}/SHELL/4\n{pad(4, *nodes)}"
 
 
-BOTH = f"/GRNOD/PART/9\nboth\n{pad(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
         THREE + write_merge((1, 1, 2, 1)),

@@ -11,6 +11,42 @@ from tests.decks import list_spans, pad, read, windows
 
 Spans = list[tuple[int | None, float, float | None]]
 
+PLAIN = "*DEFORMABLE_TO_RIGID\n         1\n"
+SETS: dict[str, tuple[str, list[int]]] = {
+    "list": ("*SET_PART_LIST\n         9\n         1         2\n", [1, 2]),
+    "list with title": (
+        "*SET_PART_LIST_TITLE\nall\n         9\n         1         2\n",
+        [1, 2],
+    ),
+    "two lines": ("*SET_PART\n         9\n         1\n         2\n", [1, 2]),
+    "generate": ("*SET_PART_LIST_GENERATE\n         9\n         1       100\n", [1, 2]),
+    "column": ("*SET_PART_COLUMN\n         9\n         2       0.5\n", [2]),
+    "add": (
+        "*SET_PART\n         8\n         2\n*SET_PART_ADD\n         9\n         8\n",
+        [2],
+    ),
+    "added to itself": ("*SET_PART_ADD\n         9\n         9\n", []),
+    "collect": (
+        "*SET_PART_COLLECT\n         9\n         1\n*SET_PART_COLLECT\n         9\n         2\n",
+        [1, 2],
+    ),
+}
+PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
+    "pairs": ("*PART\na\n" + pad(1, 1, 7) + "\n" + pad(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
+    "contact": ("*PART_CONTACT\na\n" + pad(1, 1, 7) + pad(0.1) + "b\n" + pad(2, 1, 8), {1: "7", 2: "8"}),
+    "inertia": (
+        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 0) + pad(1) + pad(0) + "b\n" + pad(2, 1, 8),
+        {1: "7", 2: "8"},
+    ),
+    "inertia in local axes": (
+        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 1) + pad(1) + pad(0) + pad(9)
+        + "b\n" + pad(2, 1, 8),
+        {1: "7", 2: "8"},
+    ),
+    "move is no part": ("*PART_MOVE\n10,0,0,0.0045\n", {}),
+    "composite": ("*PART_COMPOSITE\na\n" + pad(5, 2) + pad(7, 0.1), {5: ""}),
+}  # fmt: skip
+
 
 def write_rigid_card(time: str, *parts: str, swset: int = 1) -> str:
     return write_automatic_card(swset, time, rigid=parts)
@@ -20,7 +56,6 @@ def write_back_card(time: str, *parts: str, swset: int = 2) -> str:
     return write_automatic_card(swset, time, deformable=parts)
 
 
-PLAIN = "*DEFORMABLE_TO_RIGID\n         1\n"
 CASES: dict[str, tuple[str, Spans]] = {
     "one": (
         write_rigid_card("0.02", "1") + write_back_card("0.09", "1"),
@@ -93,27 +128,6 @@ def write_set_card(set_id: int) -> str:
     return f"*DEFORMABLE_TO_RIGID\n{set_id:10d}         0      PSET\n"
 
 
-SETS: dict[str, tuple[str, list[int]]] = {
-    "list": ("*SET_PART_LIST\n         9\n         1         2\n", [1, 2]),
-    "list with title": (
-        "*SET_PART_LIST_TITLE\nall\n         9\n         1         2\n",
-        [1, 2],
-    ),
-    "two lines": ("*SET_PART\n         9\n         1\n         2\n", [1, 2]),
-    "generate": ("*SET_PART_LIST_GENERATE\n         9\n         1       100\n", [1, 2]),
-    "column": ("*SET_PART_COLUMN\n         9\n         2       0.5\n", [2]),
-    "add": (
-        "*SET_PART\n         8\n         2\n*SET_PART_ADD\n         9\n         8\n",
-        [2],
-    ),
-    "added to itself": ("*SET_PART_ADD\n         9\n         9\n", []),
-    "collect": (
-        "*SET_PART_COLLECT\n         9\n         1\n*SET_PART_COLLECT\n         9\n         2\n",
-        [1, 2],
-    ),
-}
-
-
 @pytest.mark.parametrize(("cards", "expected"), SETS.values(), ids=SETS.keys())
 def test_part_sets_are_resolved(
     tmp_path: Path, cards: str, expected: list[int]
@@ -129,23 +143,6 @@ def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> Non
     (window,) = windows(read(tmp_path, PARTS + cards + write_set_card(9))).windows
     assert window.part is None
     assert (window.unit.id, window.unit.kind) == (9, "part set")
-
-
-PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
-    "pairs": ("*PART\na\n" + pad(1, 1, 7) + "\n" + pad(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
-    "contact": ("*PART_CONTACT\na\n" + pad(1, 1, 7) + pad(0.1) + "b\n" + pad(2, 1, 8), {1: "7", 2: "8"}),
-    "inertia": (
-        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 0) + pad(1) + pad(0) + "b\n" + pad(2, 1, 8),
-        {1: "7", 2: "8"},
-    ),
-    "inertia in local axes": (
-        "*PART_INERTIA\na\n" + pad(1, 1, 7) + pad(0, 0, 0, 1, 1) + pad(1) + pad(0) + pad(9)
-        + "b\n" + pad(2, 1, 8),
-        {1: "7", 2: "8"},
-    ),
-    "move is no part": ("*PART_MOVE\n10,0,0,0.0045\n", {}),
-    "composite": ("*PART_COMPOSITE\na\n" + pad(5, 2) + pad(7, 0.1), {5: ""}),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize(

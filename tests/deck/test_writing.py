@@ -20,6 +20,13 @@ CARD = print_cards(WINDOWS, Printing(part=(1,)))
 INCLUDE = "*INCLUDE\nswitches.k\n"
 RUN = RULES["D2R401"].passing[0]
 
+IS_CUT = r"main\.k: the .* may be truncated\. The added cards would hide this: .*"
+OTHER_SET = THERE.replace(
+    "         1         0  ", "       901         0  ", 1
+).replace("         1         0      PART", "         2         0      PART")
+ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/RBODY/OFF\n1808\n/INIV/TRA/X/2\n6.0\n2\n/TFILE/4\n1e-5\n/DTIX\n1e-6 1e-4\n"
+LEGS = Printing(node=(1808,), end=0.4, name="box")
+
 
 def list_windows(path: str) -> list[tuple[int, float, float | None]]:
     checked = check_deck(path)
@@ -61,12 +68,6 @@ def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
     written = write_deck(main, CARD, str(tmp_path / "next"))
     assert [Path(name).name for name in written] == ["main.k", "switches.k", "all.k"]
     assert list_windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
-
-
-IS_CUT = r"main\.k: the .* may be truncated\. The added cards would hide this: .*"
-OTHER_SET = THERE.replace(
-    "         1         0  ", "       901         0  ", 1
-).replace("         1         0      PART", "         2         0      PART")
 
 
 @pytest.mark.parametrize(
@@ -150,9 +151,6 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
 
 
 # Radioss.
-
-
-ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/RBODY/OFF\n1808\n/INIV/TRA/X/2\n6.0\n2\n/TFILE/4\n1e-5\n/DTIX\n1e-6 1e-4\n"
 
 
 def write_radioss_run(folder: Path, engine: str = ENGINE) -> str:
@@ -316,9 +314,6 @@ def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
         main, print_sensor_card(starter=body, sensor=4), str(tmp_path / "next")
     )
     assert list_windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
-
-
-LEGS = Printing(node=(1808,), end=0.4, name="box")
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_the_ends_of_a_flight_are_known_to_one_output_interval(
     assert load <= flight.start <= load + STEP * 1.001
     assert landing - STEP * 1.001 <= flight.end <= landing
     assert flight.end_seen
-    assert np.isnan(flight.gravity)  # no force tells of it
+    assert np.isnan(flight.gravity)  # no force gives the gravity
 
 
 @pytest.mark.parametrize("td", [0.1, 0.2, 0.55, 1.5])
@@ -125,7 +125,7 @@ def test_forces_find_the_flights_of_a_computed_run_that_its_momenta_find() -> No
     ):
         assert flight_of_momenta.start == pytest.approx(
             flight_of_forces.start, abs=3 * history.step
-        )  # momenta leave the last push a moment
+        )  # momenta show the end of the last push slightly later
         assert flight_of_momenta.end == pytest.approx(
             flight_of_forces.end, abs=1.01 * history.step
         )
@@ -252,5 +252,5 @@ def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
     assert flight.end == pytest.approx(0.8, abs=1.1 * STEP)
     counted = require(
         Touches.of((ground_with_contact, inner))
-    )  # of an unknown momentum
+    )  # the momentum is unknown
     assert counted.flight_around(0.5) is None

@@ -54,7 +54,7 @@ def test_every_contact_is_seen_within_half_an_interval(
 ) -> None:
     """A contact inside one interval is placed in its middle third: the error is at most 2/3 of an interval."""
     interval = 1e-3
-    sliver = 0.01 * interval  # so short a push in an interval does not show
+    sliver = 0.01 * interval  # a push shorter than this in one interval is invisible
     contacts = [
         (0.1 + shift * interval, 0.1 + (shift + length) * interval),
         (0.3037, 0.3115),

@@ -41,6 +41,8 @@ from tests.sample_box import make_t01
 MILLISECOND = 1e-3
 CAR, DROP = locate_stored("carT01.gz"), locate_stored("drop2T01.gz")
 
+ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
+
 
 class Rolled(NamedTuple):
     """Computed rollover run, and its true flight."""
@@ -201,7 +203,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(
         history, (rolled.start + rolled.end) / 2, Settings(replay=False)
     ).flight
     assert flight.source == "energy-balance"
-    # damping bends the parabola of the work of gravity: less than the flight is found then, never more
+    # Damping bends the parabola of the work of gravity: the flight found is shorter, never longer.
     start, end = require(flight.start), require(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
     assert find_seen_flight(history, rolled.end + 0.02).refusal
@@ -317,7 +319,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
     contact = 80 * np.exp(
         -(((time - 0.8) / 0.01) ** 2)
-    )  # brief, in the last quarter before td
+    )  # short, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
     quiet = require(
         find_quiet_time(make_table(time, np.where(time < 0.1, 0, energy)), 0.95)
@@ -381,9 +383,6 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
     (doubt,) = flight.doubts
     assert "by the momentum" in doubt
     assert "by the contact energy" in doubt
-
-
-ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:

@@ -161,7 +161,7 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("channels", "td", "settings", "why"),
+    ("push_options", "td", "settings", "why"),
     [
         (
             {"alpha": 5.0, "contact": 0.09},
@@ -174,9 +174,9 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     ],
 )
 def test_where_no_oscillator_tells_the_sign_it_is_said_why(
-    channels: dict[str, float], td: float, settings: Settings, why: str
+    push_options: dict[str, float], td: float, settings: Settings, why: str
 ) -> None:
-    situation = examine_td(push_with_noise(**channels), td, settings)  # type: ignore[arg-type]
+    situation = examine_td(push_with_noise(**push_options), td, settings)  # type: ignore[arg-type]
     assert situation.basis == "energy"
     assert why in (situation.vibration.unknown or "")
     assert settings.replay or situation.evidence.fit is None
@@ -216,11 +216,11 @@ def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.153, 0.157, 0.162, 0.17, 0.178])
-@pytest.mark.parametrize("first_td", [None, 0.03])
+@pytest.mark.parametrize("load_end", [None, 0.03])
 def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
-    td: float, first_td: float | None
+    td: float, load_end: float | None
 ) -> None:
-    answer = suggest_in_history(push_twice(), td, Settings(after=first_td))
+    answer = suggest_in_history(push_twice(), td, Settings(after=load_end))
     assert answer.recommended is None
     assert answer.situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
     assert "td-after-contact" in {caution.code for caution in answer.cautions}
@@ -297,5 +297,5 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
         )
         < 1e-4
     )
-    # in noise of 1 % a peak is not exact: the middle of what the noise leaves
+    # With 1 % noise a peak is not exact: the middle of the range left by the noise.
     assert 0 < require(require(answer.better_pair).residual) < 1e-3

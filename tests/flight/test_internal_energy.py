@@ -105,9 +105,9 @@ def test_the_flight_behind_a_load_that_fades_is_found(
 @pytest.mark.parametrize(
     ("acceleration", "direction", "flies"),
     [
-        (0.981, (1, 0, 0), False),  # friction with a coefficient of a tenth
-        (9.81, (1, 1, 0), False),  # on its way to no axis
-        (9.81, (0, 0, 1), True),  # as thrown straight up
+        (0.981, (1, 0, 0), False),  # friction coefficient 0.1
+        (9.81, (1, 1, 0), False),  # not along an axis
+        (9.81, (0, 0, 1), True),  # thrown straight up
         (9810.0, (0, 0, 1), True),
     ],
 )
@@ -123,7 +123,7 @@ def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_al
     assert (flight is not None) is flies
     falling = replace(
         braked, values=braked.values - values[-1] * 1.5
-    )  # it stands, and goes back
+    )  # it stands, then moves back
     assert find_flight_around(falling, 0.5) is not None
 
 
@@ -278,7 +278,7 @@ def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
 def test_a_motion_that_has_ended_is_no_flight() -> None:
     stopped = np.where(
         TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0
-    )  # a motion that is prescribed, then none
+    )  # prescribed motion, then none
     assert find_flight_around(make_momenta(stopped), 0.8) is None
 
 
@@ -402,7 +402,7 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     assert not find_flights(
         make_table(TIME, 8e3 * wound, whole, balance=energies), PLAIN
     )
-    stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
+    stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # stored by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
     (flight,) = find_flights(
         make_table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN
@@ -434,9 +434,7 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     lost: float,
 ) -> None:
     """Drag slows the body down while its spring vibrates on as one oscillator."""
-    decay = np.exp(
-        -0.2 * TIME
-    )  # damping within the body, which the energies show as well
+    decay = np.exp(-0.2 * TIME)  # internal damping, which the energies show too
     ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
     internal = 20 * decay - ringing
     flight = suggest_in_history(
@@ -609,6 +607,10 @@ def test_an_energy_that_stays_low_before_it_rises_is_not_that_of_a_body_that_yie
     settled = flat + 0.03
     assert rises_as_it_yields(TIME, energy, None, 0.0, settled, 1.0) is rises
     sums = 0 * TIME + 7, 7 - TIME, 7 + 20 * TIME
-    expected = (rises, rises, False)  # the motion gives it, damping takes, a load feeds
+    expected = (
+        rises,
+        rises,
+        False,
+    )  # motion supplies it, damping dissipates it, a load feeds it
     for whole, gives in zip(sums, expected, strict=True):
         assert rises_as_it_yields(TIME, energy, whole, 0.0, settled, 1.0) is gives

@@ -189,7 +189,7 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
     share=0.5,
     states=387,
     digits=9,
-)  # the first state of the contact leaves just what the tolerance allows
+)  # the first state of the contact is exactly within the tolerance
 def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchange(
     *,
     start: float,
@@ -206,7 +206,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     )  # fmt: skip
     flight = require(find_flight_around(momenta, td))
     assert flight.parts == PARTS[:2]
-    # In these times the forces change the momentum by two thousandths of its range.
+    # In these times the forces change the momentum by 0.2 % of its range.
     load, contact = 5e-3 * start, 5e-4
     tolerance = 3 * END / (states - 1)
     assert flight.start == pytest.approx(start, abs=tolerance + load)
@@ -263,7 +263,7 @@ def test_the_set_that_flies_together_can_be_named() -> None:
     assert find_flight_around(replace(momenta_of_set, flying=(0,)), TD) is None
     assert (
         find_flight_around(replace(momenta_of_set, flying=(0, 1, 2)), TD) is None
-    )  # what stands does not fall with the others
+    )  # a body at rest does not fall with the others
 
 
 def test_attached_parts_are_found_among_many() -> None:
@@ -336,7 +336,7 @@ BEFORE_AND_AFTER = make_momenta_in_flight(
     [
         *(
             (BEFORE_AND_AFTER, td) for td in (0.03, 0.35)
-        ),  # in the load, and in the contact
+        ),  # before the end of the load, and in the contact
         *(
             (make_momenta_in_flight(list_trip_pieces()), td) for td in (-0.1, END + 0.1)
         ),  # outside the record
@@ -579,7 +579,7 @@ def test_the_momentum_of_body_and_wheels_together_shows_no_flight_while_wheels_a
         flight = find_flight_around(momenta, 0.65, reference.history.balance)
         if flies:
             assert flight
-        else:  # without mass and kinetic energy gravity is not known from a push
+        else:  # without mass and kinetic energy, gravity cannot be told from a push
             assert flight is None or np.isnan(flight.gravity)
         for td in np.linspace(0.15, 0.95, 9).tolist():
             assert flies or not suggest_in_run(reference, td, Settings()).recommended

@@ -27,7 +27,7 @@ from tests.reading import read_solved
 
 TIME = np.linspace(0.0, 0.1, 401)
 FLIGHT = (0.0, 0.1)
-# Four corners of a frame and an engine in it; places in metres about any point.
+# Four corners of a frame and an engine in it; positions [m] about any point.
 PLACES = np.array(
     [
         [1.5, 0.7, 0.1],
@@ -41,6 +41,8 @@ MASSES = np.array([150.0, 160.0, 140.0, 130.0, 200.0])
 ENGINE = 4
 numbers = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
 vectors = st.tuples(numbers, numbers, numbers).map(np.array)
+
+SPAN = np.linspace(0.0, 1.0, 11)
 
 
 def rotate_about(rate: Samples, angle: Samples) -> Samples:
@@ -162,7 +164,7 @@ def test_beyond_the_flight_nothing_is_known() -> None:
         (
             np.array([0.01, 0.01, 0.01, 500.0, 300.0]),
             range(5),
-        ),  # all but two have hardly any
+        ),  # the others have almost no mass
     ],
 )
 def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
@@ -284,7 +286,7 @@ def test_the_box_is_as_far_off_as_computed(
             "1,4,5,7,11",
             (0.0386, 0.1503),
             True,
-        ),  # 0.5 mm where the solver found 0.9
+        ),  # 0.5 mm; the solver found 0.9
         ("drop2T01.gz", "1-5", (0.3396, 0.4194), False),
         ("drop2T01.gz", "1-5", (0.5022, 0.5962), False),
     ],
@@ -319,9 +321,6 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
         )
         is None
     )
-
-
-SPAN = np.linspace(0.0, 1.0, 11)
 
 
 def make_moving_body(part: int, rate: float, path: float = 100.0) -> Drift:
@@ -423,7 +422,7 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     np.testing.assert_allclose(all_bodies.errors(tr, 0.1464), alone.errors(tr, 0.1464))
     worst = require(all_bodies.worst(0.0496, 0.1464))
     assert worst.body == RigidBody(frame)
-    assert worst.error < 1e-3  # without engine and wheels; with them 2.2 mm
+    assert worst.error < 1e-3  # error without engine and wheels; with them it is 2.2 mm
 
 
 @pytest.mark.parametrize("body", [(1, 2), (99,), (1, 99)])

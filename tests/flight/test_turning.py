@@ -254,7 +254,7 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
             )
             assert drift_found.at_least is (
                 row["run"] == "car_b_stopped"
-            )  # 0.05 degrees where the solver found 0.15
+            )  # 0.05 degrees; the solver found 0.15
             judged += 1
     assert judged == 17
 

@@ -21,6 +21,8 @@ ENERGIES = np.stack(
     [np.sin(TIME) ** 2, 2 * np.cos(3 * TIME) ** 2, TIME, 1 - np.exp(-TIME)], axis=1
 )
 
+CAR = locate_stored("carT01.gz")
+
 
 @dataclass
 class Made:
@@ -71,9 +73,6 @@ def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
 
 def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
     assert find_spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
-
-
-CAR = locate_stored("carT01.gz")
 
 
 def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:

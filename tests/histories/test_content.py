@@ -47,6 +47,20 @@ OPENERS = pytest.mark.parametrize(
     "opened", [open_file, open_run_on_disk], ids=["in memory", "on disk"]
 )
 
+ANEW = {
+    "binout": bytes(make_binout([1, 2, 3], shift=1).data),
+    "radioss-th": bytes(make_t01(3, start=1).data),
+    "glstat": make_glstat_text(TIMES, [3, 2, 1]),
+    "matsum": make_matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
+    "hdf5": write_hdf5(plain)
+    .getvalue()
+    .replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
+    "csv": b"time,IE\n0,2\n1,1\n",
+    "d3thdt": D3plotWriter(family=3).together(make_states(TIMES)[::-1]),
+    "d3plot": D3plotWriter(order=">").together(make_states(TIMES)),
+}
+HOUR = 3_600_000_000_001
+
 
 @given(
     st.binary(min_size=8, max_size=3000),
@@ -284,20 +298,6 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
     )
 
 
-ANEW = {
-    "binout": bytes(make_binout([1, 2, 3], shift=1).data),
-    "radioss-th": bytes(make_t01(3, start=1).data),
-    "glstat": make_glstat_text(TIMES, [3, 2, 1]),
-    "matsum": make_matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
-    "hdf5": write_hdf5(plain)
-    .getvalue()
-    .replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
-    "csv": b"time,IE\n0,2\n1,1\n",
-    "d3thdt": D3plotWriter(family=3).together(make_states(TIMES)[::-1]),
-    "d3plot": D3plotWriter(order=">").together(make_states(TIMES)),
-}
-
-
 @pytest.mark.parametrize("kind", CONTENTS)
 def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_what_it_was(
     kind: str, tmp_path: Path
@@ -348,9 +348,6 @@ def fixed_times(
     monkeypatch.setattr(time, "sleep", pauses.append)
     monkeypatch.setattr(time, "time_ns", lambda: now)
     return pauses
-
-
-HOUR = 3_600_000_000_001
 
 
 @pytest.mark.parametrize(

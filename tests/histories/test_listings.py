@@ -31,6 +31,31 @@ TAIL = """
  EXECUTION COMPLETED .......................:      {ran}  16:51:36
 """
 
+BEFORE, FIX, AFTER = (
+    "6068aa23d",
+    "2b7ab50b747de97049f2a80bc36558eec5c0c764",
+    "780156a9a0b8906458ebd7a6eee35dbb5ef54f1a",
+)
+D3HSP = """
+  25 smallest timesteps
+ ------------------------------------------------
+ element       number                part    timestep
+ shell             12                   7  5.0000E-05
+ shell             13                   7  6.0000E-05
+ solid              4                 101  8.0000E-05
+
+ T i m i n g   i n f o r m a t i o n
+                        CPU(seconds)   %CPU  Clock(seconds) %Clock
+  ----------------------------------------------------------------
+  Keyword Processing ... 0.0000E+00    0.00     1.0000E-02    1.00
+  Initialization ....... 1.0000E+00  100.00     5.0000E-01   50.00
+  Element processing ... {}    0.00     3.0000E-01   30.00
+  ----------------------------------------------------------------
+  T o t a l s            {}  100.00     1.0000E+00  100.00
+
+ Problem cycle      =       640
+"""
+
 
 def listing(owner: str = "2026 Siemens", tag: str = "", ran: str = "2026/11/22") -> str:
     return HEAD.format(
@@ -43,13 +68,6 @@ def find_wrong_listings(
 ) -> list[str]:
     (folder / f"CAR_{leg:04d}.out").write_text(text)
     return list(find_wrong_energies([str(folder / (history or f"CART{leg:02d}"))]))
-
-
-BEFORE, FIX, AFTER = (
-    "6068aa23d",
-    "2b7ab50b747de97049f2a80bc36558eec5c0c764",
-    "780156a9a0b8906458ebd7a6eee35dbb5ef54f1a",
-)
 
 
 @pytest.mark.parametrize(
@@ -129,27 +147,6 @@ def test_the_middle_of_a_long_listing_is_not_read(tmp_path: Path) -> None:
     assert find_wrong_listings(
         tmp_path, f"{head}\n{' ' * 3_000_000}\n EXECUTION{tail}"
     ) == [f"{tmp_path / 'CAR_0002.out'}: run on 2025-06-01"]
-
-
-D3HSP = """
-  25 smallest timesteps
- ------------------------------------------------
- element       number                part    timestep
- shell             12                   7  5.0000E-05
- shell             13                   7  6.0000E-05
- solid              4                 101  8.0000E-05
-
- T i m i n g   i n f o r m a t i o n
-                        CPU(seconds)   %CPU  Clock(seconds) %Clock
-  ----------------------------------------------------------------
-  Keyword Processing ... 0.0000E+00    0.00     1.0000E-02    1.00
-  Initialization ....... 1.0000E+00  100.00     5.0000E-01   50.00
-  Element processing ... {}    0.00     3.0000E-01   30.00
-  ----------------------------------------------------------------
-  T o t a l s            {}  100.00     1.0000E+00  100.00
-
- Problem cycle      =       640
-"""
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,13 @@ SPELLINGS = [
     ("results/energies/internal", "results/energies/kinetic"),
 ]
 
+TIME = np.linspace(0.0, 1.0, 21)
+COLUMNS = {
+    "Internal energy": TIME,
+    "Kinetic energy": 2 - TIME,
+    "Total energy": 2 + 0 * TIME,
+}
+
 
 @pytest.mark.parametrize(("internal", "kinetic"), SPELLINGS)
 def test_internal_and_kinetic_energy_are_found_in_any_spelling(
@@ -168,14 +175,6 @@ def test_times_are_found(name: str) -> None:
 )
 def test_other_times_are_none_of_the_states(name: str) -> None:
     assert not is_time(name)
-
-
-TIME = np.linspace(0.0, 1.0, 21)
-COLUMNS = {
-    "Internal energy": TIME,
-    "Kinetic energy": 2 - TIME,
-    "Total energy": 2 + 0 * TIME,
-}
 
 
 def write_header_and_rows(*names: str) -> str:

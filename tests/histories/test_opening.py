@@ -29,6 +29,13 @@ GLSTAT = (
 
 Write = Callable[..., str]
 
+DYNA_HEAD = b" one shell\n                         ls-dyna smp.123456 s           date 02/02/2020\n\n"
+LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{END LEGEND}\n\n"
+STATES = (
+    b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   1.0000E+00\n"
+    b" time =   1.0000E-01\n mat.#=    1             inten=   1.0000E+00     kinen=   0.0000E+00\n"
+)
+
 
 @pytest.fixture
 def file(tmp_path: Path) -> Write:
@@ -176,10 +183,6 @@ def test_the_selection_reaches_the_reader(file: Write) -> None:
     )
 
 
-DYNA_HEAD = b" one shell\n                         ls-dyna smp.123456 s           date 02/02/2020\n\n"
-LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{END LEGEND}\n\n"
-
-
 @pytest.mark.parametrize(
     ("data", "name", "reason"),
     [
@@ -293,12 +296,6 @@ def test_a_matsum_is_told_by_its_parts_behind_any_legend(file: Write) -> None:
 def test_words_about_a_solver_in_a_table_make_no_listing_of_it(file: Write) -> None:
     head = b"# written by OpenRadioss engine, LS-DYNA and Abaqus/Explicit\n"
     assert read_history([file(head + CSV)]).energy.tolist() == [1.0, 2.0, 1.5]
-
-
-STATES = (
-    b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   1.0000E+00\n"
-    b" time =   1.0000E-01\n mat.#=    1             inten=   1.0000E+00     kinen=   0.0000E+00\n"
-)
 
 
 def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(

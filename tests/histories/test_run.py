@@ -47,6 +47,8 @@ TIMES = np.arange(1, 9) / 8
 GLSTAT = make_glstat_text(TIMES, 10 * TIMES)
 MATSUM = make_matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 
+ZERO = "   0.0000E+00"
+
 
 def open_companions(
     files: Mapping[str, bytes], selection: Selection | None = None
@@ -432,9 +434,6 @@ def test_a_long_gap_between_legs_is_told() -> None:
         "no states between 0.0999564 and 0.370008" in note
         for note in open_run(legs).history(Selection()).notes
     )
-
-
-ZERO = "   0.0000E+00"
 
 
 def masses(path: Path) -> Samples | None:

@@ -34,6 +34,8 @@ CONVENTIONS = {
     "up and down": ([0, 2, 0], 1, [(0.5, True), (1.5, False)]),
 }
 
+ROOTS = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=8).map(np.array)
+
 
 def crossings(energy: list[int], level: float) -> list[tuple[float, bool]]:
     times, rising = find_crossings(
@@ -150,9 +152,6 @@ def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
             piece[0] + energy[piece].argmin(),
             piece[0] + energy[piece].argmax(),
         } <= {*time.astype(int).tolist()}
-
-
-ROOTS = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=8).map(np.array)
 
 
 @pytest.mark.parametrize("with_slope", [False, True])

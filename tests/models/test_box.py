@@ -35,6 +35,8 @@ INTERVAL = 5e-4
 ANGLES = st.floats(-np.pi, np.pi)
 TIMES = st.integers(0, 12).map(lambda count: count / 100)
 
+FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e6)
+
 
 def momenta(motion: BoxMotion) -> tuple[complex, float]:
     """Return momentum and angular momentum about the origin of the whole model."""
@@ -86,9 +88,6 @@ def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
     run = simulate_box(parameters, *windows)
     assert run.landed is not None
     assert np.abs(run.imbalance).max() < 0.01
-
-
-FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e6)
 
 
 @pytest.mark.slow

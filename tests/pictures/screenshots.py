@@ -25,6 +25,8 @@ _PAGES: Final = {
     ),
 }
 
+NAMES: Final = (*_PAGES,)
+
 
 def browser() -> str | None:
     """Find Chromium."""
@@ -48,6 +50,3 @@ def take_screenshot(name: str, program: str) -> None:
         subprocess.run(
             [program, *options, picture, page.as_uri()], check=True, capture_output=True
         )
-
-
-NAMES: Final = (*_PAGES,)

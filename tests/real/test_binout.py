@@ -80,14 +80,14 @@ def test_half_a_real_file_keeps_the_states_of_that_half() -> None:
 
 
 def test_masses_come_from_the_velocities_of_parts() -> None:
-    found = open_run([real(f"histories/{R12}")], Selection()).masses
-    assert found is not None
-    assert found.shape == (2,)
+    run = open_run([real(f"histories/{R12}")], Selection()).masses
+    assert run is not None
+    assert run.shape == (2,)
 
 
 def test_parts_of_a_run_in_which_nothing_deforms_are_kept() -> None:
-    found = compare_sets_of_parts(
+    part_answer = compare_sets_of_parts(
         open_run([real(f"histories/{PLADE}")]), Settings(), None
     )
-    assert [row.verdict for row in found.rows] == ["keep"] * 3
-    assert found.facts.reason
+    assert [row.verdict for row in part_answer.rows] == ["keep"] * 3
+    assert part_answer.facts.reason

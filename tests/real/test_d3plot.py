@@ -40,26 +40,29 @@ def test_states_are_those_that_were_read_before(folder: str) -> None:
     )  # where they are numbered one by one
     assert database.time.size == truth["states"]
     for state in truth["at"]:
-        at, parts = int(state["state"]), state["parts"]
-        assert database.time[at] == state["time"]
+        state_number, parts = int(state["state"]), state["parts"]
+        assert database.time[state_number] == state["time"]
         for name, value in (
             ("internal_energy", "internal"),
             ("kinetic_energy", "kinetic"),
             ("total_energy", "total"),
         ):
-            assert database.channel(name)[at] == state[value]
-        assert [database.channel(f"{axis}_velocity")[at] for axis in "xyz"] == state[
-            "velocity"
-        ]
+            assert database.channel(name)[state_number] == state[value]
+        assert [
+            database.channel(f"{axis}_velocity")[state_number] for axis in "xyz"
+        ] == state["velocity"]
         quantities = {
             "internal_energy": "internal",
             "kinetic_energy": "kinetic",
             "mass": "mass",
         }
         for name, value in quantities.items():
-            assert database.part_channel(name, ids)[at].tolist() == parts[value]
+            assert (
+                database.part_channel(name, ids)[state_number].tolist() == parts[value]
+            )
         velocities = [
-            database.part_channel(f"{axis}_rbvelocity", ids)[at] for axis in "xyz"
+            database.part_channel(f"{axis}_rbvelocity", ids)[state_number]
+            for axis in "xyz"
         ]
         assert np.transpose(velocities).tolist() == parts["velocity"]
 
@@ -70,12 +73,12 @@ def test_energies_are_those_of_the_glstat_of_the_same_run() -> None:
         open_run([real("d3plot/one_shell/glstat")]).history(Selection()),
     )
     time = run.part_time
-    places = np.abs(glstat.time[:, np.newaxis] - time).argmin(axis=0)
-    same = np.abs(glstat.time[places] - time) < 1e-6 * time[-1]
+    nearest_states = np.abs(glstat.time[:, np.newaxis] - time).argmin(axis=0)
+    same = np.abs(glstat.time[nearest_states] - time) < 1e-6 * time[-1]
     assert same.sum() == 11
     energies = run.part_energies(run.parts)[same, 0]
     np.testing.assert_allclose(
-        energies, glstat.energy[places[same]], rtol=1e-5, atol=1e-18
+        energies, glstat.energy[nearest_states[same]], rtol=1e-5, atol=1e-18
     )  # of its six digits
 
 

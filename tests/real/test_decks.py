@@ -151,12 +151,17 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
         )
         if reading and line[:1] not in "*$" and line.strip():
             plain[int(line[8:16])] += 1
-    found = ls_dyna_inventory.read_ls_dyna_inventory(read_deck(real("decks/nodes.k")))
-    assert {part: counts.total() for part, counts in found.counts.items()} == plain
+    inventory = ls_dyna_inventory.read_ls_dyna_inventory(
+        read_deck(real("decks/nodes.k"))
+    )
+    assert {part: counts.total() for part, counts in inventory.counts.items()} == plain
 
 
 def test_a_real_deck_is_counted() -> None:
-    found = read_inventory(real("radioss-decks/IDEL8_0000.rad"))
-    assert count_elements(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}
-    assert not found.complete  # one of its includes is absent
-    assert not found.parts[1].section.turns
+    inventory = read_inventory(real("radioss-decks/IDEL8_0000.rad"))
+    assert count_elements(inventory) == {
+        1: {"solid": 24},
+        2: {"shell": 350, "triangle": 8},
+    }
+    assert not inventory.complete  # one of its includes is absent
+    assert not inventory.parts[1].section.turns

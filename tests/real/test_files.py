@@ -32,6 +32,26 @@ REFUSED = {
     "qd-cae-python__test-binout": "no glstat or matsum in it, but swforc; name the binout of the run that contains it",
 }
 
+# Tables among the files beside them, and what is said of each.
+MORE = {
+    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by its name not an internal energy",
+    "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
+    "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": "by its name not an internal energy",
+    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
+}
+PAIRS = {
+    "UMAT_2scale_LSDYNA__curve.txt": (
+        300,
+        (0.0, 4e7),
+        (4.2000001606841885e-06, 42607482.295758456),
+    ),
+    "UMAT_2scale_LSDYNA__stress_x_av.csv": (
+        24,
+        (0.0, 922.56408691),
+        (0.50034189224, 667.45178223),
+    ),
+}
+
 
 @pytest.mark.parametrize("file", READABLE)
 def test_read(file: str) -> None:
@@ -48,12 +68,15 @@ def test_read(file: str) -> None:
     digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(
         history.format, 0.0
     )  # sums depend on their order
-    for place, state in (
+    for position, state in (
         ("first", 0),
         ("middle", history.time.size // 2),
         ("last", -1),
     ):
-        written = float(expected[f"{place}_time"]), float(expected[f"{place}_energy"])
+        written = (
+            float(expected[f"{position}_time"]),
+            float(expected[f"{position}_energy"]),
+        )
         assert (history.time[state], history.energy[state]) == pytest.approx(
             written, rel=digits, abs=0.0
         )
@@ -76,27 +99,6 @@ def test_no_file_is_left_out() -> None:
         *READABLE,
         *REFUSED,
     }
-
-
-# Tables among the files beside them, and what is said of each.
-MORE = {
-    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by its name not an internal energy",
-    "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
-    "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": "by its name not an internal energy",
-    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
-}
-PAIRS = {
-    "UMAT_2scale_LSDYNA__curve.txt": (
-        300,
-        (0.0, 4e7),
-        (4.2000001606841885e-06, 42607482.295758456),
-    ),
-    "UMAT_2scale_LSDYNA__stress_x_av.csv": (
-        24,
-        (0.0, 922.56408691),
-        (0.50034189224, 667.45178223),
-    ),
-}
 
 
 def test_a_time_history_as_text_is_read() -> None:

@@ -60,8 +60,8 @@ def test_a_driven_model_does_not_fly(name: str) -> None:
     assert find_flights(history, Settings(replay=False)) == ()
     for share in (0.25, 0.5, 0.75):
         td = float(history.time[0] + share * np.ptp(history.time))
-        found = suggest_in_history(history, td, Settings(replay=False))
-        assert found.recommended is None
+        suggestion = suggest_in_history(history, td, Settings(replay=False))
+        assert suggestion.recommended is None
         assert not verify_in_history(
             history, td / 2, td, Settings(replay=False)
         ).verified

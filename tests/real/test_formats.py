@@ -93,8 +93,10 @@ def test_real_files_have_the_numbers_of_the_solvers_own_converter(
     table = np.array([[float(cell) for cell in row if cell] for row in rows])
     assert run.time.shape == (states,)
     np.testing.assert_allclose(run.time, table[:, 0], rtol=1e-6)
-    for place, name in enumerate(run.channels, start=1):
-        np.testing.assert_allclose(run.channel(name), table[:, place], rtol=1e-6)
+    for column_number, name in enumerate(run.channels, start=1):
+        np.testing.assert_allclose(
+            run.channel(name), table[:, column_number], rtol=1e-6
+        )
     names = next(csv.reader(io.StringIO(text)))
     for part_id, title in parts:
         for short, quantity in (
@@ -194,16 +196,16 @@ def test_glstat_and_matsum_of_one_run_are_joined_by_their_printed_times() -> Non
     )
     assert bolt.channel == "internal energy of Bolt, Bolt Head, Bolt Nut"
     assert bolt.energy[-1] == pytest.approx(34.151 + 6.2484 + 6.1190, rel=1e-12)
-    every = run.part_energies(run.parts).sum(axis=1)
-    assert np.abs(every - whole.energy).max() < 6.1e-4
+    total_energy = run.part_energies(run.parts).sum(axis=1)
+    assert np.abs(total_energy - whole.energy).max() < 6.1e-4
 
 
 def test_a_real_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothing() -> (
     None
 ):
-    found = read_timing(real("histories/lasso-python__sph_models-R12_2_1-d3hsp"))
-    assert (found.cycles, found.elements) == (640, 0.035)
-    assert found.total == pytest.approx(1.298 - 0.011 - 1.216)
+    timing = read_timing(real("histories/lasso-python__sph_models-R12_2_1-d3hsp"))
+    assert (timing.cycles, timing.elements) == (640, 0.035)
+    assert timing.total == pytest.approx(1.298 - 0.011 - 1.216)
 
 
 @pytest.mark.parametrize(
@@ -229,8 +231,8 @@ def test_the_part_that_controls_the_step_is_found_in_a_real_glstat() -> None:
 
 
 def test_times_per_zone_cycle_of_a_real_glstat() -> None:
-    found = read_zone_times(
+    zone_times = read_zone_times(
         real("histories/Masters-Project__Steel_Explicit-glstat.head16000")
     )
-    assert found.time[0] == pytest.approx(5e-4, rel=1e-3)
-    assert found.per_zone[0] == pytest.approx(5134e-9)
+    assert zone_times.time[0] == pytest.approx(5e-4, rel=1e-3)
+    assert zone_times.per_zone[0] == pytest.approx(5134e-9)

@@ -46,13 +46,27 @@ _OPTIONS = (
     "--no-first-run",
     "--disable-background-networking",
 )
-# Everything that shows on the page, reaches over its right edge, and lies in nothing that scrolls.
+# Visible elements that reach beyond the right edge of the page and are not inside a scrolling element.
 _CUT = """
 const scrolls = (one) => one.closest(".scroll, pre") !== null;
 return [...document.body.querySelectorAll("*")]
   .filter((one) => !scrolls(one) && one.getClientRects().length && one.getBoundingClientRect().right > innerWidth + 0.5)
   .map((one) => one.outerHTML.slice(0, 120));
 """
+
+# Where the first and the last td lie in the chart of the energy, in pixels.
+ENDS = """
+const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
+const width = document.querySelector(".energy .u-over").clientWidth;
+return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
+"""
+# All that is said of the td in sight, at once: each question to a browser takes its time.
+SAID = """
+const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
+const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
+return { ...Object.fromEntries(values.reverse()), typed: document.getElementById("explorer-td").value, spoken };
+"""
+WIDTHS = (390, 768, 1280)
 
 
 def mark_for_browser(test: Test) -> Test:
@@ -144,21 +158,6 @@ class Browser:
     def complaints(self) -> list[dict[str, Any]]:
         """Return the console messages since the last call."""
         return list(self.driver.get_log("browser"))  # type: ignore[no-untyped-call]
-
-
-# Where the first and the last td lie in the chart of the energy, in pixels.
-ENDS = """
-const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
-const width = document.querySelector(".energy .u-over").clientWidth;
-return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
-"""
-# All that is said of the td in sight, at once: each question to a browser takes its time.
-SAID = """
-const values = [...document.querySelectorAll("[data-value]")].map((one) => [one.dataset.value, one.textContent]);
-const spoken = document.querySelector(".handle").getAttribute("aria-valuetext");
-return { ...Object.fromEntries(values.reverse()), typed: document.getElementById("explorer-td").value, spoken };
-"""
-WIDTHS = (390, 768, 1280)
 
 
 def write_page(folder: Path, *args: str) -> Path:
@@ -405,7 +404,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     td_known = [row["td"] for row in list_numbers(paper)]
     handle = browser.find(".handle")
     for keys, td in (("", 0.064), (Keys.END, td_known[-1]), (Keys.HOME, td_known[0])):
-        handle.send_keys(keys)  # which it takes, so it can be reached
+        handle.send_keys(keys)  # it takes the focus, so it can be reached by keyboard
         (slider,) = browser.spoken({"slider"}, td)
         property_values = {
             property_["name"]: property_["value"].get("value")
@@ -416,7 +415,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
             property_values["valuemax"],
         ) == pytest.approx((td_known[0], td_known[-1]), rel=1e-6)
         assert property_values["focusable"]
-        # the words instead of the number: the tree of some versions passes over them, what speaks it does not
+        # Texts instead of numbers: some versions leave them out of the tree, but screen readers speak them.
         assert handle.get_attribute("aria-valuetext") == describe_td(
             run_suggested(browser.value("command"))
         )
@@ -428,7 +427,7 @@ def test_nothing_is_cut_with_and_without_scripts(
     paper: Path, box: Path, browser: Browser, width: int
 ) -> None:
     for page in (paper, box):
-        plain = page.with_name("plain.html")  # to a browser that runs no scripts
+        plain = page.with_name("plain.html")  # for a browser without scripts
         plain.write_text(
             re.sub(
                 r"<script>.*?</script>", "", page.read_text("utf-8"), flags=re.DOTALL

@@ -18,6 +18,8 @@ from d2rpick.report.study import shorten_names
 from tests.command import BOX, ENERGY, ROOT
 from tests.energies import require
 
+SWITCHED_RUN = "switched run, as computed"
+
 
 def list_texts(axes: Axes) -> list[str]:
     return [text.get_text() for text in axes.texts]
@@ -56,7 +58,7 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert axes.get_ylim()[1] < 4
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
     assert "landing, up to 1248 \u2191" in list_texts(axes)
-    assert list_marks(axes) == [1]  # the recommended one alone
+    assert list_marks(axes) == [1]  # only the recommended one
     drawn_patches = map(find_extents, axes.patches)
     bands = [drawn_patch for drawn_patch in drawn_patches if drawn_patch.height < 0.1]
     drawn = sum(drawn_patch.width for drawn_patch in bands)
@@ -67,7 +69,7 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
         ),
         rel=0.03,
     )
-    assert len(bands) < len(require(answer.windows))  # gaps that nobody sees are closed
+    assert len(bands) < len(require(answer.windows))  # invisible gaps are closed
 
 
 @pytest.mark.parametrize("replay", [True, False])
@@ -96,7 +98,7 @@ def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> No
         for line in (*energy.lines, *motion.lines)
         if line.get_label() == "better pair"
     ]
-    assert len(lines) == 6  # its level, its times in both axes, and what follows
+    assert len(lines) == 6  # level, times in both axes, and the energy after td
     assert np.unique(lines[0].get_ydata()).tolist() == [
         answer.situation.at(better.td).energy_td
     ]
@@ -236,9 +238,6 @@ def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:
         if energy_line.get_label() == SWITCHED_RUN
     )
     assert np.array_equal(line.get_ydata(), require(verdict.computed).energy)
-
-
-SWITCHED_RUN = "switched run, as computed"
 
 
 def test_a_plan_names_no_negative_energies_and_the_times_of_its_windows() -> None:

@@ -33,9 +33,9 @@ COMMANDS = {
 }
 
 
-pytestmark = pytest.mark.usefixtures("by_level")  # what is found does not matter here
+pytestmark = pytest.mark.usefixtures("by_level")  # only the form matters here
 
-# A scan takes seconds, and a run that is driven a solver: their own tests write each of their forms.
+# A scan takes seconds, and a driven run needs a solver: their own tests write all their formats.
 QUICK = [
     (result, form)
     for result in FORMATS

@@ -68,9 +68,12 @@ def test_what_took_no_part_is_not_named() -> None:
     weights = run_json("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)[
         "weights"
     ]
-    assert (weights["file"], weights["sha256"]) == (None, None)  # those that ship
+    assert (weights["file"], weights["sha256"]) == (
+        None,
+        None,
+    )  # the weights of the package
     arguments = ("suggest", "--td", "0.37", "--deck", "main.k", MATSUM)
-    assert run_json(*arguments)["deck"] is None  # without parts a deck tells nothing
+    assert run_json(*arguments)["deck"] is None  # without parts, a deck is not used
     document = run_json(
         *arguments, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5"
     )

@@ -24,6 +24,43 @@ ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
 VOID = {"meta", "br", "hr", "link", "input"}
 
+PAPER = ("--td", "0.064", ENERGY)
+CHAIN = locate_stored("chain_referenceT01.gz")
+BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
+# Of a command with its arguments: the exit code, what its page says, and what it must not say.
+TOLD = {
+    "parts, version, flight and health": (
+        ("suggest", *BOX), 0,
+        ("curb trip of a box", "RADIOSS OpenRadioss", "momentum of box, step", "hourglass energy of box", "kept",
+         "266 more"), (),
+    ),
+    "a pair that cannot be bettered": (
+        ("suggest", "--td-window", "0.06", "0.07", ENERGY), 0, ("usetr0.0135867td0.0687534",), ("Better pair",)
+    ),
+    "each part and the saving, and no pair that is not better": (
+        ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
+        ("Parts at this pair", "share of the mismatch", "about 16% of the processor time", "wrong by 6.5%"),
+        ("Better pair",),
+    ),
+    "nothing to recommend": (
+        ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,
+        ("No tr can be recommended", "no-candidate"), ("card chosen", "rigid at  "),
+    ),
+    "a poor pair": (
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 1,
+        ("do not usetr0.0128853td0.064", "wrong by 96%"), ("Verified",),
+    ),
+    "a pair that verifies": (
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY), 0,
+        ("usetr0.0135867td0.0687534", "residual, expected0.000", "1501 states", "Method and limits",
+         "d2rpick verify --tr", "d2rpick card --tr 0.0135867 --td 0.0687534 --part"), ("Verified",),
+    ),
+    "a pair that does not verify": (
+        ("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY), 1,
+        ("do not use", "opposite sign of the deformation"), ("d2rpick card",),
+    ),
+}  # fmt: skip
+
 
 class Page(HTMLParser):
     """Parser of the contents of a page; fails if an element is not closed."""
@@ -111,9 +148,6 @@ def read_page_of(
     assert result.exit_code == code, result.stderr
     assert not result.stderr
     return Page((folder / "report.html").read_text("utf-8"))
-
-
-PAPER = ("--td", "0.064", ENERGY)
 
 
 @pytest.fixture(scope="module")
@@ -265,43 +299,6 @@ def test_it_is_signed_where_the_times_stand(paper: Page) -> None:
 def test_it_is_the_same_every_time(paper: Page, folder: Path) -> None:
     (folder / "report.html").unlink()
     assert read_page_of(folder, *PAPER).source == paper.source
-
-
-CHAIN = locate_stored("chain_referenceT01.gz")
-BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
-# Of a command with its arguments: the exit code, what its page says, and what it must not say.
-TOLD = {
-    "parts, version, flight and health": (
-        ("suggest", *BOX), 0,
-        ("curb trip of a box", "RADIOSS OpenRadioss", "momentum of box, step", "hourglass energy of box", "kept",
-         "266 more"), (),
-    ),
-    "a pair that cannot be bettered": (
-        ("suggest", "--td-window", "0.06", "0.07", ENERGY), 0, ("usetr0.0135867td0.0687534",), ("Better pair",)
-    ),
-    "each part and the saving, and no pair that is not better": (
-        ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
-        ("Parts at this pair", "share of the mismatch", "about 16% of the processor time", "wrong by 6.5%"),
-        ("Better pair",),
-    ),
-    "nothing to recommend": (
-        ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,
-        ("No tr can be recommended", "no-candidate"), ("card chosen", "rigid at  "),
-    ),
-    "a poor pair": (
-        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 1,
-        ("do not usetr0.0128853td0.064", "wrong by 96%"), ("Verified",),
-    ),
-    "a pair that verifies": (
-        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY), 0,
-        ("usetr0.0135867td0.0687534", "residual, expected0.000", "1501 states", "Method and limits",
-         "d2rpick verify --tr", "d2rpick card --tr 0.0135867 --td 0.0687534 --part"), ("Verified",),
-    ),
-    "a pair that does not verify": (
-        ("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY), 1,
-        ("do not use", "opposite sign of the deformation"), ("d2rpick card",),
-    ),
-}  # fmt: skip
 
 
 @pytest.mark.slow

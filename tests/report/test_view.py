@@ -14,7 +14,7 @@ from tests.energies import require
 from tests.reading import read_history
 
 TIME = np.linspace(0, 10, 1001)
-# a load until 2, a ripple about 1, a landing at 8
+# A load until 2, a vibration about 1, a landing at 8.
 RECORD = np.where(TIME < 2, 50, np.where(TIME < 8, 1 + 0.1 * np.sin(9 * TIME), 500))
 
 

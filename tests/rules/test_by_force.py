@@ -131,15 +131,15 @@ def test_of_several_that_push_the_force_of_the_named_one_is_followed(
 ) -> None:
     """A T01 with the forces of interface 3 and rigid wall 3, without momenta; ends are known to half an interval."""
     values = np.zeros((TIMES.size, 2, 1, 6))
-    for place, begins in enumerate((0.5, 1.0)):
-        values[:, place, 0, 2] = np.clip(TIMES, begins - 0.125, 2.0)
+    for row_number, begins in enumerate((0.5, 1.0)):
+        values[:, row_number, 0, 2] = np.clip(TIMES, begins - 0.125, 2.0)
     groups = [MadeGroup(101, {3: "floor"}), MadeGroup(102, {3: "ground"})]
     history = tmp_path / "boxT01"
     history.write_bytes(t01(groups, values))
-    both = "/RWALL/PLANE/3\nground\n/INTER/TYPE7/3\nfloor\n"
-    deck = write_radioss_run(tmp_path, write_force_sensor(kind), both)
-    found = run_json("check", deck, "--history", str(history))
-    ends = [time for pair in list_windows(found) for time in pair]
+    both_contacts = "/RWALL/PLANE/3\nground\n/INTER/TYPE7/3\nfloor\n"
+    deck = write_radioss_run(tmp_path, write_force_sensor(kind), both_contacts)
+    check_report = run_json("check", deck, "--history", str(history))
+    ends = [time for pair in list_windows(check_report) for time in pair]
     assert ends == pytest.approx([0.0, start])
 
 

@@ -53,8 +53,8 @@ def test_a_time_after_the_run_is_one_finding(tmp_path: Path) -> None:
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
     options = (write_timed_deck(tmp_path, "0.0135867", "68.7534"), "--history", history)
     for ignored, rule in (("D2R111", "D2R101"), ("D2R111,D2R101", "D2R205")):
-        found = run_json("check", *options, "--ignore", ignored)["findings"]
-        assert [one["rule"] for one in found] == [rule]
+        findings = run_json("check", *options, "--ignore", ignored)["findings"]
+        assert [finding["rule"] for finding in findings] == [rule]
 
 
 def test_what_follows_is_reported_where_its_cause_is_ignored(tmp_path: Path) -> None:

@@ -30,6 +30,17 @@ frame
 TO_RIGID = "*RIGID_DEFORMABLE_D2R\n        11         0\n        12        11\n"
 BACK = "*RIGID_DEFORMABLE_R2D\n        11\n        12\n"
 
+NODAL = """\
+*ELEMENT_SHELL
+       1      11       1       2       3       4
+*SET_NODE_LIST
+         5
+         3         4        99
+*CONSTRAINED_NODAL_RIGID_BODY
+         9         0         5
+*END
+"""
+
 
 def write_restart(end: str, *cards: str) -> str:
     control = "*RIGID_DEFORMABLE_CONTROL\n         1         1         1    1.0e-5\n"
@@ -157,18 +168,6 @@ def test_a_bare_card_that_lets_restarts_switch_is_no_switch(legs: list[str]) -> 
     assert check_deck(legs[0]).findings == ()
 
 
-NODAL = """\
-*ELEMENT_SHELL
-       1      11       1       2       3       4
-*SET_NODE_LIST
-         5
-         3         4        99
-*CONSTRAINED_NODAL_RIGID_BODY
-         9         0         5
-*END
-"""
-
-
 @pytest.mark.parametrize("nrbf", [0, 1])
 def test_a_restart_deletes_nodal_rigid_bodies_by_its_control(
     tmp_path: Path, nrbf: int
@@ -180,5 +179,7 @@ def test_a_restart_deletes_nodal_rigid_bodies_by_its_control(
         str(put(tmp_path / f"r{number}.k", text))
         for number, text in enumerate(legs, start=1)
     ]
-    found = {finding.rule for finding in check_deck(str(main), restarts=paths).findings}
-    assert ("D2R112" in found) == (nrbf == 0)
+    rules_found = {
+        finding.rule for finding in check_deck(str(main), restarts=paths).findings
+    }
+    assert ("D2R112" in rules_found) == (nrbf == 0)

@@ -34,6 +34,15 @@ from tests.decks import count_findings, write
 PASSING = [(rule, example) for rule in RULES.values() for example in rule.passing]
 FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]
 
+SWAPPED = (
+    HEAD
+    + PARTS
+    + write_automatic_card(1, "0.09", rigid=["1"])
+    + write_automatic_card(2, "0.02", deformable=["1"])
+    + END
+)
+OWN = 'select = ["D2R1"]\nignore = ["D2R104"]\n[severity]\nD2R101 = "warning"\n'
+
 
 def name_examples(examples: list[tuple[Rule, Example]]) -> list[str]:
     return [rule.id for rule, _ in examples]
@@ -87,15 +96,6 @@ def test_every_rule_has_examples_and_an_explanation() -> None:
         assert rule.explanation.endswith(".")
         assert rule.fix[:1].isupper()
         assert rule.fix.endswith(".")
-
-
-SWAPPED = (
-    HEAD
-    + PARTS
-    + write_automatic_card(1, "0.09", rigid=["1"])
-    + write_automatic_card(2, "0.02", deformable=["1"])
-    + END
-)
 
 
 @pytest.mark.parametrize(
@@ -388,9 +388,6 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
 
 def read_configuration_in(folder: Path) -> Configuration:
     return find_configuration(str(folder / "deck.k"), Configuration())
-
-
-OWN = 'select = ["D2R1"]\nignore = ["D2R104"]\n[severity]\nD2R101 = "warning"\n'
 
 
 def test_the_nearest_file_wins(tmp_path: Path) -> None:

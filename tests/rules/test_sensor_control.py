@@ -15,13 +15,18 @@ from tests.rules.test_by_force import list_windows
 
 END = 1.0
 
+TIMES = np.arange(0.0, END + 5e-3, 0.01)
+CONTACT = (
+    "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n"
+    "         7     floor\n"
+    "         8\n*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n         8      wall\n"
+)
+SET = write_automatic_card(20, "0.0", rigid=["1"], code=5)
+
 
 def flat(found: dict[str, object]) -> list[float | None]:
     """List all ends of the windows."""
     return [time for pair in list_windows(found) for time in pair]
-
-
-TIMES = np.arange(0.0, END + 5e-3, 0.01)
 
 
 def control(switches: str, initial: str = "OFF", repeats: int = 0) -> str:
@@ -45,14 +50,6 @@ def by_force(
 
 def force_of(kind: str = "CONTACT", entity: int = 7, direction: str = "M") -> str:
     return f"*SENSOR_DEFINE_FORCE\n{3:10d}{kind:>10}{entity:10d}{direction:>10}\n"
-
-
-CONTACT = (
-    "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n"
-    "         7     floor\n"
-    "         8\n*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n         8      wall\n"
-)
-SET = write_automatic_card(20, "0.0", rigid=["1"], code=5)
 
 
 def write(folder: Path, *cards: str, switch_set: str = SET) -> str:
@@ -86,10 +83,12 @@ def history(place: Path, spans: list[tuple[float, float]]) -> str:
 
 def test_a_control_by_time_needs_no_history(tmp_path: Path) -> None:
     cards = control("1 2") + by_time(1, "GT", 0.2) + by_time(2, "GT", 0.5, delay=0.1)
-    found = run_json("check", write(tmp_path, cards))
-    assert flat(found) == pytest.approx([0.2, 0.6])
-    told = next(one for one in found["findings"] if one["rule"] == "D2R302")
-    assert "off at 0, on at 0.2, off at 0.6" in told["message"]
+    check_report = run_json("check", write(tmp_path, cards))
+    assert flat(check_report) == pytest.approx([0.2, 0.6])
+    timing_finding = next(
+        finding for finding in check_report["findings"] if finding["rule"] == "D2R302"
+    )
+    assert "off at 0, on at 0.2, off at 0.6" in timing_finding["message"]
 
 
 def test_a_control_that_begins_on_is_rigid_from_the_start(tmp_path: Path) -> None:
@@ -104,8 +103,8 @@ def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> 
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6), (0.605, 0.7)])
     cards = control("1 2", repeats=-1) + force_of()
     cards += by_force(1, "LT", 1e-3, duration=0.05) + by_force(2, "GT", 1e-3)
-    found = run_json("check", write(tmp_path, cards), "--history", folder)
-    assert flat(found) == pytest.approx(
+    check_report = run_json("check", write(tmp_path, cards), "--history", folder)
+    assert flat(check_report) == pytest.approx(
         [0.05, 0.105, 0.245, 0.505, 0.745, None], abs=0.011
     )
     assert list_windows(run_json("check", write(tmp_path, cards))) == []
@@ -117,10 +116,10 @@ def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
         20, "0.0", deformable=["1"], code=5
     )
     cards = control("1") + by_force(1, "GT", 1.0) + force_of()
-    found = run_json(
+    check_report = run_json(
         "check", write(tmp_path, cards, switch_set=sets), "--history", folder
     )
-    assert flat(found) == pytest.approx([0.1, 0.505], abs=0.006)
+    assert flat(check_report) == pytest.approx([0.1, 0.505], abs=0.006)
 
 
 def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
@@ -128,11 +127,11 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
     found = {}
     for contact in (7, 8):
-        there = write_automatic_card(20, "0.0", rigid=["1"], code=2, pair=(21, 1))
+        rigid_card = write_automatic_card(20, "0.0", rigid=["1"], code=2, pair=(21, 1))
         back = write_automatic_card(21, "0.0", deformable=["1"], code=4, pair=(20, -1))
         pair = "".join(
             text.replace("0.0         0", f"0.0{contact:10d}", 1)
-            for text in (there, back)
+            for text in (rigid_card, back)
         )
         path = write(tmp_path, switch_set=pair)
         found[contact] = run_json("check", path, "--history", folder)
@@ -153,14 +152,14 @@ def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
     tmp_path: Path,
 ) -> None:
     folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
-    there = write_automatic_card(20, "0.0", rigid=["1"], code=2).replace(
+    rigid_card = write_automatic_card(20, "0.0", rigid=["1"], code=2).replace(
         "0.0         0", f"0.0{7:10d}", 1
     )
-    path = Path(write(tmp_path, switch_set=there))
+    path = Path(write(tmp_path, switch_set=rigid_card))
     path.write_text(path.read_text().replace("SURFACE_TO_SURFACE", "GENERAL"))
-    found = run_json("check", str(path), "--history", folder)
-    assert list_windows(found) == []
-    assert "D2R008" in {one["rule"] for one in found["findings"]}
+    check_report = run_json("check", str(path), "--history", folder)
+    assert list_windows(check_report) == []
+    assert "D2R008" in {finding["rule"] for finding in check_report["findings"]}
 
 
 def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> None:
@@ -174,8 +173,8 @@ def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> No
     assert flat(run_json("check", path, "--history", run_folder)) == pytest.approx(
         [0.25, 0.505], abs=0.006
     )  # no momenta show a speed, so there is no OFFSET
-    told = read_refusal(*card, *options, "--contact", "9")
-    assert "needs a history with the force of that contact" in told
+    message = read_refusal(*card, *options, "--contact", "9")
+    assert "needs a history with the force of that contact" in message
 
 
 @pytest.mark.parametrize(
@@ -203,11 +202,15 @@ def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> No
     ],
 )
 def test_what_is_not_followed_is_named(cards: str, why: str, tmp_path: Path) -> None:
-    found = run_json("check", write(tmp_path, cards))
-    assert list_windows(found) == []
-    told = [one["message"] for one in found["findings"] if one["rule"] == "D2R302"]
-    assert why in told[0]
-    assert "not judged by time" in told[0]
+    check_report = run_json("check", write(tmp_path, cards))
+    assert list_windows(check_report) == []
+    messages = [
+        finding["message"]
+        for finding in check_report["findings"]
+        if finding["rule"] == "D2R302"
+    ]
+    assert why in messages[0]
+    assert "not judged by time" in messages[0]
 
 
 @given(
@@ -226,13 +229,13 @@ def test_switches_of_time_have_their_turns(
         by_time(number + 1, "GT", time / 100) for number, time in enumerate(times)
     )
     path = str(put(tmp_path_factory.mktemp("deck") / "main.k", HEAD + PARTS + cards))
-    read = read_deck(path)
-    (only,) = read_controls(read)
-    changes = follow_control(read, only, None, math.inf)
+    deck = read_deck(path)
+    (only,) = read_controls(deck)
+    changes = follow_control(deck, only, None, math.inf)
     assert not isinstance(changes, str)
     latest = [0.0, *np.maximum.accumulate(times).tolist()]
     assert [change.time for change in changes] == pytest.approx(
         [time / 100 for time in latest]
     )
-    on = [begins_on != bool(place % 2) for place in range(len(latest))]
+    on = [begins_on != bool(index % 2) for index in range(len(latest))]
     assert [change.on for change in changes] == on

@@ -21,9 +21,9 @@ from tests.made_t01 import MadePart, write_head
 PUSHES = (
     (0.0, 0.03),
     (0.17, 0.19),
-)  # of the box; it reaches the ground a little later while it is rigid
+)  # landing of the box; it is slightly later while the box is rigid
 LATER, STEP, PACE = 0.002, 1e-3, 0.02
-SIZE = 400  # bytes of a restart
+SIZE = 400  # size of a restart file [bytes]
 MASS = 10.0
 CODES = (1, 2, 3, 4, 5, 6)
 

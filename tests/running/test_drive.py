@@ -46,6 +46,13 @@ GRAVITY = (
 WALL = "/RWALL/PLANE/8\nground\n" + pad(0, 0, 0, 0) + 3 * pad(0.0, 0.0, 1.0, width=20)
 WAIT, END, LANDS, LOADED = 0.02, 0.22, 0.17, 0.03
 
+IDLE, SWINGS = (
+    LegFindings(0.0, 0.02, flies=True, idle=True),
+    LegFindings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
+)
+WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
+FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
+
 
 def give_solver_command(kind: str) -> str:
     return shlex.join([sys.executable, str(FAKE), kind, "{deck}"])
@@ -90,11 +97,11 @@ def check_finished_run(report: dict[str, Any], folder: Path) -> None:
     assert joined.time[-1] == pytest.approx(END, abs=0.002)
     assert np.diff(joined.time) == pytest.approx(
         0.001, abs=1e-5
-    )  # no state is missing where legs meet
+    )  # no state is missing between restart segments
     parts = joined.part_channel("internal_energy", [1])[:, 0]
     rigid = joined.time[
         parts > 1e9
-    ]  # what the parts say is void exactly where they were rigid
+    ]  # part values are meaningless exactly while the parts are rigid
     (window,) = switched
     assert LOADED - 0.002 <= window["free"] <= LOADED + 0.002
     assert window["tr"] >= window["free"] + WAIT / 2
@@ -130,7 +137,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     assert "First run: strip" in (folder / "page.html").read_text()
     assert (
         len(list((folder / "run").glob("*.rst"))) <= 4
-    )  # the starter's, and those that may be needed
+    )  # restart files of the starter, and those that may still be needed
     result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in result
     assert "no level at td is matched" in result
@@ -167,7 +174,7 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         result = run(*prepare_drive(tmp_path, "--resume"))
     if (
         fault == "damaged"
-    ):  # leg 4 fails on its restart, and only a second time tells that this is why
+    ):  # segment 4 fails on its restart file; only a second failure shows that this is the cause
         assert "strip_0004.out: the solver failed" in result.stderr
         result = run(*prepare_drive(tmp_path, "--resume"))
         assert (
@@ -204,7 +211,7 @@ def test_a_driver_that_is_ended_loses_nothing_but_its_leg(
             time.sleep(0.05)
         process.send_signal(ended)
     if ended is not signal.SIGKILL:
-        with pytest.raises(ProcessLookupError):  # the solver has ended with it
+        with pytest.raises(ProcessLookupError):  # the solver has ended too
             os.killpg(int(lock.read_text()), 0)
     result = run(*prepare_drive(tmp_path, "--resume", "-q"))
     assert not result.stderr
@@ -321,7 +328,7 @@ def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_firs
     (tmp_path / "strip_0001_0001.rst").write_bytes(content)
     put(
         tmp_path / "strip_0000_0002.rst", b"strip_0000_0002.rst".ljust(size)
-    )  # of two domains, one is missing
+    )  # one of two domains is missing
     assert not solver.whole(1)
 
 
@@ -380,14 +387,6 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
 
 
-IDLE, SWINGS = (
-    LegFindings(0.0, 0.02, flies=True, idle=True),
-    LegFindings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
-)
-WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
-FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
-
-
 @pytest.mark.parametrize(
     ("swing_seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)]
 )
@@ -428,7 +427,7 @@ def test_a_run_goes_on_from_the_last_leg_of_a_probe_that_ended_before_td() -> No
     assert choose_next_leg(make_probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
         RIGID, 4, 0.3, 0.39
     )
-    legs = make_probes(0.2, 0.39, 0.45, contact=0.4)  # which ended at td
+    legs = make_probes(0.2, 0.39, 0.45, contact=0.4)  # the last probe ended at td
     next_leg = choose_next_leg(legs, WITHIN)
     assert next_leg
     assert (next_leg.kind, next_leg.number, next_leg.start) == (LOAD, 4, 0.39)
@@ -464,7 +463,7 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
         next_leg = choose_next_leg(legs, WITHIN)
         assert next_leg
         assert (next_leg.kind, next_leg.number, next_leg.start) == (LOAD, 2, 0.1)
-        again = Leg(next_leg, SWINGS, 1000, 1.0)  # the same flight is not tried again
+        again = Leg(next_leg, SWINGS, 1000, 1.0)  # the same flight is not tried twice
         following = choose_next_leg([*legs, again], WITHIN)
         assert following
         assert following.kind == LOAD
@@ -502,7 +501,7 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
         if order.kind == RIGID:
             legs[-1] = legs[-1]._replace(
                 findings=LegFindings()
-            )  # it flies the same way as the probe did
+            )  # it flies in the same way as the probe did
 
 
 @pytest.mark.parametrize(

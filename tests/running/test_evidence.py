@@ -144,7 +144,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
             history.time[-1] if flight.end is None else flight.end,
         )
         if flight_times[1] - flight.start < 2 * flight.wait:
-            continue  # info lists none that is so short beside the others
+            continue  # info lists no flight as short as this beside the others
         assert np.abs(listed - flight_times).max(axis=1).min() <= 3 * history.step
 
 
@@ -263,7 +263,7 @@ def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> No
 def test_a_swing_in_a_push_makes_no_wait_where_the_deck_tells_its_springs() -> None:
     of_deck = Wait(0.012, "deck", "of the deck", 0.01)
     motion = take_whole_record(record(BOX), None, of_deck)[1]
-    assert require(motion.longest(0.28)) == of_deck  # it falls
+    assert require(motion.longest(0.28)) == of_deck  # the body falls
     assert (
         0.016 <= require(motion.longest(0.7)).time <= 0.021
-    )  # the swing that was pushed at 302 ms took 24 ms
+    )  # the cycle with the push at 302 ms takes 24 ms

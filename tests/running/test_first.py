@@ -21,6 +21,12 @@ THROWN = f"/GRNOD/PART/1\nall\n{pad(1, 2)}/INIVEL/TRA/3\nthrown\n{pad(10.0, 0.0,
 MASS, STIFFNESS = 5.0, 1e6
 PERIOD = 2 * math.pi * math.sqrt(MASS / 2 / STIFFNESS)
 
+SHELL = (
+    "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
+)
+CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
+FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
+
 
 def write_radioss_run(folder: Path, contents: str = CONTACT + THROWN + GRAVITY) -> str:
     folder.mkdir(exist_ok=True)
@@ -50,7 +56,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert "springs" in prepared.reason
     assert not any(
         "stays active" in note for note in prepared.notes
-    )  # it goes off: runs computed with OpenRadioss
+    )  # the body is deactivated, as in runs computed with OpenRadioss
     assert any("a momentum of 511 after it, for 365" in note for note in prepared.notes)
     starter = Path(prepared.files[0]).read_text()
     kinds = re.findall(r"/SENSOR/(\w+)/(\d+)", starter)
@@ -65,7 +71,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert [line.split()[0] for line in re.findall(r".*NF.*", starter)] == [
         "6",
         "8",
-    ]  # not the tied one
+    ]  # not the tied contact
     assert read_leg_states(prepared.files) == [*4 * [(False, 6), (True, 3)], (False, 0)]
     legs = [Path(name).read_text() for name in prepared.files[1:]]
     assert all(text.count("/RUN/box/") == 1 and "/TFILE" in text for text in legs)
@@ -198,13 +204,6 @@ def test_a_contact_that_triggers_nothing_is_refused(
             parts=1,
             wait=0.02,
         )
-
-
-SHELL = (
-    "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
-)
-CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
-FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
 
 
 def read_offsets(files: tuple[str, ...]) -> list[str]:

@@ -21,6 +21,9 @@ LEGS = [
     for leg in (1, 2)
 ]
 
+FORMS = {**WRITERS, **FALL_WRITERS}
+SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
+
 
 def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
     tmp_path: Path,
@@ -43,7 +46,7 @@ def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
     assert np.array_equal(np.concatenate(times), whole.time)
     assert np.concatenate(energies) == pytest.approx(
         whole.energy, abs=1e-20
-    )  # round-off is 0 beside a landing
+    )  # round-off is 0 compared with a landing
     assert np.array_equal(np.concatenate(momenta), whole.momenta[0].values)
 
 
@@ -85,10 +88,6 @@ def make_falling_masses() -> Written:
     return Written(time, momentum, kinetic, internal, 0 * time, masses, 0 * time)
 
 
-FORMS = {**WRITERS, **FALL_WRITERS}
-SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
-
-
 def _find_state(data: bytes, share: float) -> int:
     """Return the end of a glstat state near a share of the length; for other contents, the length itself."""
     size = int(share * len(data))
@@ -119,7 +118,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
         energies.append(states.energy)
     assert np.array_equal(np.concatenate(times), whole.time)
     assert np.array_equal(np.concatenate(energies), whole.energy)
-    assert not times[-1].size  # nothing was written since the look before
+    assert not times[-1].size  # nothing was written since the previous look
     assert len(times) > 2
     assert not looks.grow
 

@@ -41,7 +41,7 @@ def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> Non
     swing = require(find_swing(history, FREE, tr))
     assert swing.name == "engine"
     assert error <= swing.error <= 1.3 * error
-    # a flight of that length has a path of a hundred times the error, at the speed so far
+    # A flight of that length at the mean speed so far has a path of 100 times the error.
     mean = float(np.interp(tr, whole.time, whole.path)) / (tr - float(whole.time[0]))
     assert swing.flight * mean == pytest.approx(100 * swing.error, rel=0.05)
 

@@ -54,7 +54,7 @@ def test_a_growing_family_is_told_once_and_as_a_whole(folder: Path) -> None:
         for share in (0.37, 0.371, 0.8, 1.0):  # in the middle of records
             (folder / f"runT0{leg}").write_bytes(data[: int(share * len(data))])
             messages += list_news(watch)
-            assert list_news(watch) == []  # nothing new, nothing told
+            assert list_news(watch) == []  # no news, no message
     whole = [event.event for event in watch_to_end(folder)[:-1]]
     assert messages == whole
     assert messages.count("flight") == 3
@@ -112,7 +112,7 @@ def test_the_listing_says_how_a_run_has_ended(
     ] == [event] * (event is not None)
     (folder / "run_0002.rad").write_text(
         "/RUN/run/2\n1.0\n"
-    )  # a leg that is still to come
+    )  # a restart segment that does not exist yet
     assert not {*(watch_event.event for watch_event in watch_to_end(folder))} & {
         "ended"
     }

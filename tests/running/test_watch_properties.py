@@ -11,7 +11,7 @@ from tests.energies import require
 from tests.records import cut_history, make_table
 from tests.running.seen import take_whole_record
 
-# Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
+# Half-sine pushes [s], and the period of the inner vibration from the first push on [s].
 PUSHES = ((0.1, 0.13), (0.17, 0.2), (0.62, 0.66))
 PERIOD, STEP, END = 0.12, 1e-3, 0.8
 

@@ -8,18 +8,18 @@ import pytest
 
 from tests.command import ROOT
 from validation.figures import read_results
-from validation.floor import SCALES, TD, Motion, compare_motions
+from validation.floor import SCALES, TD, RunMotion, compare_motions
 
 DOCS = ROOT / "docs/explanation/validation.md"
 _MEASURES = ("momentum_peak", "momentum_rms", "energy_peak", "energy_rms")
 
 
-def motion(shift: float = 0.0, late: float = 0.0) -> Motion:
+def motion(shift: float = 0.0, late: float = 0.0) -> RunMotion:
     """Give a motion whose momentum is 10 along x and swings by 1 along z, ``shift`` apart, with a ``late`` energy."""
     time = np.linspace(0.0, 0.2, 2001)
     swing = np.sin(500 * time)
     momentum = np.column_stack((np.full(time.size, 10.0 + shift), 0 * time, swing))
-    return Motion(time, momentum, 5.0 + np.cos(500 * (time - late)))
+    return RunMotion(time, momentum, 5.0 + np.cos(500 * (time - late)))
 
 
 def test_equal_motions_do_not_differ() -> None:

@@ -15,6 +15,8 @@ from tests.command import ROLLOVER
 from tests.computed import locate_stored, read_columns
 from tests.records import ENERGY, MODE, TIME, add_noise, make_mode, round_as_printed
 
+RAMP = np.linspace(0.0, 1.0, 201)
+
 
 def identify_accepted(time: Samples, energy: Samples) -> tuple[Identification, Mode]:
     fitted = identify(time, energy)
@@ -219,9 +221,6 @@ def test_without_a_mode_there_is_no_deviation() -> None:
     assert fitted.mode is None
     assert fitted.misfit is None
     assert np.all(np.isnan(fitted.energy_deviation(TIME)))
-
-
-RAMP = np.linspace(0.0, 1.0, 201)
 
 
 @pytest.mark.parametrize(

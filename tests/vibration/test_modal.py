@@ -24,6 +24,12 @@ TIME = np.linspace(0.0, 9.0, 1801)
 EVEN = np.linspace(0.0, 9.0, 40)
 PAIRS = np.array([(tr, td) for tr in EVEN for td in EVEN if tr < td]).T
 
+STRUCTURE = LinearStructure.draw(21, 5)
+LOADED = make_energy_history(
+    np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME),
+    TIME,
+)
+
 
 def compute_residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
     """Return the residuals that follow from the lock-in error and the kinetic fraction."""
@@ -189,13 +195,6 @@ def test_without_lines_there_are_no_modes(energy: Samples) -> None:
 def test_nothing_above_single_precision_is_no_vibration() -> None:
     random = np.random.default_rng(1)
     assert identify_modal(TIME, 1e3 + 1e-5 * random.standard_normal(TIME.size)) is None
-
-
-STRUCTURE = LinearStructure.draw(21, 5)
-LOADED = make_energy_history(
-    np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME),
-    TIME,
-)
 
 
 def compute_true_residual(tr: float, td: float) -> float:

@@ -35,6 +35,9 @@ MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
 PROFILE = Profile.of(MODE, np.arange(0, 6, 1 / 64), TD)
 
+# of tr_high - tr_low over the output interval, by samples per vibration period; with 8 they may be as wide as they need
+WIDEST = {8: np.inf, 12: 1.2, 20: 0.66, 50: 0.204, 200: 0.042}
+
 
 def test_it_ends_before_td() -> None:
     assert PROFILE.time[-1] < TD
@@ -157,10 +160,6 @@ def measure_coverage(
                 inside.append(distance <= width)
         widths += (2 * half / step).tolist()
     return float(np.mean(inside)), float(np.median(widths))
-
-
-# of tr_high - tr_low over the output interval, by samples per vibration period; with 8 they may be as wide as they need
-WIDEST = {8: np.inf, 12: 1.2, 20: 0.66, 50: 0.204, 200: 0.042}
 
 
 @pytest.mark.slow

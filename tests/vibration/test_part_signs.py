@@ -29,6 +29,9 @@ from tests.records import add_noise, round_as_printed
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")
 
+SPAN = np.arange(0, 0.4, 4e-4)
+TWO_PARTS = ("A", "B")
+
 
 def move_two_springs(time: np.ndarray) -> np.ndarray:
     """Return signed deformations of two parts in which two modes mix, shape (n, 2)."""
@@ -338,10 +341,6 @@ def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic(
     assert signed_parts.kinetic_energy(times) == pytest.approx(
         1.64 * slow + 1.3 * fast, abs=0.1
     )  # but for the damping
-
-
-SPAN = np.arange(0, 0.4, 4e-4)
-TWO_PARTS = ("A", "B")
 
 
 def make_motion_in_planes(share: float) -> Motion:

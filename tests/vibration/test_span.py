@@ -33,6 +33,9 @@ from tests.records import (
     sum_energies,
 )
 
+MAIN = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0)
+TIMES = np.arange(0, 7, 1 / 40)
+
 
 def make_history(energy: np.ndarray) -> History:
     return make_table(TIME, energy)
@@ -132,10 +135,6 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
         )
         assert again.evidence.span == anew.evidence.span
         assert require(again.evidence.fit).mode == require(anew.evidence.fit).mode
-
-
-MAIN = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0)
-TIMES = np.arange(0, 7, 1 / 40)
 
 
 def add_second_mode(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:

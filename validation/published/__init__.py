@@ -1,1 +1,1 @@
-"""The study "Analysis of switched-rigid floating oscillator" computed anew, as ``d2rpick reproduce`` shows it."""
+"""The study "Analysis of switched-rigid floating oscillator" computed again, as ``d2rpick reproduce`` shows it."""

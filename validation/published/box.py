@@ -1,4 +1,4 @@
-"""The box's figures of the reproduction: what a tr too early does, the revised pair, and variants of one run."""
+"""Figures of the box: the effect of an early tr, the revised pair, and variants of one run."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _BEFORE_LANDING: Final = 0.010
 
 
 class Variant(NamedTuple):
-    """A change of one parameter, and whether it acts before td."""
+    """Change of one parameter; ``before`` is True if it acts before td."""
 
     name: str
     parameters: Parameters
@@ -48,7 +48,7 @@ class Variant(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """A variant at its own tr and at the common one [s].
+    """Result of a variant at its own tr and at the common one [s].
 
     ``level_error`` is that of the energy at the common tr in its own reference [-].  ``roll_error`` is that of the
     switched run at td, ``end_error`` at the end of the run, after the landing [degrees].
@@ -62,7 +62,7 @@ class Tried(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """All variants in their common window; ``kept`` whether it lies within the timing tolerance of each.
+    """Results of all variants in their common window; ``kept`` is True if it is within the timing tolerance of each.
 
     ``stiffness``: one tr for the base and the stiffness +-15 % alone [s], and the largest level error of the three.
     """
@@ -142,7 +142,7 @@ def _make_comparison(
     name: str, title: str, figure: str, section: int, base: Parameters, times: tuple[float, ...], paper: str,
     results: str, *, agrees: bool, partly: bool = False,
 ) -> Exhibit:  # fmt: skip
-    """Outlines, roll and height of runs switched at ``times`` beside the reference, and the differences."""
+    """Return outlines, roll and height of runs switched at ``times`` beside the reference, and the differences."""
     reference = _run(base)
     columns: dict[str, Samples] = {
         "time_ms": 1e3 * reference.time, "roll_deg": np.degrees(reference.roll), "z_m": reference.centre.imag,
@@ -192,7 +192,7 @@ def _make_comparison(
 
 
 def list_variants(base: Parameters) -> Iterator[Variant]:
-    """Changes that act after td, then changes that act before."""
+    """Yield changes that act after td, then changes that act before."""
     yield Variant("base", base, before=False)
     yield Variant(
         "ground stiffness / 2",
@@ -281,7 +281,7 @@ def _make_variants_exhibit(base: Parameters) -> Exhibit:
 
 
 def make_variants_exhibit(trial: Trial) -> Exhibit:
-    """Show what one tr for many variants costs each of them."""
+    """Return the exhibit of what one tr for many variants costs each of them."""
     window, rows = trial.window, trial.runs
     number = np.arange(1.0, len(rows) + 1)
     own_tr = np.array(
@@ -341,7 +341,7 @@ def _make_variant_panels(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
 
 
 def _is_tr_kept_after_td(trial: Trial) -> bool:
-    """Whether what acts after td leaves tr where it is, to a state of the record."""
+    """Return True if changes after td move tr by no more than one state of the record."""
     times = [
         run.row.tr
         for run in trial.runs
@@ -353,7 +353,7 @@ def _is_tr_kept_after_td(trial: Trial) -> bool:
 
 
 def _describe_outcome(trial: Trial) -> str:
-    """Say how far the paper's statement holds, and where it fails."""
+    """Describe how far the paper's statement holds, and where it fails."""
     rows, window = trial.runs, trial.window
     chosen = [
         (result_of_variant, 1e3 * result_of_variant.row.tr)
@@ -406,7 +406,7 @@ def _name_results(
 
 
 def _describe_stiffness(trial: Trial, own_results: Mapping[str, float]) -> str:
-    """Say what the stiffness alone does, where its variants were run."""
+    """Describe the effect of the stiffness alone, if its variants were run."""
     if trial.stiffness is None or "stiffness +15%" not in own_results:
         return ""
     times = ", ".join(
@@ -438,7 +438,7 @@ def _find_state_at_td(record: Record) -> _State:
 
 
 def _compute_roll_error(reference: Record, run: Record) -> float:
-    """Roll at td against the reference [degrees]."""
+    """Return the roll at td relative to the reference [degrees]."""
     return float(
         np.degrees(_find_state_at_td(run).roll - _find_state_at_td(reference).roll)
     )
@@ -462,5 +462,5 @@ _FIGURES: Final = (
 def list_box_exhibits(
     parameters: Parameters,
 ) -> list[tuple[int, Callable[[], Exhibit]]]:
-    """Figures of a box by section, each to be computed by a call."""
+    """List the figures of a box by section, each with the function that computes it."""
     return [(section, partial(make, parameters)) for section, make in _FIGURES]

@@ -1,4 +1,4 @@
-"""The figures of the study as they are drawn: panels of curves, and schemes of the models."""
+"""Drawing of the figures of the study: panels of curves, and schemes of the models."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _DOTS = 100
 
 
 def draw_exhibit(exhibit: Exhibit) -> Figure:
-    """All panels of an exhibit, or its scheme."""
+    """Draw all panels of an exhibit, or its scheme."""
     if not exhibit.panels:
         figure = Figure(figsize=(8, 4.2), layout="constrained")
         axes = figure.subplots()
@@ -115,7 +115,7 @@ def _draw_marks(axes: Axes, panel: Panel) -> None:
 
 
 def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
-    """Show the span of a panel, and of its curves what lies in it."""
+    """Limit a panel to its span, and to the parts of its curves inside."""
     assert panel.span is not None
     low, high = panel.span
     x = next(iter(columns.values()))
@@ -130,14 +130,14 @@ def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
 
 
 def _show_level(axes: Axes, level: float, highest: float) -> None:
-    """Make the axis logarithmic where the level would vanish on a linear one."""
+    """Make the axis logarithmic if the level would be invisible on a linear one."""
     if level > 0 and highest > LOGARITHMIC * level:
         make_logarithmic(axes, level / BELOW_LEVEL, highest)
         axes.set_ylim(bottom=level / BELOW_LEVEL)
 
 
 def box(axes: Axes) -> None:
-    """The rollover box on its sled."""
+    """Draw the rollover box on its sled."""
     parameters = Parameters()
     structure = build_structure(parameters)
     draw_sled(axes, parameters, 0.0)
@@ -168,7 +168,7 @@ def box(axes: Axes) -> None:
 
 
 def masses(axes: Axes) -> None:
-    """Two masses, a spring, a damper to each."""
+    """Draw two masses, a spring, and a damper for each mass."""
     _draw_block(axes, 0.0, "m")
     _draw_block(axes, 3.0, "M")
     _draw_spring(axes, 1.0, 3.0, 0.65)
@@ -189,7 +189,7 @@ def masses(axes: Axes) -> None:
 
 
 def elements(axes: Axes) -> None:
-    """Ten bricks as the spring between two lumps of mass."""
+    """Draw ten bricks as the spring between two lumped masses."""
     for number in range(10):
         axes.add_patch(
             Rectangle(
@@ -240,7 +240,7 @@ def _draw_spring(axes: Axes, left_end: float, right_end: float, height: float) -
 
 
 def _draw_damper(axes: Axes, x: float, label: str) -> None:
-    """A dashpot from a mass down to the rest."""
+    """Draw a dashpot from a mass down to the ground."""
     axes.plot([x, x], [0.15, -0.25], color=REFERENCE, linewidth=1)
     axes.plot([x - 0.13, x + 0.13], [-0.25, -0.25], color=REFERENCE, linewidth=2)
     axes.plot(

@@ -1,4 +1,4 @@
-"""Figures of the reproduction: what each shows, the columns that hold its curves, and those of the oscillator."""
+"""Figures of the reproduction: their content, the columns of their curves, and the figures of the oscillator."""
 
 from __future__ import annotations
 
@@ -28,13 +28,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.models.box_model import Plane
 
+# (tr, td) [s] whose responses are superposed: the two of the paper, and two beside them
+_PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
+# Around a switch, so much shows what a solver does there [ms].
+_NEAR: Final = 1.2
+
 
 VERDICTS: Final = ("yes", "in part", "no", "nothing to compare")
 YES, IN_PART, NO, NOTHING = VERDICTS
 
 
 class Curve(NamedTuple):
-    """A column as it is drawn: "line", "thin" or "dots"; over the column ``x``, over the first one without it."""
+    """Column drawn as "line", "thin" or "dots" over the column ``x`` (default: the first one)."""
 
     label: str
     column: str
@@ -104,14 +109,9 @@ if TYPE_CHECKING:
 
     Tables = Mapping[str, Mapping[str, Samples]]
 
-# (tr, td) [s] whose responses are superposed: the two of the paper, and two beside them
-_PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
-# Around a switch, so much shows what a solver does there [ms].
-_NEAR: Final = 1.2
-
 
 def list_exhibits(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
-    """Figures of the oscillator by section, each to be computed by a call.
+    """List the figures of the oscillator by section, each with the function that computes it.
 
     ``solver`` holds runs of a solver by name, each a table of columns: "run" of the pair that the paper computed
     (time_s, z_m, y_m, vz_mps, vy_mps), "pairs" of the published and the better pair (time_s, reference_m, published_m,
@@ -167,7 +167,7 @@ def _find_rigid_span(pair: tuple[float, float]) -> tuple[float, float]:
 
 
 def _make_response_exhibit() -> Exhibit:
-    """Response of the suspended mass for several pairs over each other, beside that without switching."""
+    """Return the response of the suspended mass for several pairs, with the reference."""
     columns = {"time_ms": 1e3 * TIME, "y_free_m": OSCILLATOR.free(START, TIME).y}
     curves, errors = [Curve("without switching", "y_free_m")], []
     for pair in _PAIRS:
@@ -198,7 +198,7 @@ def _make_response_exhibit() -> Exhibit:
 
 
 def _make_motion_exhibit(run: Mapping[str, Samples] | None) -> Exhibit:
-    """Displacements and velocities in closed form, against a solver's run or, without one, numerical integration."""
+    """Return displacements and velocities in closed form, beside a solver's run or else numerical integration."""
     replay = switch_replay(INTEGRATED)
     time = TIME if run is None else run["time_s"]
     closed = replay.motion(time)
@@ -265,7 +265,7 @@ def _make_motion_exhibit(run: Mapping[str, Samples] | None) -> Exhibit:
 
 
 def _make_level_exhibit() -> Exhibit:
-    """Energy with its level at td, all crossings of it, and tr as it was read off and as it is."""
+    """Return the energy with its level at td, all crossings, and tr as read off and as computed."""
     td = PUBLISHED[1]
     level = float(MODE.energy(td))
     crossings = sorted(
@@ -313,7 +313,7 @@ def _make_level_exhibit() -> Exhibit:
 
 
 def _make_after_td_exhibit() -> Exhibit:
-    """Response after td for the published pair and the better one, against the reference."""
+    """Return the response after td for the published pair and the better one, compared with the reference."""
     columns: dict[str, Samples] = {
         "time_ms": 1e3 * TIME,
         "y_free_m": OSCILLATOR.free(START, TIME).y,
@@ -348,7 +348,7 @@ def _make_after_td_exhibit() -> Exhibit:
 
 
 def _make_solver_exhibit(solver: Mapping[str, Samples]) -> Exhibit:
-    """The deformation of explicit finite element runs beside the closed form."""
+    """Return the deformation of explicit finite element runs beside the closed form."""
     time = solver["time_s"]
     columns = {"time_ms": 1e3 * time, "reference_solver_m": solver["reference_m"]}
     panels = []

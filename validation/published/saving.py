@@ -1,6 +1,7 @@
-"""What switching saves: the one cost model, held against the published saving and against runs that were measured.
+"""Savings of switching: the cost model compared with the published saving and with measured runs.
 
-The formulas stand in `d2rpick.choice.parts.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
+The formulas are in `d2rpick.choice.parts.cost` (share c of a time step) and
+`d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
@@ -21,55 +22,6 @@ PICK_UP: Final = (25.5, 6.5)
 # Step while everything is rigid (capped) over that while deformable, 20.00 of 21.54 us.
 _CAPPED: Final = 20.00 / 21.54
 
-
-class Run(NamedTuple):
-    """A run whose processor time was measured with and without switching.
-
-    ``rigid`` are elements by formulation, and their integration points beside those of one layer.
-    """
-
-    name: str
-    rigid_fraction: float
-    rigid: Mapping[str, int]
-    nodes: int
-    step_ratio: float
-    measured: float
-
-    def predicted(self, share: float) -> float:
-        """Saving when ``share`` of the cost of a step is saved [-]."""
-        return 1 - run_time_share(self.rigid_fraction, share, self.step_ratio)
-
-    @property
-    def element_share(self) -> float:
-        """Share of the elements that are rigid [-]."""
-        return _number(self.rigid) / _number(_CAR)
-
-    @property
-    def cost_share(self) -> float:
-        """Share of a step that is saved, by the cost model [-]."""
-        return compute_saved_share(
-            _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
-        )
-
-    @property
-    def by_cost(self) -> float:
-        """Saving by the cost model [-]."""
-        return self.predicted(self.cost_share)
-
-    @property
-    def by_count(self) -> float:
-        """Saving when the share of the elements is taken for that of the cost [-]."""
-        return self.predicted(self.element_share)
-
-
-def _compute_cost(elements: Mapping[str, int]) -> float:
-    return sum(_WEIGHTS.per_element[name] * count for name, count in elements.items())
-
-
-def _number(elements: Mapping[str, int]) -> int:
-    return sum(count for name, count in elements.items() if name != POINT)
-
-
 # A car of 17 parts on an obstacle of 309 shells, rigid for 96.8 of 240 ms; processor time of OpenRadioss 2026-08, one
 # thread.
 _WEIGHTS: Final = Weights()
@@ -84,9 +36,59 @@ _BODY: Final = {
     POINT: 4348,
 }
 _CAR: Final = {**_BODY, "BT": 258 + 309}
+
+
+class MeasuredRun(NamedTuple):
+    """MeasuredRun whose processor time was measured with and without switching.
+
+    ``rigid`` are elements by formulation, and their integration points beside those of one layer.
+    """
+
+    name: str
+    rigid_fraction: float
+    rigid: Mapping[str, int]
+    nodes: int
+    step_ratio: float
+    measured: float
+
+    def predicted(self, share: float) -> float:
+        """Return the saving if ``share`` of the cost of a time step is saved [-]."""
+        return 1 - run_time_share(self.rigid_fraction, share, self.step_ratio)
+
+    @property
+    def element_share(self) -> float:
+        """Share of the elements that are rigid [-]."""
+        return _number(self.rigid) / _number(_CAR)
+
+    @property
+    def cost_share(self) -> float:
+        """Share of the cost of a time step that is saved, by the cost model [-]."""
+        return compute_saved_share(
+            _WEIGHTS, _compute_cost(_CAR), _compute_cost(self.rigid), self.nodes
+        )
+
+    @property
+    def by_cost(self) -> float:
+        """Saving by the cost model [-]."""
+        return self.predicted(self.cost_share)
+
+    @property
+    def by_count(self) -> float:
+        """Saving if the cost is proportional to the number of elements [-]."""
+        return self.predicted(self.element_share)
+
+
+def _compute_cost(elements: Mapping[str, int]) -> float:
+    return sum(_WEIGHTS.per_element[name] * count for name, count in elements.items())
+
+
+def _number(elements: Mapping[str, int]) -> int:
+    return sum(count for name, count in elements.items() if name != POINT)
+
+
 RUNS: Final = (
-    Run("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
-    Run(
+    MeasuredRun("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
+    MeasuredRun(
         "all but the part that lands first",
         _RIGID,
         {**_BODY, "QBAT": 92, POINT: 3356},
@@ -94,7 +96,7 @@ RUNS: Final = (
         1.0,
         0.270,
     ),
-    Run(
+    MeasuredRun(
         "parts that have stopped deforming",
         _RIGID,
         {"QEPH": 764, "beam": 60, POINT: 1528},
@@ -102,7 +104,7 @@ RUNS: Final = (
         1.0,
         0.126,
     ),
-    Run(
+    MeasuredRun(
         "heavy parts",
         _RIGID,
         {"solid": 160, "beam": 18, "QEPH": 48, POINT: 96},
@@ -114,7 +116,7 @@ RUNS: Final = (
 
 
 def find_needed_fraction(share: float) -> float:
-    """Rigid fraction with which the pick-up truck's saving needs this share of the cost [-].
+    """Return the rigid fraction at which the pick-up truck's saving requires this share of the cost [-].
 
     Examples
     --------
@@ -125,7 +127,7 @@ def find_needed_fraction(share: float) -> float:
 
 
 def make_saving_exhibit() -> Exhibit:
-    """Predicted savings beside the measured ones, and what the published saving asks for."""
+    """Return predicted savings beside measured ones, and what the published saving requires."""
     published = 1 - PICK_UP[1] / PICK_UP[0]
     share = np.linspace(published, 1.0, 51)  # with less, no rigid fraction is enough
     number = np.arange(1.0, len(RUNS) + 1)

@@ -44,10 +44,31 @@ MOST_DIFFERENCE: Final = 1e-9
 # What a solver gives differs from the closed form by its one-step lag and the mass of its spring [-].
 _SOLVER_DIFFERENCE: Final = 0.006
 
+# z [m], y [m], E [J] at times [s] of the switched runs
+_STATES: Final = {
+    INTEGRATED: (
+        (0.006, 0.02411074833512, 0.003495532591536, 140.245749651),
+        (0.012, 0.03179101171863, 0.01117579597504, 140.245749651),
+        (0.064, 0.05211298900326, 0.03149777325967, 140.245749651),
+        (0.080, 0.05301085160684, 0.03239563586326, 140.245749651),
+        (0.100, 0.04127297724204, 0.03895923455904, 1.766623717034),
+        (0.150, 0.04024623325594, 0.03984369830982, 0.05347134633845),
+    ),
+    PUBLISHED: (
+        (0.040, 0.03335536800817, 0.03520219900172, 1.125558957182),
+        (0.064, 0.0371382911785, 0.03898512217205, 1.125558957182),
+        (0.080, 0.0398705626157, 0.03896578035883, 0.270148207674),
+        (0.100, 0.04016469900114, 0.03951337367949, 0.1399941426274),
+        (0.150, 0.04009663037928, 0.03991849974815, 0.01047107217665),
+    ),
+}
+# Of each step, relative and absolute: far below what a figure shows, far above rounding.
+_RELATIVE, _ABSOLUTE = 1e-11, 1e-14
+
 
 @dataclass(frozen=True)
 class PublishedValue:
-    """A number of the paper, or an independent reference value, beside the one found here.
+    """Number of the paper, or an independent reference value, beside the computed one.
 
     ``published`` is the number that the paper states, None where it states none; ``reference`` one that was computed
     in another way, see ``source``; ``tolerance`` is how far the number here may be off [unit]; ``place`` is the
@@ -75,19 +96,19 @@ class PublishedValue:
 
     @property
     def expected(self) -> float:
-        """The published number where there is one, else the reference value; one of them there must be."""
+        """The published number if there is one, else the reference value; one of them must be given."""
         expected = self.reference if self.published is None else self.published
         assert expected is not None
         return expected
 
     @property
     def difference(self) -> float:
-        """Here less expected, in ``unit``."""
+        """Computed less expected value, in ``unit``."""
         return self.here - self.expected
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference is within the tolerance."""
+        """True if the difference is within the tolerance."""
         return abs(self.difference) <= self.tolerance
 
 
@@ -101,18 +122,18 @@ def _make_exact(
 
 
 def find_pair_at_peak() -> tuple[float, float]:
-    """Give the pair that is better: td at the first energy peak after 64 ms, tr where the deformation matches [s]."""
+    """Return the better pair: td at the first energy peak after 64 ms, tr where the deformation matches [s]."""
     td = MODE.peaks(PUBLISHED[1], END)[0]
     return _find_matching(td), td
 
 
 def make_values_table() -> tuple[PublishedValue, ...]:
-    """Numbers of the paper and reference values beside those found here."""
+    """Return the numbers of the paper and reference values beside computed ones."""
     return tuple(_make_rows())
 
 
 def compute_deviation(pair: tuple[float, float]) -> float:
-    """Largest error of the deformation after td over the largest deformation without switching there [-]."""
+    """Return the largest error of the deformation after td over the largest deformation of the reference there [-]."""
     times_after_td = TIME[pair[1] <= TIME]
     replay = switch_replay(pair)
     wanted, deformation = (
@@ -123,7 +144,7 @@ def compute_deviation(pair: tuple[float, float]) -> float:
 
 
 def compute_residual(pair: tuple[float, float]) -> float:
-    """R of a pair [-]."""
+    """Return R of a pair [-]."""
     return switch_replay(pair).residual()
 
 
@@ -177,47 +198,23 @@ def _make_state_rows(
         yield _make_exact(f"E of {name}", "J", energy, energy_here, place)
 
 
-# z [m], y [m], E [J] at times [s] of the switched runs
-_STATES: Final = {
-    INTEGRATED: (
-        (0.006, 0.02411074833512, 0.003495532591536, 140.245749651),
-        (0.012, 0.03179101171863, 0.01117579597504, 140.245749651),
-        (0.064, 0.05211298900326, 0.03149777325967, 140.245749651),
-        (0.080, 0.05301085160684, 0.03239563586326, 140.245749651),
-        (0.100, 0.04127297724204, 0.03895923455904, 1.766623717034),
-        (0.150, 0.04024623325594, 0.03984369830982, 0.05347134633845),
-    ),
-    PUBLISHED: (
-        (0.040, 0.03335536800817, 0.03520219900172, 1.125558957182),
-        (0.064, 0.0371382911785, 0.03898512217205, 1.125558957182),
-        (0.080, 0.0398705626157, 0.03896578035883, 0.270148207674),
-        (0.100, 0.04016469900114, 0.03951337367949, 0.1399941426274),
-        (0.150, 0.04009663037928, 0.03991849974815, 0.01047107217665),
-    ),
-}
-
-
 def _find_matching(td: float) -> float:
-    """First time with the deformation of ``td``, sign included [s]."""
+    """Return the first time with the deformation of ``td``, sign included [s]."""
     return MODE.crossings(float(MODE.deformation(td)), 0.0, td)[0]
 
 
 def switch_replay(pair: tuple[float, float]) -> Replay:
-    """Give the run that is rigid between these times [s]."""
+    """Return the run that is rigid between these times [s]."""
     return Replay(OSCILLATOR, START, 0.0, *pair)
 
 
 def compute_deformation(state: State) -> Samples:
-    """Deformation of the spring, y - z [m]."""
+    """Return the deformation of the spring, y - z [m]."""
     return np.asarray(state.y - state.z)
 
 
-# Of each step, relative and absolute: far below what a figure shows, far above rounding.
-_RELATIVE, _ABSOLUTE = 1e-11, 1e-14
-
-
 def integrate_replay(switched: Replay, time: Samples) -> State:
-    """Integrate the equations of motion (1) through a switched run and give its states at ``time``.
+    """Integrate the equations of motion (1) through a switched run and return its states at ``time``.
 
     Free up to tr; rigid up to td, when both masses have the velocity that keeps the momentum and only damping acts;
     then free again from what that leaves.  An explicit Runge-Kutta method of order 8 (scipy's DOP853) knows nothing of

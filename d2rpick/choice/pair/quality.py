@@ -41,6 +41,18 @@ _DECIMALS: Final = 4
 # Rigid times within this share of the longest are alike; there a small position error is worth more [-].
 _LIKE_TIMES = 0.1
 
+# Largest residual of a good pair [-]: the default tolerance for tr.
+MOST_GOOD = 0.2
+# Largest residual of a good pair if the record hides a further mode [-]: a good grade is a promise.
+_MOST_HIDDEN: Final = 0.3
+# An energy has passed its mean if it is this multiple of the standard deviation beyond it; smaller noise is ignored.
+_BAND: Final = 0.25
+# Limits for the energy of the vibration error as a share of that of the next contact [-]: up to the first a pair is
+# good, up to the second not poor (docs/explanation/validation-vibration.md).
+_HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
+_NAMED: Final = 5  # number of parts that a sentence names
+_CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
+
 
 def rank_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False
@@ -145,17 +157,6 @@ def list_exceeded_limits(situation: Situation, candidate: Candidate) -> tuple[st
     return tuple(messages)
 
 
-# Largest residual of a good pair [-]: the default tolerance for tr.
-MOST_GOOD = 0.2
-# Largest residual of a good pair if the record hides a further mode [-]: a good grade is a promise.
-_MOST_HIDDEN: Final = 0.3
-# An energy has passed its mean if it is this multiple of the standard deviation beyond it; smaller noise is ignored.
-_BAND: Final = 0.25
-# Limits for the energy of the vibration error as a share of that of the next contact [-]: up to the first a pair is
-# good, up to the second not poor (docs/explanation/validation-vibration.md).
-_HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
-
-
 class Cause(NamedTuple):
     """Why a grade is not better: the ``reason``, and the ``cure`` that would make it better."""
 
@@ -163,7 +164,6 @@ class Cause(NamedTuple):
     cure: str
 
 
-_NAMED: Final = 5  # number of parts that a sentence names
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the momenta of the parts (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
@@ -172,7 +172,6 @@ _UNKNOWN_LOAD: Final = Cause(
     "momentum or energy changes in the flight, by gravity or by another load",
     "give the deck of the run as `deck`, which defines gravity and loads, or write the momenta of the parts",
 )
-_CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
 class Grade(NamedTuple):

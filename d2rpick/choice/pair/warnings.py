@@ -45,6 +45,16 @@ POOR_RESIDUAL = 0.5
 # Plastic energy above this share of the vibration gets a warning [-]: energy alone cannot tell it from a preload.
 _NOTABLE_PLASTIC = 0.05
 
+# Energy at rest as a share of the lowest in flight [-]: many modes are never at rest at once, so it is lower. This
+# share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16. The
+# lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
+_AT_REST = 0.85
+# Largest mean energy after td over that of the reference run [-]. Switching adds no energy; a larger ratio means that a
+# contact lies in the flight. The estimate itself is right to within 20 %.
+MOST_KEPT = 1.2
+# Largest exponent of e, near the largest double.
+_LARGEST_EXPONENT = 700.0
+
 
 def warn_about_td(situation: Situation) -> Iterator[Caution]:
     """Yield all warnings about a situation, those about the input first."""
@@ -286,17 +296,6 @@ def _describe_nearest_flight(situation: Situation) -> str:
     else:
         last = "; td must lie in it"
     return f"; the nearest flight lasts from {format_window(flight.start, flight.end)}{last}"
-
-
-# Energy at rest as a share of the lowest in flight [-]: many modes are never at rest at once, so it is lower. This
-# share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16. The
-# lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
-_AT_REST = 0.85
-# Largest mean energy after td over that of the reference run [-]. Switching adds no energy; a larger ratio means that a
-# contact lies in the flight. The estimate itself is right to within 20 %.
-MOST_KEPT = 1.2
-# Largest exponent of e, near the largest double.
-_LARGEST_EXPONENT = 700.0
 
 
 class Expectation(NamedTuple):

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
+# Largest error of the polyline [-]: half of the last printed digit.
+_EXACT: Final = 5e-4
+# Number of halvings of an interval in which the error is curved: a square root at zero energy is exact to 1/4000 then,
+# a parabola much sooner.
+_HALVINGS: Final = 20
+
 
 def find_acceptable_windows(
     situation: Situation, candidates: Candidates, recommended: float | None
@@ -219,13 +225,6 @@ def _find_windows_below(situation: Situation, grid: Samples, level: float) -> Sa
     return narrow_brackets(
         lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_END_HALVINGS
     ).within
-
-
-# Largest error of the polyline [-]: half of the last printed digit.
-_EXACT: Final = 5e-4
-# Number of halvings of an interval in which the error is curved: a square root at zero energy is exact to 1/4000 then,
-# a parabola much sooner.
-_HALVINGS: Final = 20
 
 
 def make_error_profile(

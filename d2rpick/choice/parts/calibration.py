@@ -56,6 +56,8 @@ _DOUBT: Final = 0.1
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
+_US: Final = 1e6
+
 
 class Observation(NamedTuple):
     """CPU time of one leg of a run per cycle [us], and what the leg computed.
@@ -196,9 +198,6 @@ def _compute_element_share(
     )
     elements = spent if observation.elements is None else observation.elements
     return min(1.0, elements / observation.total)
-
-
-_US: Final = 1e6
 
 
 class _RigidPart(NamedTuple):

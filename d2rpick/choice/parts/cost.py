@@ -43,6 +43,10 @@ _SOURCE: Final = "OpenRadioss 2026-08, one thread"
 # Sums over all elements stay finite below this; costs in any unit of time are far smaller.
 _LARGEST: Final = 1e100
 
+# Keys of the TOML file of weights that ``d2rpick calibrate`` writes.
+_NUMBERS: Final = ("element_share", "rigid_node")
+_KEYS: Final = (*_NUMBERS, "per_element", "source")
+
 
 @dataclass(frozen=True)
 class Weights:
@@ -233,11 +237,6 @@ def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
         cost += amount.cost
         unknown += amount.unknown
     return Amount(cost, tuple(dict.fromkeys(unknown)))
-
-
-# Keys of the TOML file of weights that ``d2rpick calibrate`` writes.
-_NUMBERS: Final = ("element_share", "rigid_node")
-_KEYS: Final = (*_NUMBERS, "per_element", "source")
 
 
 def read_weights(path: str) -> Weights:

@@ -35,6 +35,12 @@ STOPPED: Final = 0.1
 # The start of a landing, as a share of the duration of the flight before it [-].
 _LANDING: Final = 0.05
 
+SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
+# A part drives the landing alone if it takes up at least this share of the energy at first, and has at most this share
+# of the cost, so that it is cheap to keep it deformable [-]: a bumper or a skid, not the body shell.
+LANDING_ALONE: Final = 0.9
+_CHEAP: Final = 0.1
+
 
 class InFlight(NamedTuple):
     """One part in one flight; energies are None if the part has none or they are not written.
@@ -193,13 +199,6 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
         for part, mass in zip(run.parts, masses.tolist(), strict=True)
         if np.isfinite(mass)
     }
-
-
-SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part drives the landing alone if it takes up at least this share of the energy at first, and has at most this share
-# of the cost, so that it is cheap to keep it deformable [-]: a bumper or a skid, not the body shell.
-LANDING_ALONE: Final = 0.9
-_CHEAP: Final = 0.1
 
 
 class PartRow(NamedTuple):

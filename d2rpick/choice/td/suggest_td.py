@@ -38,6 +38,24 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
+# Number of peaks that are tried of each kind: the highest, since a high peak of several modes has little kinetic
+# energy, and the last, since a late td saves most.
+_MOST_PEAKS: Final = 12
+# For many modes the smallest residual is searched among windows of at least this share of the longest one [-].
+_LEAST_RIGID: Final = (0.5, 0.25)
+_FEWEST_TD, _MOST_TD = 3, 1000
+# Number of td in an even grid: a curve of so many points looks smooth on paper and on a screen.
+STEPS: Final = 200
+# Decimals of an error that are shown to the user.
+_READ: Final = 3
+# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
+_SHORTEST: Final = 0.05
+# A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
+_MUCH: Final = 0.1
+# The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
+# many modes. In 20 computed falls the factor was up to 1.9.
+_HIDDEN: Final = 2.0
+
 
 def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     """Return upper bounds for the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
@@ -91,25 +109,6 @@ def _find_first_near(
     high = positive * np.maximum(1 + near, 0.0) ** 2
     fallen = lowest.size - np.searchsorted(lowest[::-1], high, side="right")
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
-
-
-# Number of peaks that are tried of each kind: the highest, since a high peak of several modes has little kinetic
-# energy, and the last, since a late td saves most.
-_MOST_PEAKS: Final = 12
-# For many modes the smallest residual is searched among windows of at least this share of the longest one [-].
-_LEAST_RIGID: Final = (0.5, 0.25)
-_FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in an even grid: a curve of so many points looks smooth on paper and on a screen.
-STEPS: Final = 200
-# Decimals of an error that are shown to the user.
-_READ: Final = 3
-# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
-_SHORTEST: Final = 0.05
-# A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
-_MUCH: Final = 0.1
-# The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
-# many modes. In 20 computed falls the factor was up to 1.9.
-_HIDDEN: Final = 2.0
 
 
 class Chosen(NamedTuple):

@@ -37,6 +37,15 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
+# Another td is worth naming if its error is at most this share of that of the start, and printed digits show it [-].
+_MUCH_LESS: Final = 0.5
+# A pair that gives up more than this share of the rigid time answers another question [-].
+_LEAST_KEPT: Final = 0.5
+# Number of td on the grid of a page: some pixels of a screen apart, and finer than a slider is moved.
+_STEPS_OF_PAGE: Final = 120
+# Smallest number of td for a flight in a plan of many: a curve of fewer points shows little.
+_FEWEST_STEPS: Final = 40
+
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
@@ -139,12 +148,6 @@ def make_offers(
                 order=np.arange(end - rows.size, end),
             )
             yield Offer(candidates.situation, best, candidates.situation.td in peaks)
-
-
-# Another td is worth naming if its error is at most this share of that of the start, and printed digits show it [-].
-_MUCH_LESS: Final = 0.5
-# A pair that gives up more than this share of the rigid time answers another question [-].
-_LEAST_KEPT: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -330,12 +333,6 @@ def _warn_about_window(
             "no-candidate",
             "no td in the window has an acceptable tr that saves anything",
         )
-
-
-# Number of td on the grid of a page: some pixels of a screen apart, and finer than a slider is moved.
-_STEPS_OF_PAGE: Final = 120
-# Smallest number of td for a flight in a plan of many: a curve of fewer points shows little.
-_FEWEST_STEPS: Final = 40
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:

@@ -19,6 +19,29 @@ ENERGY = np.round(
 )  # values up to 2400, so that there are thousands separators
 KINETIC = np.round(5000 - ENERGY, 3)
 
+EXTREMES = "\n         Minimum     0.5     2600.\n            At X     0.      3.1\n         Maximum  2400.  5000.\n\n"
+RULE = "+------+------+"
+GLOBALS = (
+    "time",
+    *(
+        "INTERNAL ENERGY",
+        "KINETIC ENERGY",
+        "X-MOMENTUM",
+        "Y-MOMENTUM",
+        "Z-MOMENTUM",
+        "MASS",
+        "TIME STEP",
+    ),
+    *(
+        "ROTATION ENERGY",
+        "EXTERNAL WORK",
+        "SPRING ENERGY",
+        "CONTACT ENERGY",
+        "HOURGLASS ENERGY",
+    ),
+)
+BEHIND = ("PLASTIC WORK", "box IE", "box KE")
+
 
 def format_number(value: float, decimal: str = ".", thousands: str = "") -> str:
     return (
@@ -61,8 +84,6 @@ REPORT = lines(
     "\n            X               ALLIE           ALLKE     \n",
     "      {t}      {e}      {k}",
 )
-EXTREMES = "\n         Minimum     0.5     2600.\n            At X     0.      3.1\n         Maximum  2400.  5000.\n\n"
-RULE = "+------+------+"
 
 TABLES: dict[str, str | bytes] = {
     "a column of errors": lines(
@@ -258,28 +279,6 @@ def test_what_stands_below_is_named() -> None:
     )
     again = " ".join(read_table((REPORT + EXTREMES) * 2).notes)
     assert "the same table is repeated from line 52 on; they were left out" in again
-
-
-GLOBALS = (
-    "time",
-    *(
-        "INTERNAL ENERGY",
-        "KINETIC ENERGY",
-        "X-MOMENTUM",
-        "Y-MOMENTUM",
-        "Z-MOMENTUM",
-        "MASS",
-        "TIME STEP",
-    ),
-    *(
-        "ROTATION ENERGY",
-        "EXTERNAL WORK",
-        "SPRING ENERGY",
-        "CONTACT ENERGY",
-        "HOURGLASS ENERGY",
-    ),
-)
-BEHIND = ("PLASTIC WORK", "box IE", "box KE")
 
 
 def th_to_csv(names: Sequence[str], columns: int) -> str:

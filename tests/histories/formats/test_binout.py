@@ -20,6 +20,15 @@ from tests.made_binout import (
 )
 from tests.reading import open_contents
 
+STYLES = [
+    Style(order, length, offset, command, type_id, real)
+    for order, (length, offset, command, type_id), real in product(
+        "<>",
+        [(8, 8, 1, 1), (4, 4, 1, 1), (8, 4, 2, 4), (4, 8, 8, 2), (2, 4, 1, 1)],
+        ("f4", "f8"),
+    )
+]
+
 
 def open_binout(*files: LsdaWriter | bytes) -> Binout:
     contents = [
@@ -30,16 +39,6 @@ def open_binout(*files: LsdaWriter | bytes) -> Binout:
 
 def expected(name: str, states: Sequence[int]) -> list[float]:
     return [compute_value(name, state) for state in states]
-
-
-STYLES = [
-    Style(order, length, offset, command, type_id, real)
-    for order, (length, offset, command, type_id), real in product(
-        "<>",
-        [(8, 8, 1, 1), (4, 4, 1, 1), (8, 4, 2, 4), (4, 8, 8, 2), (2, 4, 1, 1)],
-        ("f4", "f8"),
-    )
-]
 
 
 @pytest.mark.parametrize("style", STYLES, ids=str)

@@ -18,6 +18,55 @@ from tests.reading import list_states, open_on_disk, read_contents
 TIMES = [0.0, 0.25, 0.625]
 ENERGIES = [1.5, 2.75, -3.125]
 
+FOUR = "time_s,boxIE_J,stepIE_J,KE\n0,1,10,5\n1,2,20,6\n2,4,40,7\n"
+SIDE_BY_SIDE = (
+    "Time,IE,Time,KE,Time,HE\n0,1,0,5,0,7\n1,3,0.5,6,1,8\n2,4,,,2,9\n3,6,,,3,10\n"
+)
+ROWS = [
+    "{},1.5",
+    "{},-2",
+    "{},2,",
+    "1,7",
+    "0,3",
+    "{},nan",
+    "{},1,2",
+    "{};3",
+    "{},x",
+    " {} , 1.5",
+    '{},"1.5"',
+    "{}",
+]
+# With comma and point as in the file, whatever they mean in the table.
+CELLS = [
+    "1_0",
+    "0x10",
+    "1e999",
+    "1.5d0",
+    "1~5",
+    "1!5",
+    "+.5",
+    "5.",
+    "1e",
+    "1 2",
+    "-inf",
+    "#",
+]
+HARD = st.floats(allow_nan=False, allow_infinity=False).map(repr) | st.from_regex(
+    r"-?[0-9]{1,25}(\.[0-9]{0,25})?([eE][+-]?[0-9]{1,2})?",
+    fullmatch=True,
+    alphabet=st.characters(codec="ascii"),
+)
+FORMS = [
+    (",", "."),
+    (";", "."),
+    (";", ","),
+    ("|", "."),
+    ("\t", "."),
+    ("\t", ","),
+    ("  ", "."),
+    (" , ", "."),
+]
+
 
 def read_table(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
@@ -227,9 +276,6 @@ def test_scenario(name: str) -> None:
     assert history.complete
 
 
-FOUR = "time_s,boxIE_J,stepIE_J,KE\n0,1,10,5\n1,2,20,6\n2,4,40,7\n"
-
-
 @pytest.mark.parametrize(
     ("text", "asked", "channel", "energy"),
     [
@@ -258,11 +304,6 @@ def test_the_time_by_name_and_number() -> None:
     assert read_table(
         "Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", "Y2", time="3"
     ).time.tolist() == [5, 6]
-
-
-SIDE_BY_SIDE = (
-    "Time,IE,Time,KE,Time,HE\n0,1,0,5,0,7\n1,3,0.5,6,1,8\n2,4,,,2,9\n3,6,,,3,10\n"
-)
 
 
 def test_curves_side_by_side_have_times_of_their_own() -> None:
@@ -456,35 +497,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("tables") / "table"
 
 
-ROWS = [
-    "{},1.5",
-    "{},-2",
-    "{},2,",
-    "1,7",
-    "0,3",
-    "{},nan",
-    "{},1,2",
-    "{};3",
-    "{},x",
-    " {} , 1.5",
-    '{},"1.5"',
-    "{}",
-]
-# With comma and point as in the file, whatever they mean in the table.
-CELLS = [
-    "1_0",
-    "0x10",
-    "1e999",
-    "1.5d0",
-    "1~5",
-    "1!5",
-    "+.5",
-    "5.",
-    "1e",
-    "1 2",
-    "-inf",
-    "#",
-]
 CELLS += ["\xa01.5", "1.5\x85", "\xb2"]  # blanks and a digit beyond ASCII
 LINES = [
     *ROWS,
@@ -554,13 +566,6 @@ def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     assert tables[0] == tables[1] == tables[2]
     file.write_bytes(data)
     assert [in_pieces(open_on_disk(file), size) for size in (8, 1 << 17)] == tables[:2]
-
-
-HARD = st.floats(allow_nan=False, allow_infinity=False).map(repr) | st.from_regex(
-    r"-?[0-9]{1,25}(\.[0-9]{0,25})?([eE][+-]?[0-9]{1,2})?",
-    fullmatch=True,
-    alphabet=st.characters(codec="ascii"),
-)
 
 
 @given(st.lists(HARD, min_size=1, max_size=40))
@@ -648,16 +653,6 @@ def test_precision_is_read_off_the_text(
 finite = st.floats(
     -1e149, 1e149, allow_subnormal=False
 )  # a history may not contain energies above 1e150
-FORMS = [
-    (",", "."),
-    (";", "."),
-    (";", ","),
-    ("|", "."),
-    ("\t", "."),
-    ("\t", ","),
-    ("  ", "."),
-    (" , ", "."),
-]
 
 
 @given(

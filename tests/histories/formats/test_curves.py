@@ -56,6 +56,27 @@ CHANNELS = {
     "DYNAFORM": ("Internal Energy", "Kinetic Energy"),
 }
 
+COUNTED = "3\n0.0, 1.5\n 0.25 2.75\n0.625, -3.125\n"
+PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
+OASYS = """\
+$ written by a postprocessor
+Drop of a case
+Time <TIME/0.001>;
+Internal energy <ENERGY>;
+Whole model
+0.0, 1.0
+1.0, -3.25
+2.5, 4.0
+continue
+Drop of a case
+Time <TIME/0.001>;
+Kinetic energy <ENERGY/1.0>;
+Whole model
+0.0 5.0
+1.0 6.0
+2.5 7.0
+"""
+
 
 def read_curves(text: str, *energy: str, time: str | None = None) -> History:
     return read_contents(
@@ -152,10 +173,6 @@ def test_no_text_raises_anything_else(text: str, form: str) -> None:
         read_curves(TEXTS[form][:90] + text + TEXTS[form][90:])
 
 
-COUNTED = "3\n0.0, 1.5\n 0.25 2.75\n0.625, -3.125\n"
-PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
-
-
 def test_pairs_below_their_count_are_a_curve() -> None:
     history = read_curves(COUNTED)
     assert (list_states(history), history.channel, history.complete) == (
@@ -240,26 +257,6 @@ def test_pairs_below_their_count_are_a_curve() -> None:
 def test_refused(text: str, energy: list[str], reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
         read_curves(text, *energy)
-
-
-OASYS = """\
-$ written by a postprocessor
-Drop of a case
-Time <TIME/0.001>;
-Internal energy <ENERGY>;
-Whole model
-0.0, 1.0
-1.0, -3.25
-2.5, 4.0
-continue
-Drop of a case
-Time <TIME/0.001>;
-Kinetic energy <ENERGY/1.0>;
-Whole model
-0.0 5.0
-1.0 6.0
-2.5 7.0
-"""
 
 
 @pytest.mark.parametrize("title", ["Drop of a case\n", "\n"])

@@ -24,6 +24,48 @@ if TYPE_CHECKING:
 TIMES = [0.0, 0.5, 1.0, 1.5, 2.0]
 STATES = make_states(TIMES)
 
+# Optional contents of a d3plot: control words, sections of the geometry, and further words of a state.
+LAYOUTS = {
+    "rigid shells": ({"ndim": 5, "maxint": 3}, {"control": [1, 2, 24, 20]}, -9),
+    "fluid materials": ({"ialemat": 2}, {"control": [1, 2]}, 0),
+    "particles": (
+        {"nmsph": 2},
+        {"control": [11, 1, 1, 6, 1, 1, 1, 1, 6, 1, 2], "ids": [1, 1, 2, 1]},
+        2 * 22,
+    ),
+    "older particles": (
+        {"nmsph": 2},
+        {"control": [10, 1, 1, 6, 1, 1, 1, 1, 6, 1], "ids": [1, 1, 2, 1]},
+        2 * 20,
+    ),
+    "airbags": (
+        {"npefg": 4001},
+        {"control": [4, 14, 3, 2, 1, *[1] * 20, *[65] * 160], "ids": [1, 3, 1, 1]},
+        1 * 2 + 3 * 14,
+    ),
+    "temperatures": ({"it": 13}, {}, 5 * 7),
+    "rates": ({"idtdt": 11}, {}, 5 * 7),
+    "ten nodes": ({"nel8": -2}, {"elements": [1] * 4}, 0),
+    "ten nodes behind the ids": ({"nel8": -2}, {"ids": [1] * 4}, 0),
+    "rigid bodies": ({"ndim": 8}, {"ids": [2, 1, 3, 1, 2, 3, 1, 1, 2, 0, 0]}, 2 * 24),
+    "few values of rigid bodies": (
+        {"ndim": 9},
+        {"ids": [1, 1, 1, 1, 0, 1, 1, 1, 0, *[0] * 4, 9, 1, *[0] * 4]},
+        18,
+    ),
+    "a road": ({"ndim": 6}, {"ids": [2, 3, 1, 0, *[1] * 8, 9, 3, *[1] * 12]}, 6),
+    "adapted elements": ({"nadapt": 2}, {"ids": [1] * 4}, 0),
+    "shells of eight nodes": ({"nel48": 2}, {"ids": [1] * 10}, 0),
+    "solids of twenty nodes": ({"nel20": 1}, {"ids": [1] * 13}, 0),
+    "full quadratic solids": ({"nel27": 1, "quadr": 1}, {"ids": [1] * 28}, 0),
+    "cubic solids": ({"nel20t": 1, "cubic": 1}, {"ids": [1] * 21}, 0),
+    "heat of solids": ({"nt3d": 3}, {}, 2 * 3),
+    "depths and energies of contacts": ({"penout": 2, "engout": 1}, {}, 5 * 3),
+    "nodes that are deleted": ({"maxint": -3}, {}, 0),
+    "nothing that is deleted": ({"maxint": 3}, {}, 0),
+}
+GLSTAT = make_glstat_text(TIMES, [sum(state.internal) for state in STATES])
+
 
 def put(folder: Path, files: Mapping[str, bytes]) -> Path:
     folder.mkdir(exist_ok=True)
@@ -208,48 +250,6 @@ def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
     assert run.databases[0].part_channel("x_momentum", [3])[-1, 0] == 0
 
 
-# Optional contents of a d3plot: control words, sections of the geometry, and further words of a state.
-LAYOUTS = {
-    "rigid shells": ({"ndim": 5, "maxint": 3}, {"control": [1, 2, 24, 20]}, -9),
-    "fluid materials": ({"ialemat": 2}, {"control": [1, 2]}, 0),
-    "particles": (
-        {"nmsph": 2},
-        {"control": [11, 1, 1, 6, 1, 1, 1, 1, 6, 1, 2], "ids": [1, 1, 2, 1]},
-        2 * 22,
-    ),
-    "older particles": (
-        {"nmsph": 2},
-        {"control": [10, 1, 1, 6, 1, 1, 1, 1, 6, 1], "ids": [1, 1, 2, 1]},
-        2 * 20,
-    ),
-    "airbags": (
-        {"npefg": 4001},
-        {"control": [4, 14, 3, 2, 1, *[1] * 20, *[65] * 160], "ids": [1, 3, 1, 1]},
-        1 * 2 + 3 * 14,
-    ),
-    "temperatures": ({"it": 13}, {}, 5 * 7),
-    "rates": ({"idtdt": 11}, {}, 5 * 7),
-    "ten nodes": ({"nel8": -2}, {"elements": [1] * 4}, 0),
-    "ten nodes behind the ids": ({"nel8": -2}, {"ids": [1] * 4}, 0),
-    "rigid bodies": ({"ndim": 8}, {"ids": [2, 1, 3, 1, 2, 3, 1, 1, 2, 0, 0]}, 2 * 24),
-    "few values of rigid bodies": (
-        {"ndim": 9},
-        {"ids": [1, 1, 1, 1, 0, 1, 1, 1, 0, *[0] * 4, 9, 1, *[0] * 4]},
-        18,
-    ),
-    "a road": ({"ndim": 6}, {"ids": [2, 3, 1, 0, *[1] * 8, 9, 3, *[1] * 12]}, 6),
-    "adapted elements": ({"nadapt": 2}, {"ids": [1] * 4}, 0),
-    "shells of eight nodes": ({"nel48": 2}, {"ids": [1] * 10}, 0),
-    "solids of twenty nodes": ({"nel20": 1}, {"ids": [1] * 13}, 0),
-    "full quadratic solids": ({"nel27": 1, "quadr": 1}, {"ids": [1] * 28}, 0),
-    "cubic solids": ({"nel20t": 1, "cubic": 1}, {"ids": [1] * 21}, 0),
-    "heat of solids": ({"nt3d": 3}, {}, 2 * 3),
-    "depths and energies of contacts": ({"penout": 2, "engout": 1}, {}, 5 * 3),
-    "nodes that are deleted": ({"maxint": -3}, {}, 0),
-    "nothing that is deleted": ({"maxint": 3}, {}, 0),
-}
-
-
 @pytest.mark.parametrize("kind", LAYOUTS)
 def test_what_a_model_has_besides_is_passed_over(kind: str, tmp_path: Path) -> None:
     control, sections, words_after_state = LAYOUTS[kind]
@@ -407,9 +407,6 @@ def test_other_files_are_none() -> None:
     assert not recognises(D3plotWriter(family=4).head()[:8192])  # forces of interfaces
     assert not any(recognises(head[:end]) for end in range(0, 256, 8))
     assert not recognises(b" " * 8192)
-
-
-GLSTAT = make_glstat_text(TIMES, [sum(state.internal) for state in STATES])
 
 
 def test_in_a_folder_a_d3plot_gives_what_the_others_leave_out(tmp_path: Path) -> None:

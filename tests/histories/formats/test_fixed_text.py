@@ -22,6 +22,9 @@ from tests.text_files import (
 IDS = [1, 20, 300]
 Sizes = dict[str, int]  # numbers of blocks and fields that are read together
 
+# Numbers are copied in advance only from runs of many blocks.
+SIZES = st.fixed_dictionaries({"many": st.integers(1, 4), "batch": st.integers(1, 12)})
+
 
 @st.composite
 def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
@@ -81,10 +84,6 @@ def answer(
         return read(data, sizes)
     except FormatError:
         return None
-
-
-# Numbers are copied in advance only from runs of many blocks.
-SIZES = st.fixed_dictionaries({"many": st.integers(1, 4), "batch": st.integers(1, 12)})
 
 
 @given(damaged(parts=False), SIZES)

@@ -28,6 +28,11 @@ CONTROLLERS = (
     "DE sphere         24 of part        10",
 )
 
+STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
+KILLED = "a leg that was killed, and its restart"
+NO_NUMBER = "glstat:32: 'internal energy' is '{}', a number in its columns was expected"
+NOT_ONCE = "glstat:29: 'internal energy' is missing, cut or doubled in the state that begins here"
+
 
 def line(label: str, value: object, suffix: str = "") -> str:
     text = value if isinstance(value, str) else f"{value:.5E}"
@@ -58,7 +63,6 @@ def block(
     )
 
 
-STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
 WHOLE = HEAD + "".join(
     block(*state, controller=c) for state, c in zip(STATES, CONTROLLERS, strict=False)
 )
@@ -70,7 +74,6 @@ def read_glstat(text: str | bytes, *energy: str) -> History:
     )
 
 
-KILLED = "a leg that was killed, and its restart"
 SCENARIOS = {
     "as written": (WHOLE, STATES),
     "one state": (HEAD + block(0.0, 4.5), [(0.0, 4.5)]),
@@ -202,8 +205,6 @@ def test_other_labels(asked: list[str], channel: str, expected: float) -> None:
 
 
 GOOD = line("internal energy", 1.36945e-5)  # in line 32, its state begins in line 29
-NO_NUMBER = "glstat:32: 'internal energy' is '{}', a number in its columns was expected"
-NOT_ONCE = "glstat:29: 'internal energy' is missing, cut or doubled in the state that begins here"
 REFUSED = {
     "no state": (HEAD, "no states"),
     "no state, one controller": (

@@ -32,6 +32,11 @@ from tests.hdf5_files import (
 )
 from tests.reading import read_contents
 
+SMALL = {
+    layout: write_hdf5(LAYOUTS[layout]).getvalue()
+    for layout in ("plain", "compound", "lasso")
+}
+
 
 def read_hdf5(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
     return read_contents(
@@ -225,12 +230,6 @@ def test_shape_far_too_large_for_the_file_is_refused() -> None:
 
     with pytest.raises(FormatError, match="is the file damaged"):
         read_hdf5(write_hdf5(write), "internal_energy", time="t")
-
-
-SMALL = {
-    layout: write_hdf5(LAYOUTS[layout]).getvalue()
-    for layout in ("plain", "compound", "lasso")
-}
 
 
 def check(layout: str, faults: list[Fault]) -> None:

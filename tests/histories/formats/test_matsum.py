@@ -30,21 +30,6 @@ STATES = [
 LONG = 150  # states; from so many on, the reader remembers which bytes differ between blocks
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
 
-
-def read_matsum(text: bytes) -> matsum.Matsum:
-    return matsum.Matsum(text, "matsum")
-
-
-def assert_as_written(run: matsum.Matsum) -> None:
-    assert run.part_time.tolist() == TIMES
-    assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES.tolist()
-    for column, id_ in enumerate(IDS):
-        assert (
-            run.part_channel("internal_energy", [id_])[:, 0].tolist()
-            == ENERGIES[:, column].tolist()
-        )
-
-
 SAME = {
     "four lines": TEXT,
     "three lines": make_matsum_text(TIMES, IDS, ENERGIES, lines=3),
@@ -69,6 +54,20 @@ SAME = {
         STATES[2], make_matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])
     ),
 }
+
+
+def read_matsum(text: bytes) -> matsum.Matsum:
+    return matsum.Matsum(text, "matsum")
+
+
+def assert_as_written(run: matsum.Matsum) -> None:
+    assert run.part_time.tolist() == TIMES
+    assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES.tolist()
+    for column, id_ in enumerate(IDS):
+        assert (
+            run.part_channel("internal_energy", [id_])[:, 0].tolist()
+            == ENERGIES[:, column].tolist()
+        )
 
 
 @pytest.mark.parametrize("text", SAME.values(), ids=SAME.keys())

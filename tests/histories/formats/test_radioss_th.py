@@ -23,6 +23,8 @@ FORMS: dict[str, Callable[[], T01Writer]] = {
     "text of another system": lambda: T01TextWriter(line_end=b"\r\n"),
 }
 
+CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
+
 
 def open_history(source: T01Writer | bytes) -> TimeHistory:
     return TimeHistory(
@@ -225,9 +227,6 @@ def test_a_head_that_does_not_hold_what_it_says_is_refused(
         FormatError, match="was expected in the head of the time history near byte"
     ):
         open_history(SMALL.data.replace(line, damaged))
-
-
-CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
 
 
 @pytest.mark.parametrize(
