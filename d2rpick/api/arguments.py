@@ -176,12 +176,12 @@ def suggest_decimal_point(value: object) -> str:
 
 def suggest_without_unit(value: object) -> str:
     """Return a hint how to write a time that has a unit, empty for other texts."""
-    from d2rpick.histories.names import parse_seconds
+    from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
     if seconds is None:
         return ""
-    return f": give a number in the unit of the history, {seconds:g} where it is s"
+    return f": give a number in the unit of the run, {seconds:g} if it is s"
 
 
 def check_optional_number(

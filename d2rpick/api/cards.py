@@ -114,11 +114,11 @@ class Cards:
     """Options of a card, shared by all commands that print one."""
 
     solver: str | None = make_option(
-        "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
+        "Solver whose input is printed.  [default: solver that wrote the history, else ls-dyna]",
         "solver",
     )
     merge: int | None = make_option(
-        "LS-DYNA: lead part that all others are merged into (LRB).", _IDS, "ID"
+        "LS-DYNA: lead part into which all others are merged (LRB).", _IDS, "ID"
     )
     swset: tuple[int, int] | None = make_option(
         "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]",

@@ -91,7 +91,7 @@ class Motion:
     t_end: float = make_option("Last time.", POSITIVE, "T")
     dt: float = make_option("Output interval.", POSITIVE, "T")
     write_as: str | None = make_option(
-        "Format of the result.  [default: by the name of -o, else csv]", HISTORIES
+        "Format of the result.  [default: suffix of -o, else csv]", HISTORIES
     )
 
     def __post_init__(self) -> None:
@@ -157,52 +157,55 @@ class Box:
     """Request for the rollover box in SI units: the box, its windows and the scan."""
 
     tr: tuple[float, ...] = make_option(
-        "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
+        "Switch the box to rigid at this time; for several windows give --tr and --td in pairs.",
         *(NOT_NEGATIVE, "T"), many=True,
     )  # fmt: skip
     td: tuple[float, ...] = make_option(
-        "Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True
+        "Switch the box back at this time.  [default: 0.37 with --scan]",
+        NOT_NEGATIVE,
+        "T",
+        many=True,
     )
     drop: float | None = make_option(
-        "Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
+        "Height in m from which the box falls on the ground, instead of tripping on the sled.",
         *(NOT_NEGATIVE, "HEIGHT"),
     )
     tilt: float | None = make_option(
-        "Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG"
+        "Tilt of the falling box, in degrees.  [default: 30]", NOT_NEGATIVE, "DEG"
     )
     ground_stiffness: float | None = make_option(
-        "Of the ground at a point, N/m.  [default: 5e5]", POSITIVE
+        "Stiffness of the ground at a point, N/m.  [default: 5e5]", POSITIVE
     )
     scan: bool = make_option(
-        "Compute many tr, and hold each run against the one without switching.",
+        "Compute many tr, and compare each run with the run without switching.",
         "flag",
         default=False,
     )
     jobs: int | None = make_option(
-        "Processes of a scan.  [default: one for each core]", range(1, UNLIMITED)
+        "Number of processes of a scan.  [default: one per core]", range(1, UNLIMITED)
     )
     t_end: float | None = make_option(
         "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
     )
     dt: float = make_option("Output interval.", POSITIVE, "T", default=1e-4)
     speed: float | None = make_option(
-        "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]",
+        "Speed of the sled at the start, or of a falling box along x, m/s.  [default: 7, with --drop 0]",
         NOT_NEGATIVE,
     )
     stiffness: float | None = make_option(
-        "Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE
+        "Stiffness E A of the bars of the box, N.  [default: 4.5e6]", POSITIVE
     )
     yield_strain: float | None = make_option(
-        "Of the bars of the box.  [default: 4.5e-3]", POSITIVE
+        "Yield strain of the bars of the box.  [default: 4.5e-3]", POSITIVE
     )
     damping: float | None = make_option(
         "Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE
     )
     mesh: int | None = make_option(
-        "Cells along each side of the box.  [default: 16]", range(4, 201)
+        "Number of cells along each side of the box.  [default: 16]", range(4, 201)
     )
     write_as: str | None = make_option(
-        "Format of a history.  [default: by the name of -o, else csv]", HISTORIES
+        "Format of a history.  [default: suffix of -o, else csv]", HISTORIES
     )
 
     def __post_init__(self) -> None:

@@ -108,7 +108,7 @@ def explore(
     td_window : (float, float), optional
         Range of td [time].  Default: the longest flight; if there is none but td is given, the record.
     steps : int
-        Number of evenly spaced td; peaks of the energy come on top.
+        Number of evenly spaced td; the peaks of the energy are added.
     parts, flying, deck, weights, **choosing
         As for `suggest`.
 

@@ -143,11 +143,12 @@ class Request:
         "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
     )
     no_deck: bool = make_option(
-        "Use no deck.  [default: if HISTORY is the folder of a run, the main deck in it]",
+        "Use no deck.  [default: the main deck in HISTORY, if that is a folder]",
         *("flag",), default=False, instead_of=("deck",),
     )  # fmt: skip
     weights: str | Weights | None = make_option(  # noqa: RUF009
-        "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
+        "File with the cost of an element by formulation, from d2rpick calibrate.  [default: measured with "
+        "OpenRadioss]",
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
@@ -162,7 +163,7 @@ class Request:
         "Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER"
     )
     energy: tuple[str, ...] = make_option(
-        "Energy column, label or HDF5 path; repeat it to add several.",
+        "Energy column, label or HDF5 path; repeat the option to add several.",
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(
@@ -173,24 +174,24 @@ class Request:
         "Parts that fly together with the switched parts.", "parts", "IDS", many=True
     )
     channel: tuple[str, ...] = make_option(
-        "Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
+        "Channel of another quantity, if its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
     after: float | None = make_option(
         "End of the load.  [default: found from the record]", TIME, "T"
     )
     landing: float | None = make_option(
-        "Next contact after the flight; td keeps the margin before it.  [default: found from the record]",
+        "Time of the next contact after the flight; td is earlier by the margin.  [default: found from the record]",
         TIME,
         "T",
     )
     margin: float | None = make_option(
-        "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, or before "
-        "--landing, derived]",
+        "Time kept free after the load and before the next contact.  [default: 0; derived if d2rpick chooses "
+        "td, or with --landing]",
         *(NOT_NEGATIVE, "T"),
     )
     tolerance: float = make_option(
-        "Limit on the lock-in error, or on the level error where no oscillator is known.",
+        "Largest lock-in error, or level error if no oscillator describes the record.",
         FRACTION,
         "L",
         default=0.2,
@@ -213,10 +214,10 @@ class Request:
         "Rate of damping proportional to mass.", NOT_NEGATIVE
     )
     v0: float | None = _make_oscillator_option(
-        "Velocity of the frame at time 0; all else at rest.", TIME, "vz0"
+        "Velocity of the frame at time 0; the rest is at rest.", TIME, "vz0"
     )
     fit_window: tuple[float, float] | None = make_option(
-        "Identify the oscillator only here.",
+        "Window of time in which the oscillator is identified.",
         TIME,
         "LO HI",
         pair=True,
@@ -227,26 +228,25 @@ class Request:
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     strict: bool = make_option(
-        "Recommend nothing where the energy alone shows when the load is over.",
+        "Recommend nothing if only the energy shows when the load ends.",
         "flag",
         default=False,
     )
     keep_vibration: bool = make_option(
-        "Grade the vibration by itself, however little its error is worth in the next contact.",
+        "Grade the vibration by its own error, also if that is small in the next contact.",
         "flag",
         default=False,
     )
     min_quality: str | None = make_option(
-        "Least grade of a pair that is not reported as a problem (exit code 1).  [default: fair; poor where --td alone "
-        "is given]",
+        "Lowest grade that is not reported as a problem (exit code 1).  [default: fair; poor if only --td is given]",
         GRADES,
     )
     cost_share: float | None = make_option(
-        "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
+        "Share of the cost of a time step that the elements of the switched parts take, to predict the run time.",
         *(FRACTION, "C"),
     )
     step_ratio: float | None = make_option(
-        "Time step while rigid over that before, 1 or more.  [default: 1]",
+        "Ratio of the time step while rigid to the one before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,
         "N",
     )

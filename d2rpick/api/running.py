@@ -116,7 +116,7 @@ def follow(
     wait : float, optional
         Time without a force that counts as flight [time].  Default: half of the longest inner period that is known.
     deck : path, optional
-        Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.
+        Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.
     lasting : float, optional
         Duration [s]; 0: only the events so far.  Default: until the run has ended.
 

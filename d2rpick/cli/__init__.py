@@ -28,7 +28,7 @@ _WORK: Final = {
     "plan": ("one_run", "Plan the rigid windows of all flights of a run."),
     "suggest": ("one_run", "Choose tr for a td, or both times."),
     "explore": ("one_run", "Show what each td costs."),
-    "parts": ("one_run", "Say which parts may be switched, and what that saves."),
+    "parts": ("one_run", "List which parts may be switched, and what that saves."),
     "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
     "study": ("study", "Choose tr for many runs, and one tr for all."),
     "follow": (
@@ -40,7 +40,7 @@ _WORK: Final = {
     "first": ("running", "Write a deck whose first run switches itself."),
     "check": ("decks", "Check the switches of decks, also against a run."),
     "rule": ("decks", "Explain a rule of check, or list all."),
-    "calibrate": ("study", "Fit the cost of elements to runs of a site."),
+    "calibrate": ("study", "Fit the cost of elements to your own runs."),
 }
 _EXPERIMENTS: Final = {
     "replay": ("models", "Compute the floating oscillator in closed form."),

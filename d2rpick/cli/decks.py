@@ -33,10 +33,12 @@ if TYPE_CHECKING:
 @options.make_time_option(
     "--td", "Switch back at this time, one for each --tr.", many=True
 )
-@options.make_file_option("--windows", "Instead of both: a file with lines 'tr td'.")
+@options.make_file_option(
+    "--windows", "File with lines 'tr td', instead of --tr and --td."
+)
 @options.add_options(
     *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
-    deck="Main deck of the run of --history: tells which parts become one rigid body.",
+    deck="Main deck of the run of --history, which defines the parts that become one rigid body.",
     part={
         "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
         "type": choose_click_type("names"),
@@ -53,8 +55,8 @@ def card(
 ) -> None:
     """Print solver input for switching windows, ready to be pasted.
 
-    With a history, the times are judged again as printed, and the verdict is added as a comment.  With the deck of the
-    run, parts that share nodes are merged, and the deck is checked with the card in it.
+    With a history, d2rpick judges the times as printed, and adds the verdict as a comment.  With the deck of the run,
+    it merges parts that share nodes, and checks the deck with the card in it.
 
     Examples
     --------
@@ -104,7 +106,8 @@ def _read_windows(
 @options.add_options(*REFERENCE)
 @click.option(
     "--select", metavar="IDS", multiple=True, type=choose_click_type("rules"),
-    help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
+    help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: set in d2rpick.toml or "
+    "pyproject.toml]",
 )  # fmt: skip
 @click.option(
     "--ignore",
@@ -128,9 +131,9 @@ def check(
 ) -> None:
     """Find the switching cards of LS-DYNA decks and Radioss runs, and check them against deck and history.
 
-    Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  The starter deck
-    and the engine files of a Radioss run are one DECK, whichever is named.  `d2rpick rule` lists the rules; a comment
-    line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
+    Each DECK is read with its includes.  A folder means the main decks in it, `-` means standard input.  The starter
+    deck and the engine files of a Radioss run are one DECK; name any of them.  `d2rpick rule` lists the rules.  A
+    comment line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) turns this rule off for the card.
 
     Examples
     --------

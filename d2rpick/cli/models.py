@@ -45,9 +45,9 @@ _ABSENT = (
 def replay(motion: Motion, output: Output) -> None:
     r"""Compute the floating oscillator in closed form, with or without switching.
 
-    It starts from any displacements and velocities of both masses; what is not given is 0.  Columns: time,
-    displacement and velocity of frame (z) and suspended mass (y), internal and kinetic energy; at tr itself the state
-    after the switch.
+    Give the displacements and velocities of both masses at the start; the default is 0.  The columns are time,
+    displacement and velocity of frame (z) and suspended mass (y), internal energy and kinetic energy.  The row at tr is
+    the state after the switch.
 
     Examples
     --------
@@ -88,9 +88,9 @@ def replay(motion: Motion, output: Output) -> None:
 def rollover(box: Box, output: Output) -> None:
     """Compute a planar box that trips over the curb of a braking sled and rolls, or falls and bounces.  SI units.
 
-    It is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.
-    Columns: time, place, roll and velocities of the box, its energies, the momentum of box and step, and the energy
-    balance of the model.  glstat holds the energies of both, matsum those of each.
+    The box is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.
+    The columns are time, position, roll, velocities and energies of the box, the momentum of box and step, and the
+    energy balance of the model.  The file glstat contains the energies of the model, matsum the energies of each part.
 
     Examples
     --------
@@ -154,26 +154,26 @@ def _scan(box: Box, output: Output) -> None:
 )
 @click.option(
     "--section", type=click.Choice(SECTIONS), multiple=True,
-    help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
-    "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
+    help="Section of the paper to reproduce; repeatable.  1: the setting, early switches of the box; 2: the "
+    "oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
 )  # fmt: skip
 @options.make_file_option(
     "--solver",
-    "A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
-    f"{', or '.join(', '.join(columns) for columns in SOLVER.values())}; repeatable.",
+    "Table of a solver's runs of the same oscillator, for comparison, with time_s and {', or '.join(', "
+    "'.join(columns) for columns in SOLVER.values())}; repeatable.",
     many=True,
 )
 @options.add_options(
-    "report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN
+    "report", *RESULT, report="Write everything to one HTML page.", forms=PLAIN
 )
 def reproduce(
     output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output
 ) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
-    Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts
-    published numbers and reference values beside those found here.  The figures of the box (sections 1 and 4) take
-    about half a minute.  It runs from a clone of the repository, whose folder validation holds the study.
+    For each figure, in the order of the paper, it prints what the paper shows, what is found here, and whether the two
+    agree: yes, in part or no.  Published numbers and reference values follow next to those found here.  The figures of
+    the box (sections 1 and 4) take about a minute.  It runs from a clone of the repository, with its folder validation.
 
     Examples
     --------

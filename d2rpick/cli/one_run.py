@@ -51,11 +51,11 @@ if TYPE_CHECKING:
 @options.make_command
 @options.add_options(
     *("deck", "no_deck", HISTORY, *READING, *RESULT),
-    deck="Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.",
+    deck="Main deck of the run, which defines gravity, supports and prescribed motion.",
     forms=FORMATS["overview"],
 )
 def info(request: Request, output: Output) -> None:
-    """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health.
+    """Show whether the HISTORY of a run can be used: flights, format, states, sampling, channels, parts, health.
 
     Examples
     --------
@@ -82,15 +82,15 @@ def info(request: Request, output: Output) -> None:
 @click.option(
     "--write-as",
     type=click.Choice(["csv", "hdf5"]),
-    help="Format of the result.  [default: by the name of -o, else csv]",
+    help="Format of the result.  [default: suffix of -o, else csv]",
 )
 @options.add_options(*FILES)
 def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
-    With more than one part a column part_<id> for each follows, then what else is known at these times of the whole
-    model: total internal energy, kinetic energy, external work, contact energy, momentum, ... Where the files have the
-    momenta of parts, those that fly together with the chosen ones count.
+    With several parts, a column part_<id> follows for each.  Other columns are quantities of the whole model, such as
+    total internal energy, kinetic energy, external work and momentum.  If the files contain part momenta, the momentum
+    is the sum over the parts that fly together with the chosen parts.
 
     Examples
     --------
@@ -130,10 +130,10 @@ def suggest(
 ) -> None:
     """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
-    Without --td both are chosen, in --td-window or in the longest flight.
+    If you omit --td, d2rpick chooses both times, in --td-window or in the longest flight.
 
-    A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
-    replaying the floating oscillator behind the record; the best one, and a better td, are named.
+    A candidate is a time before td at which the internal energy has the same level as at td.  d2rpick verifies each
+    candidate with the floating oscillator that describes the record.  It recommends the best candidate and a better td.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def suggest(
 
 @options.make_command
 @options.make_time_option(
-    "--td", "A time to switch back that others are compared with."
+    "--td", "Time to switch back with which the others are compared."
 )
 @options.make_time_option(
     "--td-window",
@@ -197,7 +197,7 @@ def suggest(
 @options.make_click_option(
     "steps",
     Option(
-        "Number of evenly spaced td; peaks of the energy come on top.",
+        "Number of evenly spaced td; the peaks of the energy are added.",
         range(1, 100_001),
     ),
     default=200,
@@ -206,7 +206,7 @@ def suggest(
     *("limit", *ONE_RUN, *ANSWER),
     limit={
         "default": 10,
-        "help": "Number of rows in the table, of the pairs that nothing beats; json and csv have all.",
+        "help": "Number of rows in the table of the best pairs; json and csv contain all pairs.",
     },
     deck=DECK_OF_PARTS,
     forms=FORMATS["trade_off"],
@@ -219,10 +219,11 @@ def explore(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Show what each time td to switch back costs: the best tr for it, its error, and what it saves.
+    """Show for each time td to switch back the best tr, the error, and the saving.
 
-    A grid of td over --td-window or the longest flight, and every peak of the energy, each as `suggest --td` answers
-    it.  Named are those that no other beats in both error and rigid time, and the nearest td with half the error.
+    The td form a grid over --td-window or the longest flight, with every peak of the energy; each is judged as by
+    `suggest --td`.  The table lists the pairs that no other pair beats in both error and rigid time.  d2rpick also
+    names the nearest td with half the error.
 
     Examples
     --------
@@ -253,11 +254,11 @@ def explore(
 
 @options.make_command
 @options.make_time_option(
-    "--tr", "Switch to rigid at this time.  [with --switched: read off that run]"
+    "--tr", "Switch to rigid at this time.  [default: read from the run of --switched]"
 )
 @options.make_time_option(
     "--td",
-    "Switch back to deformable at this time.  [with --switched: read off that run]",
+    "Switch back to deformable at this time.  [default: read from the run of --switched]",
 )
 @options.make_file_option(
     "--switched",
@@ -267,7 +268,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Mean energy after td over the reference's, at least; it may be as far above 1 as below.",
+        "Lowest ratio of the mean energy after td to the reference's; the highest is as far above 1.",
         FRACTION,
         "E",
     ),
@@ -313,10 +314,12 @@ def verify(
 
 
 @options.make_command
-@options.make_time_option("--tr", "With --td: compare the sets in this window.")
+@options.make_time_option(
+    "--tr", "Start of the window in which the sets are compared; with --td."
+)
 @options.make_time_option(
     "--td",
-    "Compare the sets in a window that ends here.  [default: at the end of the longest flight]",
+    "End of the window in which the sets are compared.  [default: end of the longest flight]",
 )
 @options.add_options(
     *(
@@ -331,15 +334,15 @@ def verify(
         *RESULT,
     ),
     deck=f"{DECK}.",
-    step_ratio="Time step while rigid over that before, 1 or more.",
+    step_ratio="Ratio of the time step while rigid to the one before, 1 or more.",
     report="Write everything to one HTML page to read and sign.",
     forms=FORMATS["parts"],
 )
 def parts(tr: float | None, td: float | None, request: Request, output: Output) -> None:
-    """Say which parts of a run may be switched, and what sets of them save.
+    """List which parts of a run may be switched, and what sets of parts save.
 
-    Each part with its elements, material, mass and energy, and a verdict with its reasons; then sets of parts with the
-    run time that they save, and the one to take.  A set that --part names is compared too.
+    Each part is listed with its elements, material, mass and energy, and a verdict with its reasons.  Sets of parts
+    follow with the processor time that they save, and the recommended set.  --part adds a set to the comparison.
 
     Examples
     --------
@@ -365,21 +368,21 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
 @options.make_command
 @options.make_click_option("min_rigid", Option(
-    "Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
+    "Shortest rigid window.  [default: 5% of the record; a window is dropped for a later one twice as long]",
     *(NOT_NEGATIVE, "T"),
 ))  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True,
-    help="With -f value, -f card and --write-deck: all windows, not only the supported ones.",
+    help="Write all windows, not only the supported ones, with -f value, -f card and --write-deck.",
 )  # fmt: skip
 @options.make_file_option(
     "--done",
-    "Windows in which HISTORY was switched, a line 'tr td' for each, or a journal: plan those after.  -f value, "
-    "-f card and --write-deck hold both, as the next run needs them.",
+    "File with the windows in which HISTORY was switched, a line 'tr td' for each, or a journal.  d2rpick plans "
+    "the later windows; -f value, -f card and --write-deck contain both.",
 )
 @options.make_file_option(
     "--before",
-    "The run that the windows of --done were planned from: its landings are compared; repeatable.",
+    "Run from which the windows of --done were planned, to compare its landings; repeatable.",
     *("HISTORY",), many=True,
 )  # fmt: skip
 @options.make_file_option(
@@ -414,10 +417,10 @@ def plan(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Plan the rigid windows of a run: each of its flights with tr, td, and whether HISTORY supports it.
+    """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
 
-    Windows are supported up to and with the first that locks in energy: it moves the landings after it.  Run with
-    these, then plan the next from the switched run, with --done.
+    HISTORY supports the windows up to and including the first that locks in energy, which moves the later landings.
+    Run with these windows, then plan the next ones from the switched run, with --done.
 
     Examples
     --------

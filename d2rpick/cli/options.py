@@ -25,6 +25,7 @@ from d2rpick.base.errors import ArgumentError
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
 from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
+from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
     CARDS,
     choose_click_type,
@@ -48,11 +49,11 @@ ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
 DECK: Final = (
-    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
-    "and which of them become one rigid body"
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): defines the cost of the parts, and "
+    "which of them become one rigid body"
 )
 DECK_OF_PARTS: Final = (
-    f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+    f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
 )
 # Sections of the help, after the options of a command that belong to no section.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -94,6 +95,8 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
 }
+# Placeholders of options that are times of the run.
+_TIMES: Final = ("T", "LO HI")
 # Options that write files, which would already exist when the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
@@ -158,6 +161,7 @@ class Command(Documented):
             import shlex  # imported here to keep the start fast
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
+        convert_typed_times(ctx)
         # Import numpy before the modules of a run: its import makes many nested calls, and each may meet the end of a
         # piece of the stack of Python 3.11, which then maps memory for it and unmaps it again.
         if ctx.params.get("history"):
@@ -313,6 +317,8 @@ def make_click_option(
         about["is_flag"] = True
     else:
         kind = choose_click_type(entry.kind)
+        if entry.metavar in _TIMES:
+            kind = TimeType(kind.limits)
         about |= {"type": kind, "nargs": 2 if entry.pair else 1, "multiple": entry.many}
     about |= {"instead_of": entry.instead_of} | arguments
     if about["instead_of"]:
@@ -401,7 +407,7 @@ _FLAGS: Final = [
         ),
         (
             ["-v", "--verbose"],
-            "Say all that is known, and on stderr what was read and how long it took.",
+            "Print all details, and on stderr what was read and how long reading took.",
         ),
     )
 ]

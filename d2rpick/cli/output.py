@@ -96,7 +96,7 @@ class Output:
         "Format of the result.", default="table", short=("-f",)
     )
     exit_zero: bool = make_option(
-        "Exit with 0 instead of 1 when the answer is an objection.",
+        "Exit with 0 instead of 1 if a problem was found.",
         "flag",
         default=False,
     )
@@ -111,7 +111,7 @@ class Output:
         "Print no notes and warnings to stderr.", "flag", default=False, short=("-q",)
     )
     limit: int = make_option(
-        "Number of rows in the table; json and csv have all.",
+        "Number of rows in the table; json and csv contain all.",
         range(1, UNLIMITED),
         default=3,
     )

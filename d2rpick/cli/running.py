@@ -26,25 +26,25 @@ CMD = ("program", "CMD")
 @click.argument("deck", type=choose_click_type("file"))
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=choose_click_type("output"),
-    help="Folder of the run; made if missing.",
+    help="Folder of the run; created if missing.",
 )  # fmt: skip
 @options.make_click_option(
     "part",
     Option(
-        "Parts to switch.  [default: those of the bodies that the deck puts off]",
+        "Parts to switch.  [default: parts of the rigid bodies that the deck deactivates]",
         "text",
         "IDS",
         many=True,
     ),
 )
 @options.make_click_option("wait", Option(
-    "Time without force that counts as flight.  [default: half of the longest inner period known so far]",
+    "Time without force after which the parts fly.  [default: half of the longest vibration period found so far]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @options.make_click_option(
     "margin",
     Option(
-        "From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]",
+        "Time from td to the next contact.  [default: 2 ms, or 3% of the flight if longer]",
         POSITIVE,
         "T",
     ),
@@ -52,14 +52,14 @@ CMD = ("program", "CMD")
 @options.make_click_option(
     "starter",
     Option(
-        "Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]",
+        "Command that runs the starter on {deck}.  [default: starter in OPENRADIOSS_PATH]",
         *CMD,
     ),
 )
 @options.make_click_option(
     "engine",
     Option(
-        "Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]",
+        "Command that runs the engine on {deck}.  [default: engine in OPENRADIOSS_PATH]",
         *CMD,
     ),
 )
@@ -67,11 +67,11 @@ CMD = ("program", "CMD")
     "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
     help="Threads of the solver; {threads} in a command.",
 )  # fmt: skip
+@click.option("--resume", is_flag=True, help="Resume a run that was started in RUNDIR.")
 @click.option(
-    "--resume", is_flag=True, help="Go on with a run that has begun in RUNDIR."
-)
-@click.option(
-    "--dry-run", is_flag=True, help="Print what would be started, and start nothing."
+    "--dry-run",
+    is_flag=True,
+    help="Print the commands of the run without starting them.",
 )
 @options.add_options(
     "report",
@@ -91,9 +91,9 @@ def drive(
 ) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
-    DECK, a starter deck with one engine file, is copied into RUNDIR.  It flies when no force has acted for the wait.
-    Then a rigid probe finds the next contact, and the run goes on deformable from the margin before it.  The same
-    command computes the same run.  What is interrupted goes on with --resume.
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts fly when no force has acted on them for
+    the time --wait.  A rigid probe run then finds the next contact.  The run continues deformable from the margin
+    before the contact.  The same command computes the same run.  --resume continues an interrupted run.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def _plan(driving: Driving) -> list[str]:
 @options.make_command
 @click.argument("run", metavar="RUN", type=choose_click_type("file"))
 @options.make_click_option("wait", Option(
-    "Time without a force that counts as flight.  [default: half of the longest inner period that is known]",
+    "Time without force after which the parts fly.  [default: half of the longest vibration period found]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @click.option(
@@ -155,15 +155,15 @@ def _plan(driving: Driving) -> list[str]:
     is_flag=True,
     cls=options.Either,
     instead_of=("lasting",),
-    help="Tell what there is now, and end.",
+    help="Report the present state, and end.",
 )
 @click.option(
     "--for", "lasting", type=choose_click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
-    help="End after so many seconds.  [default: when the run has ended]",
+    help="Number of seconds after which to end.  [default: when the run has ended]",
 )  # fmt: skip
 @options.add_options(
     *("part", "deck", "output_format", "exit_zero", "quiet"),
-    deck="Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.",
+    deck="Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.",
     forms=("table", "ndjson"),
 )
 def follow(
@@ -174,10 +174,10 @@ def follow(
     request: Request,
     output: Output,
 ) -> None:
-    """Watch RUN, files or a folder, while it is computed: say when it flies, and when to switch.
+    """Watch RUN, files or a folder, while it is computed: report when it flies, and when to switch.
 
-    A line for each event: load, flight with its evidence, a switch advised, contact, restart, silence, end.  RUN need
-    not have begun.  Nothing is started, stopped or changed.
+    d2rpick prints a line for each event: load, flight with its evidence, recommended switch, contact, restart, silence,
+    end.  RUN need not have started.  d2rpick does not start, stop or change anything.
 
     Examples
     --------
@@ -214,26 +214,24 @@ def follow(
 @options.make_click_option(
     "part",
     Option(
-        "Parts to switch, by number (3,7) or range (10-19).  [default: Radioss, those of bodies that are put off]",
+        "Parts to switch, by number (3,7) or range (10-19).  [default: Radioss, parts of deactivated rigid bodies]",
         *("names", "IDS"), many=True,
     ),
 )  # fmt: skip
 @options.make_click_option(
     "wait",
     Option(
-        "Time without force that counts as flight.  [default: by the deck]",
+        "Time without force after which the parts fly.  [default: derived from the deck]",
         POSITIVE,
         "T",
     ),
 )
 @options.make_click_option(
-    "after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T")
+    "after", Option("Time before which nothing becomes rigid.", NOT_NEGATIVE, "T")
 )
 @options.make_click_option(
     "output_dir",
-    Option(
-        "Folder for the copy, made where there is none.", "output", "DIR", short=("-o",)
-    ),
+    Option("Folder for the copy; created if missing.", "output", "DIR", short=("-o",)),
     required=True,
 )
 @options.add_options("overwrite", "quiet")
@@ -247,8 +245,9 @@ def first(
 ) -> None:
     """Write a copy of DECK whose first run switches itself: no reference run is needed.
 
-    The solver makes the parts rigid when no contact has had a force for the wait, and deformable with the next force.
-    Radioss: legs that sensors end, and the rigid bodies that the deck lacks.  LS-DYNA: switches with contact codes.
+    The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
+    force.  For Radioss, the copy contains restart segments that sensors end, and the missing rigid bodies.  For
+    LS-DYNA, it contains switches with contact codes.
 
     Examples
     --------

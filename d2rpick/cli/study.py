@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @options.make_file_option(
     "--resume",
-    "Keep finished runs in FILE, and skip those that are in it and unchanged.",
+    "Keep finished runs in FILE, and skip unchanged runs that it contains.",
     kind="output",
 )
 @options.make_click_option("jobs", Option(
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 @options.add_options(
     *(*READING, *LIMITS, "plot", "report", *RESULT),
     plot="Draw the energies of all runs to FILE (png, svg, pdf).",
-    report="Write all of it to one HTML page to read, print and sign.",
+    report="Write everything to one HTML page to read, print and sign.",
     forms=FORMATS["study"],
 )
 def study(
@@ -74,11 +74,11 @@ def study(
     request: Request,
     output: Output,
 ) -> None:
-    """Choose tr for many runs: how far they agree, and one tr for all of them.
+    """Choose tr for many runs: each tr, how far the runs agree, and one tr for all.
 
-    Without --td and --td-window each run chooses both times in its longest flight.  Each RUN is a file, a folder with
-    the files of one run, or a pattern whose matches are runs.  One that cannot be
-    read is listed in its row and does not stop the others.
+    If you omit --td and --td-window, both times of each run are chosen in its longest flight.  Each RUN is a file, a
+    folder with the files of one run, or a pattern that matches runs.  A run that cannot be read is reported in its row
+    and does not stop the others.
 
     Examples
     --------
@@ -233,11 +233,11 @@ def _choose_farm(
 )
 @options.add_options(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
-    """Fit the cost of elements to what runs of a site took, for --weights.
+    """Fit the cost of elements to the processor times of your runs, for --weights.
 
-    Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,
-    with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
-    not tell apart keeps the ratio that was measured.  A run that is named twice counts once.
+    Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
+    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  Costs that the runs
+    do not distinguish keep the measured ratio.  A run that is named twice is used once.
 
     Examples
     --------

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from decimal import Decimal
 
     import numpy as np
     from numpy.typing import NDArray
@@ -15,6 +17,19 @@ if TYPE_CHECKING:
 _DIGITS: Final = 6  # significant digits of a printed time
 # Significant digits of a sum of times: more than files have, fewer than those of a double.
 _EXACT: Final = 12
+
+# Units of time by the names that files and users give them [s].  Texts, because a double of 0.001 is not exact.
+_SIZES: Final = {
+    **dict.fromkeys(("s", "sec", "second", "seconds"), "1"),
+    **dict.fromkeys(("ms", "msec"), "1e-3"),
+    **dict.fromkeys(("us", "µs", "μs"), "1e-6"),
+    "ns": "1e-9",
+    "min": "60",
+    "h": "3600",
+}
+_TYPED_TIME: Final = (
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
+)
 
 # Shares of a record in which a time is rarely meant.  A number in the first 1 % is assumed to be in another unit.
 _NEVER_MEANT: Final = 0.01
@@ -121,6 +136,38 @@ def format_above_limit(value: float, limit: float) -> str:
     """
     texts = (f"{value:.{digits}g}" for digits in range(3, 17))
     return next((text for text in texts if float(text) > limit), repr(float(value)))
+
+
+def parse_seconds(text: str) -> Decimal | None:
+    """Return a time given with its unit [s], exact; None if the text is not such a time.
+
+    Examples
+    --------
+    >>> [str(parse_seconds(text)) for text in ("64ms", "2 min", "64", "forms")]
+    ['0.064', '120', 'None', 'None']
+    """
+    typed_time = re.fullmatch(_TYPED_TIME, text, re.ASCII)
+    size = _SIZES.get(typed_time[2]) if typed_time else None
+    if typed_time is None or size is None:
+        return None
+    from decimal import Decimal  # most times are typed without a unit
+
+    return Decimal(typed_time[1]) * Decimal(size)
+
+
+def convert_to_unit(text: str, unit: str) -> float | None:
+    """Return a time given with its unit as a number in another ``unit``; None if the text or the unit is not known.
+
+    Examples
+    --------
+    >>> convert_to_unit("64ms", "s"), convert_to_unit("64 ms", "ms"), convert_to_unit("64ms", "")
+    (0.064, 64.0, None)
+    """
+    seconds = parse_seconds(text)
+    size = _SIZES.get(unit.casefold())
+    if seconds is None or size is None:
+        return None
+    return float(seconds / type(seconds)(size))
 
 
 def _find_next_printed(printed: float) -> float:

@@ -192,21 +192,6 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
     return same[0]
 
 
-def parse_seconds(text: str) -> float | None:
-    """Return a time given with its unit [s]; None if the text is not such a time.
-
-    Examples
-    --------
-    >>> parse_seconds("64ms"), parse_seconds("0.064 s"), parse_seconds("64"), parse_seconds("forms")
-    (0.064, 0.064, None, None)
-    """
-    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|ms|us|µs)\s*", text, re.ASCII)
-    if match is None:
-        return None
-    sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
-    return float(f"{float(match[1]) * sizes[match[2]]:.12g}")
-
-
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
     """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity."""
     import difflib

@@ -12,8 +12,9 @@ from d2rpick.base.errors import FormatError, list_names
 from d2rpick.base.files import STDIN, FileState, bound, describe_unpacked_excess
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, open_content, open_scattered
+from d2rpick.histories.digits import parse_seconds
 from d2rpick.histories.formats import READERS
-from d2rpick.histories.names import number_in_family, parse_seconds, suggest_name
+from d2rpick.histories.names import number_in_family, suggest_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -156,6 +156,10 @@
   Object.entries({ role: "slider", tabindex: "0", "aria-label": "td, time to switch back to deformable", "aria-orientation": "horizontal" })
     .forEach(([name, value]) => handle.setAttribute(name, value));
 
+  // What the cards with a verdict at the top of the page have of their pairs, which is not repeated here.
+  const cards = [...document.querySelectorAll(".card:has(.badge) .exact")].map((one) => one.textContent);
+  const onCards = ["verdict", "why", "cure", "rigid"];
+
   const spoken = (one) => `td ${one.text.td}, tr ${one.text.tr}, ${one.text.said}`;
 
   function show(next, message = "") {
@@ -167,10 +171,11 @@
     const first = flight.rows[0], last = flight.rows[flight.rows.length - 1];
     Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: spoken(row) })
       .forEach(([name, value]) => handle.setAttribute(`aria-${name}`, value));
+    const isAbove = cards.some((card) => card.includes(`tr = ${row.text.exact_tr}, td = ${row.text.exact_td}`));
     section.querySelectorAll("[data-value]").forEach((place) => {
       const text = place.dataset.value === "command" ? data.command.join(row.text.exact_td) : row.text[place.dataset.value] ?? "";
       place.textContent = text;
-      place.closest("dl > div")?.classList.toggle("empty", !text);
+      place.closest("dl > div")?.classList.toggle("empty", !text || (isAbove && onCards.includes(place.dataset.value)));
     });
     if (charts.motion) charts.motion.setData(motion(), false);
     follow();

@@ -178,7 +178,7 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
     cut = f"; cut at the top: {' and '.join(above)}" if above else ""
     return {
         "caption": f"Internal energy in the flight{cut}",
-        "time": f"time [{unit}]" if unit else "time",
+        "time": f"time [{unit}]" if unit else "time (unit of the run)",
         "error": _name_error(trade_off.offers),
         "saved": _name_saving(trade_off.offers),
         "view": [view.start, view.end],

@@ -248,8 +248,8 @@ def add_legend_below(
 
 
 def add_unit(name: str, unit: str) -> str:
-    """Return the label of an axis, with the unit if a file names one."""
-    return f"{name} [{make_plain_text(unit)}]" if unit else name
+    """Return the label of an axis of time, with the unit that a file names, else with that of the run."""
+    return f"{name} [{make_plain_text(unit)}]" if unit else f"{name} (unit of the run)"
 
 
 def make_plain_text(name: str) -> str:

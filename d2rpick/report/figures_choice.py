@@ -524,7 +524,7 @@ def _show_runs(
     drawn: Sequence[StudyRow],
     curves: Sequence[Samples],
 ) -> None:
-    """Limit the axes to the time from shortly before the first tr to shortly after td; higher energies are cut off."""
+    """Limit the axes to the time from shortly before the first tr to shortly after td, with all energies in it."""
     if not curves:
         return
     first = min(float(curve[0, 0]) for curve in curves)
@@ -549,12 +549,10 @@ def _show_runs(
     )
     # keep the lowest level visible next to the median one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
-    scale = make_scale(float(inner.min()), float(inner.max()), level)
+    scale = make_scale(float(inner.min()), float(visible_energies.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
         scale = make_scale(0.0, max(float(curve[1].max()) for curve in curves), 0.0)
-    figures.show_span(
-        axes, span, scale, [("highest run", float(visible_energies.max()))]
-    )
+    figures.show_span(axes, span, scale, [])
 
 
 def _select_energies(

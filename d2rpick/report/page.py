@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
+# smallest number of sections with which a page has a list of its contents
+_LONG: Final = 4
 # tables with more columns do not fit on a narrow screen
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
@@ -56,6 +58,13 @@ class Markup(str):
     """Text that is HTML already."""
 
     __slots__ = ()
+
+
+class Section(Markup):
+    """A section of a page, with its title and the id to which a link in the contents leads."""
+
+    name: str
+    anchor: str
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
@@ -101,6 +110,8 @@ def build_document(
     ``styles`` and ``scripts`` are needed besides the style of every page; the policy of the page blocks all others.
     """
     sheets = (read_resource("style.css"), *styles)
+    if any("<pre" in part for part in content):
+        scripts = (read_resource("copy.js"), *scripts)
     head = make_element(
         "head",
         make_element("meta", charset="utf-8"),
@@ -128,6 +139,7 @@ def build_document(
     body = make_element(
         "body",
         header,
+        build_contents(content),
         make_element("main", *content),
         *(make_element("script", script) for script in scripts),
     )
@@ -155,9 +167,33 @@ def _compute_digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def build_section(title: str, *content: str) -> Markup:
+def build_section(title: str, *content: str) -> Section:
     """Return a section with a title."""
-    return make_element("section", make_element("h2", title), *content)
+    return _make_section(title, make_element("h2", title), *content)
+
+
+def _make_section(title: str, *content: str) -> Section:
+    """Return a section with an id made from its title."""
+    letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
+    anchor = f"section-{''.join(letters)}"
+    section = Section(make_element("section", *content, id=anchor))
+    section.name = title
+    section.anchor = anchor
+    return section
+
+
+def build_contents(content: Iterable[str]) -> Markup:
+    """Return links to the sections of a page, nothing if it is short."""
+    sections = [part for part in content if isinstance(part, Section)]
+    if len(sections) < _LONG:
+        return Markup()
+    links = (
+        make_element("li", make_element("a", section.name, href=f"#{section.anchor}"))
+        for section in sections
+    )
+    return make_element(
+        "nav", make_element("ul", *links), class_="contents", aria_label="Contents"
+    )
 
 
 def build_drawing(caption: str, svg: str) -> Markup:
@@ -429,11 +465,11 @@ def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup
         make_element("summary", make_element("h2", "Method and limits")),
         read_resource("method.html"),
     )
-    yield make_element("section", folded)
+    yield _make_section("Method and limits", folded)
     yield build_command(command, stdin)
 
 
-def build_command(command: Sequence[str], stdin: bool = False) -> Markup:
+def build_command(command: Sequence[str], stdin: bool = False) -> Section:
     """Return the arguments that repeat an answer as a command line to paste."""
     stdin_note = (
         [make_element("p", "with the same history on standard input:")] if stdin else []

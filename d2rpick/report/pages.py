@@ -361,7 +361,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
         page.build_front(
             [_build_common_card(answer)],
             build_remarks(answer.cautions),
-            build_pairs([*study.list_outcome(answer), *study.list_run_reasons(answer)]),
+            build_pairs([*_list_below_card(answer), *study.list_run_reasons(answer)]),
         ),
         _build_figure("runs-", caption, "study", answer, page=True),
         build_section(
@@ -377,6 +377,12 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
         *page.build_method(command),
         signed=page.CHECKED,
     )
+
+
+def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
+    """Return the outcome without what the card of the common tr has already."""
+    outcome = study.list_outcome(answer)
+    return outcome if answer.common.tr is None else outcome[1:]
 
 
 def _build_common_card(answer: StudyOfRuns) -> Markup:

@@ -93,7 +93,7 @@ EXPLANATIONS: Final = {
         "Run the reference again with a version of January 2026 or later, and choose the times by that run.",
     ),
     "eroded-energy": Explanation(
-        "Deleted elements hold a notable part of the internal energy. It counts as internal energy of "
+        "Deleted elements hold a notable part of the internal energy. It is part of the internal energy of "
         "the model, but does "
         "not spring back after td.",
         "Choose by the energies of the parts (--part), or by a history without eroded energy.",
@@ -250,7 +250,7 @@ EXPLANATIONS: Final = {
         "Nothing, if the part is light. Otherwise write its energy more often.",
     ),
     "partly-rigid": Explanation(
-        "Some of the parts were rigid in the run and others deformed, so this time counts as no window.",
+        "Some of the parts were rigid in the run and others deformed, so this time is not used as a window.",
         "Name the parts that were switched together with --part.",
     ),
     "parts-not-in-deck": Explanation(

@@ -631,7 +631,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), "64ms"),
             TypeError,
-            "of the history, 0.064 where it is s",
+            "of the run, 0.064 if it is s",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)),

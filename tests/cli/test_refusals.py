@@ -176,7 +176,7 @@ suggest --td-window 0.06 0.2 {ENERGY} | --td-window 0.06 0.2 reaches outside the
 suggest --td 0.16 {ENERGY} | --td 0.16 lies outside the record, 0 to 0.15$
 suggest --td 0.6 {ENERGY} | --td 0.6 lies outside the record, 0 to 0.15$
 suggest --td 2 {ENERGY} | --td 2 lies outside the record, 0 to 0.15$
-suggest --td 64ms {ENERGY} | '64ms' is not a number | give a number in the unit of the history, 0.064 where it is s
+suggest --td 64ms {ENERGY} | --td | unit of time is not known from {ENERGY} | give 0.064 if it is s, 64 if it is ms
 suggest 64 {ENERGY} | a time is given as --td, a number in the unit of the record
 suggest 64ms {ENERGY} | a time is given as --td, a number in the unit of the record, 0.064 if that unit is s
 suggest --td 0.064 {ENERGY.replace("energy", "enrgy")} | (did you mean 'energy.csv'?)

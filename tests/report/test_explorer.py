@@ -106,6 +106,10 @@ class Browser:
         """Find an element."""
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
+    def all(self, selector: str) -> "list[WebElement]":
+        """Find all such elements."""
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
     def shown(self, selector: str) -> bool:
         """Return True if the first such element has a visible size."""
         return self.find(selector).is_displayed()
@@ -261,7 +265,7 @@ def check(browser: Browser) -> float:
     if best:
         expected["residual"] = format_measure(best["residual"])
         expected["kinetic"] = format_measure(suggestion["kinetic_share"])
-        expected["tolerance"] = f"{best['timing_tolerance']:.1e}"
+        expected["tolerance"] = f"±{best['timing_tolerance']:.1e}"
     expected["level"] = format_short(suggestion["energy_td"])
     assert {name: said_by_page[name] for name in expected} == expected
     assert said_by_page["typed"] == expected["td"]
@@ -435,8 +439,11 @@ def test_nothing_is_cut_with_and_without_scripts(
             assert browser.cut() == []
             assert browser.shown("#explorer") == scripts
             assert browser.shown("figure.drawn") == (not scripts)
-            assert browser.shown(".sign")
+            assert not browser.shown(".sign")  # for paper alone
             assert browser.shown(".hint") == (width < 960)
+            assert len(browser.all(".copy")) == (
+                len(browser.all("pre")) if scripts else 0
+            )
 
 
 @mark_for_browser
@@ -455,6 +462,42 @@ def test_it_prints_as_the_static_page_also_where_it_is_dark(
     assert not browser.shown("#explorer")
     assert browser.shown("figure.drawn")
     assert browser.shown(".sign")
+    assert not browser.shown(".contents")
+    assert not browser.shown(".copy")
+
+
+@mark_for_browser
+def test_a_button_copies_what_stands_below_it(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    grant = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
+    browser.ask("Browser.grantPermissions", **grant)
+    buttons = browser.all(".copy")
+    commands = browser.all("pre")
+    assert len(buttons) == len(commands) >= 3
+    for button, command in zip(buttons, commands, strict=True):
+        button.click()
+        copied = browser.driver.execute_async_script(
+            "navigator.clipboard.readText().then(arguments[0], () => arguments[0](null))"
+        )
+        assert copied == command.get_property("textContent")
+        assert button.text == "Copied"
+
+
+@mark_for_browser
+def test_the_pair_of_the_first_card_is_not_told_twice(
+    paper: Path, browser: Browser
+) -> None:
+    browser.open(paper)
+    why = '.now dd[data-value="why"]'
+    assert browser.shown(why)
+    for _ in range(2):
+        browser.find(".later").click()
+    pair = f"tr = {browser.value('exact_tr')}, td = {browser.value('exact_td')}"
+    assert pair in str(browser.find(".card .exact").get_property("textContent"))
+    assert browser.find(why).get_property("textContent")
+    assert not browser.shown(why)
+    browser.find(".back").click()
+    assert browser.shown(why)
 
 
 @mark_for_browser
@@ -475,7 +518,7 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
             f"{suggestion[end]:.0%}" for end in ("mean_energy_low", "mean_energy_high")
         ]
         assert browser.value("after").startswith(
-            f"{share[0]} to {share[1]} of what the reference has"
+            f"{share[0]} to {share[1]} of the reference's"
         )
     assert not browser.driver.find_elements("css selector", ".motion")
 
@@ -503,7 +546,16 @@ def test_each_flight_of_a_plan_can_be_explored(
         ).exit_code
         == 0
     )
-    page = write_page(tmp_path, "plan", "--no-verify", "--part", "box", motion)
+    page = write_page(
+        tmp_path,
+        "plan",
+        "--no-verify",
+        "--min-quality",
+        "poor",
+        "--part",
+        "box",
+        motion,
+    )
     browser.open(page)
     flights = read_content(page)["flights"]
     assert len(flights) > 1

@@ -16,6 +16,7 @@ import pytest
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.cli import one_run
+from d2rpick.report.page import read_resource
 from tests.command import ENERGY, GLSTAT, ROOT, make_replay_file, put, run
 from tests.computed import locate_stored, read_unpacked
 
@@ -34,27 +35,29 @@ TOLD = {
          "266 more"), (),
     ),
     "a pair that cannot be bettered": (
-        ("suggest", "--td-window", "0.06", "0.07", ENERGY), 0, ("Recommended",), ("Better pair",)
+        ("suggest", "--td-window", "0.06", "0.07", ENERGY), 0, ("usetr0.0135867td0.0687534",), ("Better pair",)
     ),
     "each part and the saving, and no pair that is not better": (
         ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
-        ("Parts at this pair", "share of the mismatch", "run time", "residual0.065"), ("Better pair",),
+        ("Parts at this pair", "share of the mismatch", "about 16% of the processor time", "wrong by 6.5%"),
+        ("Better pair",),
     ),
     "nothing to recommend": (
         ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,
         ("No tr can be recommended", "no-candidate"), ("card chosen", "rigid at  "),
     ),
     "a poor pair": (
-        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 0, ("Verified, but of poor quality",), ()
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 1,
+        ("do not usetr0.0128853td0.064", "wrong by 96%"), ("Verified",),
     ),
     "a pair that verifies": (
         ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY), 0,
-        ("Verified", "residual 0.000", "0.0687534", "1501 states", "Method and limits", "d2rpick verify --tr",
-         "d2rpick card --tr 0.0135867 --td 0.0687534 --part"), ("but of poor quality",),
+        ("usetr0.0135867td0.0687534", "residual, expected0.000", "1501 states", "Method and limits",
+         "d2rpick verify --tr", "d2rpick card --tr 0.0135867 --td 0.0687534 --part"), ("Verified",),
     ),
     "a pair that does not verify": (
         ("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY), 1,
-        ("Not verified", "opposite sign of the deformation"), ("d2rpick card",),
+        ("do not use", "opposite sign of the deformation"), ("d2rpick card",),
     ),
 }  # fmt: skip
 
@@ -181,14 +184,14 @@ def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(
         == 1
     )
     assert paper.source.partition("</details>")[0].count("<h3>Limits</h3>") == 1
-    assert paper.text.count("To repeat this") == 1
+    assert paper.source.count("<h2>To repeat this</h2>") == 1
 
 
 @pytest.mark.slow
 def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> None:
     arguments = ("--tr", "0.1", "--td", "0.2838", locate_stored("drop2T01.gz"))
     page = read_page_of(tmp_path, *arguments, command="verify")
-    assert "<dt>level error</dt><dd>0</dd>" in page.source
+    assert "<dt>level error</dt><dd>0.000</dd>" in page.source
     assert "<dt>energy ratio</dt>" not in page.source
     document = json.loads(page.data[0])["flights"][0]
     assert (document["log"], document["heights"][1] > 40) == (False, True)
@@ -228,11 +231,12 @@ def test_only_what_belongs_to_the_page_takes_effect(paper: Page) -> None:
             for text in texts
         ]
         assert rules[name] == [f"'sha256-{digest}'" for digest in digests]
-    assert (len(paper.scripts), len(paper.styles), len(paper.data)) == (2, 3, 1)
-    assert "The MIT License" in paper.scripts[0]
+    assert (len(paper.scripts), len(paper.styles), len(paper.data)) == (3, 3, 1)
+    assert paper.scripts[0] == read_resource("copy.js")
+    assert "The MIT License" in paper.scripts[1]
 
 
-def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(
+def test_without_a_flight_nothing_can_be_explored_and_only_copying_has_a_script(
     tmp_path: Path,
 ) -> None:
     table = put(
@@ -240,9 +244,37 @@ def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(
         "time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)),
     )
     page = read_page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
-    assert not page.scripts
+    assert page.scripts == [read_resource("copy.js")]
     assert not page.data
-    assert "script-src 'none'" in html.unescape(page.source)
+
+
+def test_links_lead_to_every_section_of_a_long_page(paper: Page) -> None:
+    links = re.findall(r'<a href="#(section-[^"]*)">([^<]*)</a>', paper.source)
+    titles = re.findall(
+        r'<section id="(section-[^"]*)">(?:<details><summary>)?<h2>([^<]*)</h2>',
+        paper.source,
+    )
+    assert links == titles
+    assert ("section-candidates", "Candidates") in links
+
+
+def test_a_study_shows_all_of_every_peak_and_td() -> None:
+    from d2rpick import study
+    from d2rpick.report.figures_choice import draw_study
+
+    answer = study([ENERGY], td=0.064)
+    figure = draw_study(answer, page=True)
+    (axes,) = figure.axes
+    first, last = axes.get_xlim()
+    for row in answer.runs:
+        assert row.curve is not None
+        time, energy = row.curve
+        seen = energy[(first <= time) & (time <= last)]
+        assert axes.get_ylim()[1] >= seen.max()
+    assert first < 0.064 < last
+    texts = [text.get_text().strip() for text in axes.texts]
+    assert "td = 0.064" in texts
+    assert not [text for text in texts if "up to" in text]
 
 
 def test_ids_are_unique_and_all_that_is_referred_to_is_there(paper: Page) -> None:
@@ -302,7 +334,7 @@ def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(
     page = read_page_of(tmp_path, "--td", "0.064", str(evil))
     assert NASTY in page.text
     assert "evil\ufffd.glstat" in page.text
-    assert (len(page.scripts), len(page.data)) == (2, 1)
+    assert (len(page.scripts), len(page.data)) == (3, 1)
     assert "alert" not in "".join(page.scripts)
 
 
@@ -320,7 +352,7 @@ def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
     assert name in page.text
     assert "energy & <i>.csv" in page.text
     assert "foreignobject" not in page.names
-    assert (len(page.scripts), len(page.data)) == (2, 1)
+    assert (len(page.scripts), len(page.data)) == (3, 1)
     assert not set("<>&") & set(page.data[0])
     assert json.loads(page.data[0])["command"][1].endswith("<i>.csv'")
 

@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 
 from d2rpick.models.box_model import Parameters
-from d2rpick.report.formats import PLAIN
+from d2rpick.report.formats import PLAIN, DisplayOptions
 from d2rpick.vibration.oscillator import Oscillator, Replay, State
 from tests import paper
 from tests.command import ENERGY, ROOT, join_wrapped_lines, read_refusal, run, run_json
 from tests.json_schemas import check_by_schema
-from validation.published import box, exhibits, saving, values
+from validation.published import (
+    box,
+    command,
+    exhibits,
+    reproduction,
+    saving,
+    values,
+)
 from validation.published.drawing import draw_exhibit
 from validation.published.values import MISPRINTS, integrate_replay, make_values_table
 
@@ -254,6 +261,51 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"]
     )
+
+
+@pytest.mark.slow
+def test_a_section_has_its_own_figures_values_and_misprints_alone(
+    tmp_path: Path,
+) -> None:
+    about = ("reproduce", "--output-dir", str(tmp_path), "--section")
+    third = run_json(*about, "3")
+    assert [figure["figure"] for figure in third["figures"]] == ["5", "6a-d"]
+    assert {row["section"] for row in third["rows"]} == {3}
+    assert {row["figure"] for row in third["rows"]} == {"6a-d"}
+    assert third["misprints"] == []
+    text = run(*about, "2", "--overwrite").stdout
+    assert "omega_2" in text
+    assert "misprints in the paper" in text
+    assert "(6, 80) ms at" not in text
+    assert "published pair" not in text
+
+
+def test_each_value_is_printed_with_its_figure_and_once() -> None:
+    figures = sorted(ALL.values(), key=lambda exhibit: exhibit.figure, reverse=True)
+    made = reproduction.Reproduction(
+        make_values_table(), [*figures, replace(ALL["after-td"])]
+    )
+    rows = [row for exhibit in figures for row in made.list_values(exhibit)]
+    assert sorted(row.what for row in rows) == sorted(
+        row.what for row in make_values_table()
+    )
+    text = reproduction.as_table(made, DisplayOptions())
+    named = {row.what: text.count(f"\n{row.what} ") for row in rows}
+    assert {what for what, count in named.items() if count != 1} == set()
+
+
+def test_figures_are_in_the_order_of_the_paper() -> None:
+    pairs = read_named_columns(SOLVER)
+    made = command.make_exhibits(("2", "3", "5"), {"pairs": pairs})
+    assert [exhibit.figure for exhibit in made] == ["3", "4", "5", "6a-d", "section 5"]
+
+
+def test_a_verdict_has_three_kinds_and_one_for_nothing_to_compare() -> None:
+    figure = ALL["level"]
+    kinds = {(True, False): "yes", (False, True): "in part", (False, False): "no"}
+    for (agrees, partly), verdict in kinds.items():
+        assert replace(figure, agrees=agrees, partly=partly).verdict == verdict
+    assert replace(figure, agrees=None).verdict == "nothing to compare"
 
 
 def test_without_the_repository_a_line_says_what_is_missing(

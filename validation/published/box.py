@@ -33,6 +33,8 @@ _END: Final = 0.42
 # tr [s]: the paper's two, one with too little and one with too much energy, all in the trip of this box.
 _EARLY, _REVISED, _LITTLE, _MUCH = 0.001, 0.070, 0.020, 0.068
 _OUTLINES: Final = 8
+# Roll error that is not visible in a figure whose axis of roll spans about 200 degrees [degrees].
+_CLOSE: Final = 0.1
 # td of the variants is so long before the first landing [s], as in the paper.
 _BEFORE_LANDING: Final = 0.010
 
@@ -131,13 +133,14 @@ def _make_revised_exhibit(base: Parameters) -> Exhibit:
         f"The sled pushes this box until {1e3 * (reference.released or 0):.0f} ms, so 70 ms lies in its trip: the roll "
         f"at td is off by {errors[0]:+.2f} degrees. The analogue is the recommended tr = {1e3 * tr:.1f} ms, after the "
         f"trip, with {errors[1]:+.2f} degrees.",
-        agrees=abs(errors[1]) < abs(errors[0]),
+        agrees=abs(errors[0]) <= _CLOSE,
+        partly=abs(errors[1]) < _CLOSE < abs(errors[0]),
     )  # fmt: skip
 
 
 def _make_comparison(
     name: str, title: str, figure: str, section: int, base: Parameters, times: tuple[float, ...], paper: str,
-    results: str, *, agrees: bool,
+    results: str, *, agrees: bool, partly: bool = False,
 ) -> Exhibit:  # fmt: skip
     """Return outlines, roll and height of runs switched at ``times`` beside the reference, and the differences."""
     reference = _run(base)
@@ -184,7 +187,7 @@ def _make_comparison(
         ),
     )
     return Exhibit(
-        name, title, section, figure, paper, results, agrees, columns, panels
+        name, title, section, figure, paper, results, agrees, columns, panels, partly
     )
 
 

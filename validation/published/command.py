@@ -1,4 +1,4 @@
-"""The command ``d2rpick reproduce``: figures and tables of the requested sections."""
+"""What ``d2rpick reproduce`` does: the figures and tables of the sections that are asked for."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from validation.published.drawing import draw_exhibit
 from validation.published.values import make_values_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.cli.output import Output
     from d2rpick.histories.history import Samples
@@ -36,7 +36,7 @@ def reproduce(
     tables: Tables,
     output: Output,
 ) -> None:
-    """Write the figures and tables of the requested sections (default: all), and the answer.
+    """Write the figures and tables of these sections, of all without any, and the answer.
 
     ``tables``: the columns of a solver's table beside its times, by what it is.
     """
@@ -45,9 +45,10 @@ def reproduce(
     curves = _read_solver_tables(
         solver, tables
     )  # before the half minute that the box takes
-    answer = reproduction.Reproduction(
-        make_values_table(), list(_make_exhibits(section, curves))
-    )
+    rows = [
+        row for row in make_values_table() if not section or str(row.section) in section
+    ]
+    answer = reproduction.Reproduction(rows, make_exhibits(section, curves))
     files = _write(output, folder, answer)
     if output.report:
         output.write(
@@ -62,25 +63,25 @@ def reproduce(
     output.finish(objection=not all(row.agrees for row in answer.rows))
 
 
-def _make_exhibits(
+def make_exhibits(
     sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
-) -> Iterator[Exhibit]:
-    """Yield the figures of the requested sections (default: all), in the order of the paper."""
+) -> list[Exhibit]:
+    """Give the figures of these sections, of all without any, in the order of the paper."""
     makers = [
         *box.list_box_exhibits(Parameters()),
         *exhibits.list_exhibits(solver),
         (5, saving.make_saving_exhibit),
     ]
-    makers.sort(key=lambda section_name: section_name[0])
-    return (
+    made = [
         make() for section, make in makers if not sections or str(section) in sections
-    )
+    ]
+    return sorted(made, key=lambda exhibit: (exhibit.section, exhibit.figure))
 
 
 def _read_solver_tables(
     names: Sequence[str], tables: Tables
 ) -> dict[str, dict[str, Samples]]:
-    """Read each table of a solver, which is recognised by its columns."""
+    """Read each table by the columns that it has."""
     tables_by_name = {}
     for name in names:
         (database,) = open_run([name], Selection(energy=("2",))).databases
@@ -105,7 +106,7 @@ def _read_solver_tables(
 
 
 def _make_folder(folder: str) -> Path:
-    """Create the folder if it is missing; raise D2RPickError if that fails."""
+    """Create the folder where it is missing; D2RPickError where that cannot be done."""
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -117,7 +118,7 @@ def _make_folder(folder: str) -> Path:
 
 
 def _write(output: Output, folder: Path, answer: Reproduction) -> list[str]:
-    """Write all files, or none if one of them may not be written; return their names."""
+    """Write all files, or none where one may not be written; give their names."""
     index, values = (
         reproduction.as_markdown(answer, DisplayOptions(), pictures=True),
         reproduction.as_csv(answer, DisplayOptions()),

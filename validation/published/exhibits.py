@@ -34,6 +34,10 @@ _PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)
 _NEAR: Final = 1.2
 
 
+VERDICTS: Final = ("yes", "in part", "no", "nothing to compare")
+YES, IN_PART, NO, NOTHING = VERDICTS
+
+
 class Curve(NamedTuple):
     """Column drawn as "line", "thin" or "dots" over the column ``x`` (default: the first one)."""
 
@@ -75,7 +79,8 @@ class Exhibit:
     """A figure and the columns it shows, the first of them the default x; panels row by row, none for a scheme.
 
     ``section`` and ``figure`` are those of the paper; ``paper`` is what it shows or claims there, ``found`` what is
-    found here, ``agrees`` whether that is the same (None: there is nothing to compare).
+    found here, ``agrees`` whether that is the same (None: there is nothing to compare), ``partly`` whether it is so
+    only roughly, or only a part of it.
     """
 
     name: str
@@ -87,6 +92,14 @@ class Exhibit:
     agrees: bool | None = None
     columns: Mapping[str, Samples] = field(default_factory=dict)
     panels: tuple[tuple[Panel, ...], ...] = ()
+    partly: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words: yes, in part, no, or nothing to compare."""
+        if self.partly:
+            return IN_PART
+        return {True: YES, False: NO, None: NOTHING}[self.agrees]
 
 
 if TYPE_CHECKING:

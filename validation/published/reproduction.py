@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
-from d2rpick.report.fields import Document, Field, Kind, get_kind, many, row
+from d2rpick.report.fields import Document, Field, Kind, get_kind, many, one_of, row
 from d2rpick.report.figures import render_svg_element
 from d2rpick.report.page import (
     Markup,
@@ -16,6 +16,7 @@ from d2rpick.report.page import (
     make_element,
 )
 from validation.published.drawing import draw_exhibit
+from validation.published.exhibits import IN_PART, NO, NOTHING, VERDICTS, YES
 from validation.published.values import (
     MISPRINTS,
     MOST_DIFFERENCE,
@@ -44,6 +45,45 @@ HEAD = (
     "source",
 )
 
+
+# Columns of the values of one figure, without their source: it stands once below them.
+_VALUES: Final = HEAD[:-1]
+# Section of the paper with the equations that have misprints, and the one that chooses the pair.
+_EQUATIONS: Final = 2
+_CHOICE: Final = 4
+_OVERVIEW: Final = ("figure", "the paper shows", "the same here")
+
+
+class Reproduction(NamedTuple):
+    """Values and figures of the paper next to those found here, in its order; ``files`` were written."""
+
+    rows: Sequence[PublishedValue]
+    exhibits: Sequence[Exhibit]
+    files: Sequence[str] = ()
+
+    @property
+    def misprints(self) -> Sequence[str]:
+        """Misprints in the equations, if their section is asked for."""
+        return MISPRINTS if self._has_section(_EQUATIONS) else ()
+
+    @property
+    def pairs(self) -> Sequence[str]:
+        """How good the published and the better pair are, if the section that chooses them is asked for."""
+        return describe_pairs() if self._has_section(_CHOICE) else ()
+
+    def _has_section(self, section: int) -> bool:
+        """Return True if figures of a section of the paper are in the answer."""
+        return any(exhibit.section == section for exhibit in self.exhibits)
+
+    def list_values(self, exhibit: Exhibit) -> Sequence[PublishedValue]:
+        """Return the values that belong to a figure; with several pictures of it, those of the first."""
+        place = (exhibit.section, exhibit.figure)
+        first = next(
+            other for other in self.exhibits if (other.section, other.figure) == place
+        )
+        return [row for row in self.rows if first is exhibit and row.place == place]
+
+
 _PAIR: Final = Kind(
     row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
     lambda pair: {"tr": pair[0], "td": pair[1], "residual": compute_residual(pair)},
@@ -58,6 +98,8 @@ _ROW: Final = row(
     Field("tolerance", get_kind("number", minimum=0)),
     Field("source", "text", "where the published number or the reference value is from"),
     Field("agrees", "flag", "the difference is within the tolerance"),
+    Field("section", get_kind("integer", minimum=1, maximum=5), "section of the paper", later=True),
+    Field("figure", "text", "number of the figure in the paper", later=True),
 )  # fmt: skip
 _FIGURE: Final = row(
     Field("name", "text"), Field("title", "text"), Field("section", get_kind("integer", minimum=1, maximum=5)),
@@ -65,85 +107,82 @@ _FIGURE: Final = row(
     Field("paper", "text", "what the paper shows"),
     Field("found", "text", "what is found here"),
     Field("agrees", "flag?", "null where there is nothing to compare"),
+    Field("verdict", one_of(*VERDICTS), "in words; in part: the same only roughly, or only a part of it", later=True),
 )  # fmt: skip
 DOCUMENT: Final = Document(
     "d2rpick/reproduce/2",
     "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
-        Field("rows", get_kind(many(_ROW), minItems=1)),
+        Field("rows", many(_ROW)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
         Field("better", _PAIR, get=lambda _: find_pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
-        Field("misprints", "texts", get=lambda _: MISPRINTS),
+        Field("misprints", "texts"),
         Field("files", "texts"),
     ),
 )
 
 
-class Reproduction(NamedTuple):
-    """Values and figures of the paper beside those found here; ``files`` were written."""
-
-    rows: Sequence[PublishedValue]
-    exhibits: Sequence[Exhibit]
-    files: Sequence[str] = ()
-
-
-def as_table(answer: Reproduction, is_shown: DisplayOptions) -> str:
-    """Return published numbers and reference values beside computed ones, the pairs, the figures, the misprints."""
-    rows, exhibits = answer[:2]
-    lines = [
-        tables.as_text(HEAD, [list_cells(row) for row in rows], is_shown.width),
-        "",
-        *describe_pairs(),
-        "",
+def as_table(answer: Reproduction, shown: DisplayOptions) -> str:
+    """Each figure with its verdict; then, in the order of the paper, what it shows, what is found here, the values."""
+    overview = [
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
     ]
-    for exhibit in exhibits:
-        lines += [
-            f"{write_heading(exhibit)}: {write_verdict(exhibit)}",
+    blocks = [tables.as_text(_OVERVIEW, overview, shown.width)]
+    for exhibit in answer.exhibits:
+        lines = [
+            f"{write_heading(exhibit)}: {exhibit.verdict}",
             f"  paper  {exhibit.paper}",
             f"  here   {exhibit.found}",
         ]
-    lines += [
-        "",
-        "misprints in the paper",
-        *(f"  {misprint}" for misprint in MISPRINTS),
-    ]
-    return tables.wrap_lines("\n".join(lines), is_shown.width)
+        if rows := answer.list_values(exhibit):
+            body = [list_cells(row)[:-1] for row in rows]
+            lines += ["", tables.as_text(_VALUES, body, shown.width)]
+            lines += [f"sources  {'; '.join(list_sources(rows))}"]
+        blocks.append("\n".join(lines))
+    if answer.pairs:
+        blocks.append("\n".join(answer.pairs))
+    if answer.misprints:
+        listed = (f"  {misprint}" for misprint in answer.misprints)
+        blocks.append("\n".join(["misprints in the paper", *listed]))
+    return tables.wrap_lines("\n\n".join(blocks), shown.width)
 
 
 def as_markdown(
     answer: Reproduction, _: DisplayOptions, *, pictures: bool = False
 ) -> str:
-    """Return the answer as Markdown, with figures if ``pictures`` are in the same folder."""
-    rows, exhibits = answer[:2]
+    """Give the same as Markdown, with the figures if ``pictures`` are in the same folder."""
+    overview = [
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
+    ]
     blocks = [
         "# Analysis of switched-rigid floating oscillator, reproduced",
         f"{MODEL}; d2rpick {__version__}.",
+        tables.as_markdown(_OVERVIEW, overview),
     ]
-    for exhibit in exhibits:
-        picture_lines = [f"![{exhibit.title}]({exhibit.name}.svg)"] if pictures else []
+    for exhibit in answer.exhibits:
+        picture = f"![{exhibit.title}]({exhibit.name}.svg)"
         blocks += [
             f"## {write_heading(exhibit)}",
-            *picture_lines,
+            *((picture,) if pictures else ()),
             f"Paper: {exhibit.paper}",
             f"Here: {exhibit.found}",
-            f"Agrees: {write_verdict(exhibit)}.",
+            f"Agrees: {exhibit.verdict}.",
         ]
-    blocks += [
-        "## Published and computed values",
-        tables.as_markdown(HEAD, [list_cells(row) for row in rows]),
-        *describe_pairs(),
-    ]
-    blocks += [
-        "## Misprints in the paper",
-        "\n".join(f"* {misprint}" for misprint in MISPRINTS),
-    ]
+        if rows := answer.list_values(exhibit):
+            blocks.append(tables.as_markdown(HEAD, [list_cells(row) for row in rows]))
+    blocks += answer.pairs
+    if answer.misprints:
+        listed = "\n".join(f"* {misprint}" for misprint in answer.misprints)
+        blocks += ["## Misprints in the paper", listed]
     return "\n\n".join(blocks)
 
 
 def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
-    """Return the rows at full precision."""
+    """Give the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
     body = [
@@ -163,45 +202,39 @@ def as_csv(answer: Reproduction, _: DisplayOptions) -> str:
 
 
 def list_cells(row: PublishedValue) -> list[tables.Cell]:
-    """Return a row in digits that are the same on every machine."""
-    cell_texts = (
+    """Give a row in digits that are the same on every machine."""
+    known = (
         None if value is None else f"{round(value, _DECIMALS):.12g}"
         for value in (row.published, row.reference)
     )
-    our_value = f"{round(row.here, _DECIMALS):.12g}"
+    here = f"{round(row.here, _DECIMALS):.12g}"
     difference = (
         "0"
         if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected)
         else f"{row.difference:.1e}"
     )
-    return [
-        row.what,
-        row.unit,
-        *cell_texts,
-        our_value,
-        difference,
-        row.agrees,
-        row.source,
-    ]
+    return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
+
+
+def name_place(exhibit: Exhibit) -> str:
+    """Return the figure or the section of the paper."""
+    is_section = exhibit.figure.startswith("section")
+    return exhibit.figure if is_section else f"fig. {exhibit.figure}"
 
 
 def write_heading(exhibit: Exhibit) -> str:
-    """Return the number of the figure in the paper and what it shows."""
-    figure_label = (
-        exhibit.figure
-        if exhibit.figure.startswith("section")
-        else f"fig. {exhibit.figure}"
-    )
-    return f"{figure_label[0].upper()}{figure_label[1:]}: {exhibit.title}"
+    """Give the figure of the paper and what it shows."""
+    place = name_place(exhibit)
+    return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
 
 
-def write_verdict(exhibit: Exhibit) -> str:
-    """Return if the computed figure agrees with the paper."""
-    return {True: "yes", False: "no", None: "nothing to compare"}[exhibit.agrees]
+def list_sources(rows: Sequence[PublishedValue]) -> list[str]:
+    """Return the sources of some values, each once."""
+    return [*dict.fromkeys(row.source for row in rows)]
 
 
 def describe_pairs() -> list[str]:
-    """Describe how good the published and the better pair are."""
+    """Say how good the published and the better pair are."""
     return [
         f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {compute_residual(pair):.3f}"
         for name, pair in (("published", PUBLISHED), ("better", find_pair_at_peak()))
@@ -209,9 +242,14 @@ def describe_pairs() -> list[str]:
 
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
-    """Return the page: every figure with the paper's statement and the computed result, then the table."""
-    published = build_scrolling_table(
-        "Published and here", HEAD, [list_cells(row) for row in answer.rows]
+    """Write the page: every figure with what the paper shows, what is found here, and its values."""
+    overview = [
+        [name_place(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
+    ]
+    pairs = make_element("ul", *(make_element("li", text) for text in answer.pairs))
+    misprints = make_element(
+        "ul", *(make_element("li", text) for text in answer.misprints)
     )
     return build_document(
         "Analysis of switched-rigid floating oscillator, reproduced",
@@ -219,23 +257,26 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
-        *(_write_exhibit(exhibit) for exhibit in answer.exhibits),
-        build_section("Published and here", published),
-        make_element("ul", *(make_element("li", text) for text in describe_pairs())),
         build_section(
-            "Misprints in the paper",
-            make_element(
-                "ul", *(make_element("li", misprint) for misprint in MISPRINTS)
-            ),
+            "Overview",
+            build_scrolling_table("Figures of the paper", _OVERVIEW, overview),
         ),
+        *(_show_exhibit(exhibit, answer) for exhibit in answer.exhibits),
+        build_section("Published and better pair", pairs) if answer.pairs else "",
+        build_section("Misprints in the paper", misprints) if answer.misprints else "",
         page.build_command(command),
         signed=page.CHECKED,
     )
 
 
-def _write_exhibit(exhibit: Exhibit) -> Markup:
+_CLASSES: Final = {YES: "good", IN_PART: "care", NO: "bad", NOTHING: "soft"}
+
+
+def _show_exhibit(exhibit: Exhibit, answer: Reproduction) -> Markup:
+    """Show a figure with the verdict on it and the values that belong to it."""
     drawing = Markup(render_svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
-    class_ = {True: "good", False: "bad", None: "soft"}[exhibit.agrees]
+    rows = [list_cells(row) for row in answer.list_values(exhibit)]
+    verdict = make_element("span", exhibit.verdict, class_=_CLASSES[exhibit.verdict])
     return build_section(
         write_heading(exhibit),
         make_element(
@@ -243,7 +284,8 @@ def _write_exhibit(exhibit: Exhibit) -> Markup:
         ),
         make_element("p", make_element("b", "Paper: "), exhibit.paper),
         make_element("p", make_element("b", "Here: "), exhibit.found),
-        make_element(
-            "p", "Agrees: ", make_element("span", write_verdict(exhibit), class_=class_)
-        ),
+        make_element("p", "Agrees: ", verdict),
+        build_scrolling_table(f"Values of {name_place(exhibit)}", HEAD, rows)
+        if rows
+        else "",
     )

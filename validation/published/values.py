@@ -37,6 +37,8 @@ MISPRINTS: Final = (
 
 _EXACT = "matrix exponential of the first-order system, 40 digits"
 _SOLVER = "OpenRadioss, same motion"
+# Section and figure of the paper to which a value belongs.
+_FREE, _RIGID, _LEVEL, _AFTER = (2, "4"), (3, "6a-d"), (4, "7a"), (4, "7b")
 # Relative agreement of what rests on closed forms on both sides, to the digits that are quoted.
 MOST_DIFFERENCE: Final = 1e-9
 # What a solver gives differs from the closed form by its one-step lag and the mass of its spring [-].
@@ -69,7 +71,8 @@ class PublishedValue:
     """Number of the paper, or an independent reference value, beside the computed one.
 
     ``published`` is the number that the paper states, None where it states none; ``reference`` one that was computed
-    in another way, see ``source``; ``tolerance`` is how far the number here may be off [unit].
+    in another way, see ``source``; ``tolerance`` is how far the number here may be off [unit]; ``place`` is the
+    section and the figure of the paper.
     """
 
     what: str
@@ -79,6 +82,17 @@ class PublishedValue:
     here: float
     tolerance: float
     source: str
+    place: tuple[int, str]
+
+    @property
+    def section(self) -> int:
+        """Section of the paper."""
+        return self.place[0]
+
+    @property
+    def figure(self) -> str:
+        """Number of the figure in the paper."""
+        return self.place[1]
 
     @property
     def expected(self) -> float:
@@ -99,16 +113,11 @@ class PublishedValue:
 
 
 def _make_exact(
-    quantity: str, unit: str, reference: float, our_value: float
+    quantity: str, unit: str, reference: float, our_value: float, place: tuple[int, str]
 ) -> PublishedValue:
+    tolerance = MOST_DIFFERENCE * abs(reference)
     return PublishedValue(
-        quantity,
-        unit,
-        None,
-        reference,
-        our_value,
-        MOST_DIFFERENCE * abs(reference),
-        _EXACT,
+        quantity, unit, None, reference, our_value, tolerance, _EXACT, place
     )
 
 
@@ -141,48 +150,52 @@ def compute_residual(pair: tuple[float, float]) -> float:
 
 def _make_rows() -> Iterator[PublishedValue]:
     td, better = PUBLISHED[1], find_pair_at_peak()
+    yield _make_exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2, _FREE)
+    yield from _make_state_rows(INTEGRATED, _RIGID)
     yield PublishedValue(
         "tr with the energy of td = 64 ms", "ms", 13.0, None, 1e3 * _find_matching(td), 0.5,
-        "the paper, read from its plot to a millisecond",
+        "the paper, read from its plot to a millisecond", _LEVEL,
     )  # fmt: skip
     yield _make_exact(
-        "the same, sign matched", "ms", 12.8852793630525, 1e3 * _find_matching(td)
-    )
-    yield _make_exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2)
-    yield _make_exact("E(64 ms)", "J", 0.606348787620396, float(MODE.energy(td)))
-    yield _make_exact(
-        "kinetic share at 64 ms",
-        "-",
-        0.916699887073,
-        float(measures.kinetic_share(MODE, td)),
+        "the same, sign matched",
+        "ms",
+        12.8852793630525,
+        1e3 * _find_matching(td),
+        _LEVEL,
     )
     yield _make_exact(
-        "energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1]
+        "E(64 ms)", "J", 0.606348787620396, float(MODE.energy(td)), _LEVEL
     )
-    yield _make_exact("tr for that peak", "ms", 13.5866683619825, 1e3 * better[0])
-    for pair, known_values in _STATES.items():
-        for time, z, y, energy in known_values:
-            state = switch_replay(pair).motion(time)
-            name = f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms at {1e3 * time:g} ms"
-            yield _make_exact(f"z of {name}", "m", z, float(state.z))
-            yield _make_exact(f"y of {name}", "m", y, float(state.y))
-            yield _make_exact(
-                f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state))
-            )
-    for name, pair, deviation_found in (
+    share = float(measures.kinetic_share(MODE, td))
+    yield _make_exact("kinetic share at 64 ms", "-", 0.916699887073, share, _AFTER)
+    yield _make_exact(
+        "energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1], _AFTER
+    )
+    yield _make_exact(
+        "tr for that peak", "ms", 13.5866683619825, 1e3 * better[0], _AFTER
+    )
+    yield from _make_state_rows(PUBLISHED, _AFTER)
+    for name, pair, found in (
         ("(13, 64) ms", PUBLISHED, 0.888),
         ("better pair", better, 0.005),
     ):
-        quantity = f"deviation after td, {name}"
         yield PublishedValue(
-            quantity,
-            "-",
-            None,
-            deviation_found,
-            compute_deviation(pair),
-            _SOLVER_DIFFERENCE,
-            _SOLVER,
-        )
+            f"deviation after td, {name}", "-", None, found, compute_deviation(pair),
+            _SOLVER_DIFFERENCE, _SOLVER, _AFTER,
+        )  # fmt: skip
+
+
+def _make_state_rows(
+    pair: tuple[float, float], place: tuple[int, str]
+) -> Iterator[PublishedValue]:
+    """Displacements and energy of a switched run."""
+    for time, z, y, energy in _STATES[pair]:
+        state = switch_replay(pair).motion(time)
+        name = f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms at {1e3 * time:g} ms"
+        energy_here = float(OSCILLATOR.internal_energy(state))
+        yield _make_exact(f"z of {name}", "m", z, float(state.z), place)
+        yield _make_exact(f"y of {name}", "m", y, float(state.y), place)
+        yield _make_exact(f"E of {name}", "J", energy, energy_here, place)
 
 
 def _find_matching(td: float) -> float:

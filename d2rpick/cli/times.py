@@ -1,0 +1,123 @@
+"""Options that are times of a run: numbers in its unit, or texts with a unit until the unit of the run is known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.base.errors import ArgumentError, list_names
+from d2rpick.cli.values import NumberType
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.api.request import Request
+
+# Commands whose runs are computed here, in SI units.
+_IN_SECONDS = ("rollover",)
+# Arguments that name the files of one run, and of many.
+_ONE_RUN = "history"
+_MANY_RUNS = "run"
+# Options that choose the column of time and the format.
+_COLUMNS = ("input_format", "time", "energy", "channel")
+
+
+class TimeType(NumberType):
+    """A time of the run: a number, or a text like 64ms, which `convert_typed_times` replaces by a number."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Read a number; leave a time with a unit as it was typed."""
+        if isinstance(value, str) and value.strip()[-1:].isalpha():
+            from d2rpick.api.times import is_time_with_unit
+
+            if is_time_with_unit(value):
+                return value.strip()
+        return super().convert(value, param, ctx)
+
+
+def convert_typed_times(ctx: click.Context) -> None:
+    """Replace the times of a command that were typed with a unit by numbers in the unit of the run.
+
+    Raises
+    ------
+    click.BadParameter
+        If the unit of the run is not known, or a number is outside its limits.
+    """
+    typed = {
+        option.name: option
+        for option in ctx.command.params
+        if isinstance(option.type, TimeType)
+        and option.name
+        and _has_text(ctx.params.get(option.name))
+    }
+    if not typed:
+        return
+    unit, source = _find_unit(ctx)
+    for name, option in typed.items():
+        ctx.params[name] = _convert(ctx.params[name], option, ctx, unit, source)
+
+
+def _has_text(value: Any) -> bool:
+    """Return True if a value, or one in a tuple of values, is a text."""
+    if isinstance(value, tuple):
+        return any(_has_text(single) for single in value)
+    return isinstance(value, str)
+
+
+def _convert(
+    value: Any, option: click.Parameter, ctx: click.Context, unit: str, source: str
+) -> Any:
+    """Return a time, or a tuple of times, as numbers."""
+    from d2rpick.api.times import convert_typed_time
+
+    if isinstance(value, tuple):
+        return tuple(_convert(single, option, ctx, unit, source) for single in value)
+    if not isinstance(value, str):
+        return value
+    try:
+        number = convert_typed_time(value, unit, source)
+    except ArgumentError as error:
+        raise click.BadParameter(str(error), ctx, option) from None
+    return option.type.convert(number, option, ctx)
+
+
+def _find_unit(ctx: click.Context) -> tuple[str, str]:
+    """Return the unit of the run of a command, empty if it is not known, and what should name it."""
+    if ctx.command.name in _IN_SECONDS:
+        return "s", ""
+    runs = _list_runs(ctx)
+    if not runs:
+        return "", "the command line, which names no run"
+    if any("-" in names for names in runs):
+        return "", "standard input"
+    from d2rpick.api.times import find_time_unit
+
+    request = _make_reading_request(ctx)
+    selection = request.selection(parts=False)
+    units = {find_time_unit(names, selection, request.input_format) for names in runs}
+    source = list_names([name for names in runs for name in names])
+    return (units.pop() if len(units) == 1 else ""), source
+
+
+def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
+    """Return the names of the files of each run that a command line names."""
+    if history := ctx.params.get(_ONE_RUN):
+        return [history]
+    names = ctx.params.get(_MANY_RUNS)
+    if not isinstance(names, tuple) or ctx.params.get("listed"):
+        return []
+    from d2rpick.api.studies import find_runs
+
+    return [[name] for name in find_runs(names)]
+
+
+def _make_reading_request(ctx: click.Context) -> Request:
+    """Return how the command line says to read files."""
+    from d2rpick.api.request import Request
+
+    return Request(
+        **{name: ctx.params[name] for name in _COLUMNS if name in ctx.params}
+    )
