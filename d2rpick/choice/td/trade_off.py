@@ -65,7 +65,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The pair by which offers are compared; None if no tr is recommended."""
+        """The recommended pair of this td, by which different td are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
