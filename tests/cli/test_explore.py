@@ -194,3 +194,18 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
     (offer_at_td,) = (offer for offer in document["offers"] if offer["td"] == 0.5)
     assert offer_at_td["reason"] in " ".join(run_result.stdout.split())
     assert document["recommended"] is None
+
+
+def test_what_would_be_better_is_the_pair_that_suggest_names() -> None:
+    window = ("--td-window", "0.06", "0.066", ENERGY)
+    answers = [
+        run(command, *window, "-q").stdout.splitlines()
+        for command in ("suggest", "explore")
+    ]
+    cures = [
+        [line.removeprefix("to improve").strip() for line in lines if "improve" in line]
+        for lines in answers
+    ]
+    assert (
+        cures == [["use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%"]] * 2
+    )
