@@ -21,7 +21,12 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.pair.aftermath import Kept, bound_mean_energy
 from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_times
-from d2rpick.choice.pair.decision import Decision, decide
+from d2rpick.choice.pair.decision import (
+    CHECK_SWITCHED_RUN,
+    CHOOSE_ANOTHER,
+    Decision,
+    decide,
+)
 from d2rpick.choice.pair.grades import POOR
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
@@ -96,13 +101,38 @@ class PairVerdict(AnswerAtTd):
         unknown = () if self.reasons else ("nothing shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         return decide(
-            self.situation, self.candidate, objections=objections, better=better
+            self.situation,
+            self.candidate,
+            objections=objections,
+            better=better,
+            cure_of_objections=CHECK_SWITCHED_RUN
+            if self._is_refuted
+            else CHOOSE_ANOTHER,
         )
 
     @cached_property
     def better(self) -> Pair | None:
         """A pair that is not poor: another tr for this td, or a pair at the nearest better td; None without one."""
+        return None if self._is_refuted else self._good_pair
+
+    @cached_property
+    def _good_pair(self) -> Pair | None:
+        """The pair that the reference run recommends, whatever a finished switched run says."""
         return find_good_pair(self.situation)
+
+    @property
+    def _is_refuted(self) -> bool:
+        """True if the finished switched run objects to the pair that the reference run recommends.
+
+        Any tr within the timing tolerance is that pair.
+        """
+        good = self._good_pair
+        if self.switched is None or not self.switched.objections or good is None:
+            return False
+        tr = self.candidate.tr
+        is_same_tr = abs(good.tr - tr) <= (self.candidate.timing_tolerance or 0.0)
+        is_same_tr |= round_as_read(good.tr) == round_as_read(tr)
+        return is_same_tr and good.td == self.situation.td
 
     @property
     def quality(self) -> Quality | None:

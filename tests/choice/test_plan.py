@@ -28,6 +28,8 @@ from tests.reading import read, read_solved
 # The level alone is poor here: no oscillator describes these runs, and none is searched.
 PLAIN = Settings(replay=False, min_quality="poor")
 BOX = Selection(parts=("box",))
+# A car grazes its second push; the margin for a grazing contact leaves no time between the pushes, this one does.
+SHORT_MARGIN = replace(PLAIN, margin=0.0015)
 
 
 @pytest.fixture(scope="module")
@@ -403,14 +405,30 @@ def car() -> Reference:
 def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
     car: Reference,
 ) -> None:
-    """The car is rigid for 17 ms between two pushes, and for 108 ms after them; `parts` compares sets for 108 ms."""
-    planned = plan_run(car, PLAIN)
+    """The car is rigid for 13 ms between two pushes, and for 108 ms after them; `parts` compares sets for 108 ms."""
+    planned = plan_run(car, SHORT_MARGIN)
     assert list_statuses(planned) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (
         planned.flights[0].reason or ""
     )
-    longest = require(suggest_in_run(car, None, PLAIN).recommended)
+    longest = require(suggest_in_run(car, None, SHORT_MARGIN).recommended)
     assert planned.windows == ((longest.tr, longest.td),)
+
+
+@pytest.mark.slow
+def test_a_grazing_push_may_come_before_any_window_between_two_pushes(
+    car: Reference,
+) -> None:
+    """The second push takes little momentum at first, so that a car out of place may meet it at any time before."""
+    planned = plan_run(car, PLAIN)
+    assert list_statuses(planned) == ["left-out", "supported"]
+    between, after = planned.flights
+    assert between.margin.source == "grazing"
+    assert between.margin.time > between.end - between.start
+    assert "too short: rigid for 0, with the margin" in (between.reason or "")
+    longest = require(suggest_in_run(car, None, PLAIN).recommended)
+    assert after.window == (longest.tr, longest.td)
+    assert after.rigid_time == pytest.approx(0.108, abs=5e-4)
 
 
 @pytest.mark.slow
@@ -442,7 +460,7 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(
     car: Reference,
 ) -> None:
-    planned = plan_run(car, PLAIN, min_rigid=0.013)
+    planned = plan_run(car, SHORT_MARGIN, min_rigid=0.013)
     assert list_statuses(planned) == ["supported", "re-plan"]
-    assert planned.flights[0].rigid_time == pytest.approx(0.0131, abs=1e-4)
+    assert planned.flights[0].rigid_time == pytest.approx(0.0132, abs=1e-4)
     assert [caution.code for caution in planned.cautions][-1] == "longer-window-later"

@@ -220,7 +220,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         "planar box", (0.2, 0.37), {"max_residual": 0.5},
         FrozenAnswer(
             basis="modal", recommended=None, tr_half_width=None,
-            better_pair=RoundedPair(tr=0.0983731, td=0.197, residual=0.497),
+            better_pair=RoundedPair(tr=0.0983731, td=0.197, residual=0.481),
             candidates=6, admissible=6, next_tr=(0.123891, 0.222688, 0.278399),
             windows=(),
         ),
@@ -318,8 +318,8 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
     (
         "planar box, glstat", 0.37, {},
         FrozenAnswer(
-            basis="modal", recommended=RoundedPair(tr=0.123654, td=0.37, residual=0.623), tr_half_width=0.00043,
-            better_pair=RoundedPair(tr=0.123654, td=0.37, residual=0.623),
+            basis="modal", recommended=RoundedPair(tr=0.123654, td=0.37, residual=0.612), tr_half_width=0.00043,
+            better_pair=RoundedPair(tr=0.123654, td=0.37, residual=0.612),
             candidates=6, admissible=6, next_tr=(0.170694, 0.222715, 0.278342),
             windows=(),
         ),

@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.pair.situation import Situation
 
+# Cures of a pair that is not admissible: one for any pair, and one for a recommended pair whose finished switched run
+# contradicts the recommendation.
+CHOOSE_ANOTHER: Final = "choose another pair, as d2rpick suggest names it"
+CHECK_SWITCHED_RUN: Final = (
+    "check that the switched run was switched at these times and differs from the reference run in nothing else; "
+    "if so, choose another td"
+)
 # A worst case within this difference of the expected residual is shown as the same [-].
 _ALIKE: Final = 5e-3
 
@@ -46,6 +53,8 @@ class Decision(NamedTuple):
         Largest residual that the record allows [-].
     better : Pair or None
         A better pair, if one was searched and found.
+    cure_of_objections : str
+        What to do about the objections without a better pair.
     """
 
     grade: str
@@ -56,6 +65,7 @@ class Decision(NamedTuple):
     residual: float | None
     worst_residual: float
     better: Pair | None = None
+    cure_of_objections: str = CHOOSE_ANOTHER
 
     @property
     def verdict(self) -> str:
@@ -112,7 +122,7 @@ class Decision(NamedTuple):
             return ""
         cures = dict.fromkeys(cause.cure for cause in self.quality.causes)
         if self.objections or not cures:
-            cures = {"choose another pair, as d2rpick suggest names it": None}
+            cures = {self.cure_of_objections: None}
         if self.better is None:
             return "; ".join(cures)
         return f"use {_describe_pair(self.better)}"
@@ -124,8 +134,12 @@ def decide(
     *,
     objections: Sequence[str] = (),
     better: Pair | None = None,
+    cure_of_objections: str = CHOOSE_ANOTHER,
 ) -> Decision:
-    """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair."""
+    """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair.
+
+    Without a better pair, ``cure_of_objections`` says what to do about them.
+    """
     quality = grade_pair(situation, candidate)
     return Decision(
         grade=POOR if objections else quality.grade,
@@ -136,6 +150,7 @@ def decide(
         residual=candidate.residual,
         worst_residual=_find_worst_residual(situation, candidate),
         better=better,
+        cure_of_objections=cure_of_objections,
     )
 
 

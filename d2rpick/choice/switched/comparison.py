@@ -347,11 +347,11 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     time = switched.time
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
-    still = find_stretches(
-        np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST
-    )
-    spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
     rounding = round_off(reference)
+    # in a fall the energy of rigid parts and of those at rest is round-off, which never stays the same
+    unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
+    still = find_stretches(np.append(False, unchanged), FEWEST)
+    spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
     moving = []
     for first, last in spans:
         largest = max(rounding, 2 * limit[first : last + 1].max())
