@@ -26,7 +26,7 @@ def find_deck_in_folder(request: Request) -> Request:
         return request
     from d2rpick.deck import (
         find_decks_of_run,
-    )  # imported here since most runs are files
+    )  # imported here: most runs are given as files and do not need it
 
     decks = find_decks_of_run(folder)
     if len(decks) > 1:

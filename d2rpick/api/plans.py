@@ -48,7 +48,7 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         return give_answer(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per td and a column per single value of ``offers`` in the JSON; unknown values are NaN.
+        """Return one row per td and one column per scalar value of ``offers`` in the JSON; unknown values are NaN.
 
         Examples
         --------

@@ -232,7 +232,7 @@ def read(
 
 
 def find_folder(names: Sequence[str]) -> str | None:
-    """Return the folder that names a run; None if files name it."""
+    """Return the folder if the run was given as a folder; None if it was given as files."""
     import os
 
     return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names

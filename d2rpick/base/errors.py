@@ -72,7 +72,7 @@ def give_if_written(read: Callable[[], _Read]) -> _Read | None:
 
 
 def format_in_one_line(error: BaseException) -> str:
-    """Return the message of any error in one line; an unforeseen error is to be reported.
+    """Return any error as a one-line message; an unforeseen error asks the user to report it.
 
     Examples
     --------

@@ -47,7 +47,7 @@ class Searched(Protocol):
     def __len__(self) -> int: ...
 
     def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
-        """Return the address of the last ``wanted`` between two addresses, -1 if there is none."""
+        """Return the offset of the last occurrence of ``wanted`` between two offsets, -1 if there is none."""
 
 
 def bound(name: str) -> float:

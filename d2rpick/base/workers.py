@@ -43,7 +43,7 @@ _STARTS = 3
 _DYING = 0.1  # [s] between attempts, in which the system ends a killed process
 # Errors of starting a process if the process from which it is forked was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
-# Time-out for the answer of a scheduler [s].
+# Timeout for a scheduler's reply [s].
 _PATIENCE = 10
 
 
@@ -150,7 +150,7 @@ class Cores(Farm):
     def _begin_pool(
         self, processes: int, function: Callable[[Item], Result], item: Item
     ) -> tuple[ProcessPoolExecutor, Future[Result]]:
-        """Start a pool with one call; raise D2RPickError if none of its processes can be started."""
+        """Start a pool and submit one call to it; raise D2RPickError if none of its processes can be started."""
         for _ in range(_STARTS):
             pool = self._new(processes)
             try:

@@ -169,7 +169,7 @@ def verify_in_history(
 
 
 def verify_at(situation: Situation, tr: float) -> PairVerdict:
-    """Judge one pair in a known situation.
+    """Judge one pair (tr, td), given the situation at td.
 
     Raises
     ------
@@ -293,7 +293,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def decision(self) -> Decision | None:
-        """Verdict on the recommended pair, with reason and cure; None without a pair."""
+        """Verdict on the recommended pair, with its reason and cure; None if there is no pair."""
         best = self.chosen
         if best is None:
             return None
@@ -453,7 +453,7 @@ def _examine_anew(situation: Situation, td: float) -> Situation:
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
-    """Return True if ``verify`` admits a pair as rounded to the six printed digits."""
+    """Return True if ``verify`` accepts a pair once it is rounded to the six printed digits."""
     # rounding moved a time beyond the record, or both onto each other
     try:
         return verify_at(

@@ -152,7 +152,7 @@ def print_judged_card(
 
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Return the windows of switches by force as they are judged: between states."""
+    """Return the windows of switches by force, narrowed to output states, as they are judged."""
     from d2rpick.flight.contact_times import narrow_to_states  # as above
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)

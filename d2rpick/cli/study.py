@@ -163,7 +163,7 @@ def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
 
 def _read_list(name: str) -> Iterator[str]:
-    """Yield the names in a list, one a line; blank lines and comments are skipped."""
+    """Yield the names in a list file, one per line; blank lines and comments are skipped."""
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:

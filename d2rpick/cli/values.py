@@ -411,7 +411,7 @@ def _get_source(ctx: click.Context, name: str | None) -> ParameterSource | None:
 
 
 def list_words(ctx: click.Context) -> Sequence[str]:
-    """Return the options from the settings as they are typed."""
+    """Return the settings as command-line options, spelled as a user types them."""
     of_settings = (
         parameter
         for parameter in ctx.command.params

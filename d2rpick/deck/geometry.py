@@ -254,7 +254,7 @@ class PartPosition(NamedTuple):
 
 
 class _PartShare(NamedTuple):
-    """Elements of a part together: their size (), its first moments (3,) and its second moments (3, 3)."""
+    """Totals over the elements of a part: size (), first moments (3,) and second moments (3, 3)."""
 
     size: float
     first: Reals

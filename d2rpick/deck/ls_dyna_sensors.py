@@ -178,7 +178,7 @@ def _find_spans_of_sensor(
     if card.transform.scaled:
         return f"{name}), which is in an include in other units"
     entity = card.integer(row, _FORCE_ID).value + card.transform.rest
-    if value < 0 or (value == 0 and not above):  # no magnitude is below it
+    if value < 0 or (value == 0 and not above):  # a magnitude never falls below 0
         return _ALWAYS if above else ()
     strong = forces(kind, entity, value) if forces else None
     if strong is None:

@@ -455,7 +455,7 @@ class Inventory:
         return counts_by_part
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the number of elements by part and kind whose nodes all lie in these parts."""
+        """Count, by part and kind, the elements whose nodes all belong to these parts."""
         inside = np.append(self._mask(parts), True)  # the last entry stands for NO_NODE
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:

@@ -1,4 +1,4 @@
-"""Read a Radioss run: when each part is rigid over its legs or by time sensors, and what stays rigid.
+"""Read a Radioss run: when each part is rigid, by its legs or by time sensors, and which parts stay rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
 in later runs unless an engine file changes it.

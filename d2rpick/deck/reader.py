@@ -499,7 +499,7 @@ def has_mesh(block: Block) -> bool:
 
 
 def _has_whole_end(block: Block) -> bool:
-    """Return True if a last line without line end lacks nothing: it is a comment, or a keyword without values."""
+    """Return True if a last line without a line end is complete: a comment, or a keyword that takes no values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
         return True

@@ -158,7 +158,7 @@ def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Return the next occurrence of a letter below the line of ``at``; -1 if there is none."""
+    """Return the next position of a letter after the line that contains ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 

@@ -155,7 +155,7 @@ class Witness(NamedTuple):
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td`` that a function finds from shared marks, or from td itself."""
+    """Return the flight around ``td``, searched from marks that many td share, else from td itself."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -165,7 +165,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time as a td in its middle would get it, so that listed flights equal those in use."""
+    """Return the flight around a time, found as for a td in its middle, so that listed flights match those used."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)

@@ -186,7 +186,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) along an axis that show across a load of one direction, which bends only along it."""
+        """Yield weights (3,) along an axis, seen across a load of one direction: across it the momentum is straight."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -255,7 +255,9 @@ class Laws:
             _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
         ):
             return None if self._slowed(window, vector) else force / mass
-        if self.velocity:  # velocities change by an acceleration
+        if (
+            self.velocity
+        ):  # the change of a velocity is an acceleration, so no mass is missing
             return None
         gravity = None
         if self.balance is not None:

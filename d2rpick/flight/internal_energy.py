@@ -40,7 +40,7 @@ _KNOWN, _TURNED = 3 / 4, 4
 # Below this share of the largest energy, an energy is round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# Widening of the band of a flight's last quarter, by this share of its width, that contains all energies before it.
+# The energy band of a flight's last quarter, widened by this share of its width, contains all earlier energies.
 _RESERVE: Final = 0.5
 # The means of the last two quarters differ by less than this share of the band. A steady drift differs by 1, a
 # vibration that shows 3/4 of a period in each quarter by 0.3.

@@ -287,7 +287,7 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 def _find_attached_parts(
     momenta: Momenta, chosen: Sequence[int], td: float
 ) -> tuple[int, ...]:
-    """Return the parts that must be added so that the bending of all momenta before td cancels.
+    """Return the parts to add so that, before td, the deviations of the momenta from straight lines cancel.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
     the bent momenta, and its projector groups the parts of a body.

@@ -115,7 +115,7 @@ def _fit_steady_rotation(
 
 
 def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
-    """Return the displacements (n, parts, 3) less their circles at a rate, in the frame that turns, without their mean.
+    """Return the displacements (n, parts, 3) in the turning frame, without circular motion at a rate and mean.
 
     The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """

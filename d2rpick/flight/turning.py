@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _MOST_BENT: Final = 0.05
 # Most states of the pass; between them places are straight lines, as vibration hardly turns a body.
 _STATES: Final = 2000
-# Connected parts make the frame if they have this share of the body's mass, else all parts that do not move.
+# The frame consists of connected parts with this share of the body's mass, or else of all parts that do not move.
 _MOST: Final = 0.5
 # Parts lie on a line if a moment of inertia is below this share of the others.
 _ALONG_LINE: Final = 1e-9
@@ -219,7 +219,7 @@ def _solve_turning(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of psi: return the matrix that carries it, the right side, and the effect of I(tr)."""
+    """Integrate the equation of psi: return its propagation matrix, its particular part, and the effect of I(tr)."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = (
         np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))

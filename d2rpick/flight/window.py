@@ -223,7 +223,7 @@ def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
 
 
 def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
-    """Return True if a window shrinks on one side only: a load fades there, a contact or the record ends the other."""
+    """Return True if a window shrinks only where a load fades; a contact or the record ends its other side."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 
@@ -253,7 +253,7 @@ def list_moments(time: Samples) -> Iterator[float]:
 
 
 def list_marks(time: Samples, td: float) -> Iterator[float]:
-    """Yield the times from which the flight around ``td`` is searched, so that many td share the result.
+    """Yield the times at which the search for the flight around ``td`` starts; many td share them.
 
     First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
     """

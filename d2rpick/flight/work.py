@@ -233,7 +233,7 @@ def list_damped_energies(
 def _compute_work_of_gravity(
     balance: Balance, flight: FreeFlight, momenta: Momenta
 ) -> Samples:
-    """Return the work of gravity since the first state (n,), from the momentum of the model that it changes [energy].
+    """Return the work of gravity since the first state (n,), from the momentum that it gives the model [energy].
 
     For a velocity, the mass is the largest one that the written kinetic energy allows.
     """

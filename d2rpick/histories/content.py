@@ -102,7 +102,7 @@ class OnDisk(Content):
         Its state at rest.
     """
 
-    # Numbers of bytes that are read together.
+    # Sizes of the chunks that are read at once [bytes].
     block = 1 << 19  # of many bytes; a power of 2, which stays in the cache
     # between two fields read together: a system call costs more than these
     gap = 1 << 13

@@ -324,7 +324,7 @@ class BoxMotion:
         self.body = None
 
     def advance(self) -> Plane:
-        """Advance the velocities to half a step after the places; return their mean over the step, (n,) [m/s]."""
+        """Advance the velocities to half a step past the positions; return their mean over the step, (n,) [m/s]."""
         s = self.structure
         old_velocities = self.velocities
         push = self.contact.push(self.time, self.places, old_velocities)

@@ -156,9 +156,11 @@
   Object.entries({ role: "slider", tabindex: "0", "aria-label": "td, time to switch back to deformable", "aria-orientation": "horizontal" })
     .forEach(([name, value]) => handle.setAttribute(name, value));
 
-  // What the cards with a verdict at the top of the page have of their pairs, which is not repeated here.
-  const cards = [...document.querySelectorAll(".card:has(.badge) .exact")].map((one) => one.textContent);
-  const onCards = ["verdict", "why", "cure", "rigid"];
+  // The cards with a verdict at the top of the page: their pairs, and the names of what they say, which is not repeated here.
+  const cards = [...document.querySelectorAll(".card:has(.badge):has(.exact)")].map((card) => ({
+    pair: card.querySelector(".exact").textContent,
+    names: ["verdict", ...[...card.querySelectorAll("dt")].map((name) => name.textContent)],
+  }));
 
   const spoken = (one) => `td ${one.text.td}, tr ${one.text.tr}, ${one.text.said}`;
 
@@ -171,11 +173,12 @@
     const first = flight.rows[0], last = flight.rows[flight.rows.length - 1];
     Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: spoken(row) })
       .forEach(([name, value]) => handle.setAttribute(`aria-${name}`, value));
-    const isAbove = cards.some((card) => card.includes(`tr = ${row.text.exact_tr}, td = ${row.text.exact_td}`));
+    const above = cards.find((card) => card.pair.includes(`tr = ${row.text.exact_tr}, td = ${row.text.exact_td}`));
     section.querySelectorAll("[data-value]").forEach((place) => {
       const text = place.dataset.value === "command" ? data.command.join(row.text.exact_td) : row.text[place.dataset.value] ?? "";
       place.textContent = text;
-      place.closest("dl > div")?.classList.toggle("empty", !text || (isAbove && onCards.includes(place.dataset.value)));
+      const line = place.closest("dl > div");
+      line?.classList.toggle("empty", !text || Boolean(above?.names.includes(line.firstChild.textContent)));
     });
     if (charts.motion) charts.motion.setData(motion(), false);
     follow();

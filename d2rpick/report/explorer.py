@@ -59,7 +59,7 @@ _VALUES: Final[Mapping[str, str]] = {
     "after": "mean energy after td",
     "level_error": "level error",
     "kinetic": "kinetic fraction",
-    "rigid": "rigid",
+    "rigid": "rigid for",
     "run_time": "saves",
     "level": "energy at td",
     "tolerance": "timing tolerance",
@@ -311,7 +311,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
     """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
     best = offer.best
-    decision = offer.decision
+    decision = offer.decision_with_cure
     return {
         "td": format_short(offer.td),
         "tr": format_short(best.tr) if best else "none",
@@ -343,7 +343,7 @@ def _list_texts_of_best(
         "level_error": format_if_known(
             best.level_error if best.residual is None else None, ".3f"
         ),
-        "rigid": f"for {format_short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
+        "rigid": f"{format_short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the simulated time",
         "run_time": None
         if best.run_time_share is None
         else format_saved_share(best.run_time_share),

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.sets_of_parts import Parts
     from d2rpick.choice.switched.switched_run import Times
-    from d2rpick.choice.td.plan import RunPlan
+    from d2rpick.choice.td.plan import PlannedFlight, RunPlan
     from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.histories.history import History, Samples
 
@@ -67,9 +67,18 @@ _BEYOND_FLIGHTS: Final = 0.05
 # Shortest window, as a share of the simulated time, whose label has room for its times.
 _ROOM_FOR_TIMES: Final = 0.2
 
-_COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
+# Colours of windows by their verdict, as of the badges on pages; windows that wait or are done have their own.
+_COLOURS: Final = {
+    "use": GOOD,
+    "use with care": "#e69f00",
+    "do not use": SWITCHED,
+    "re-plan": "#cc79a7",
+    "done": "#999999",
+}
 _HATCHES: Final = {
-    "supported": None,
+    "use": None,
+    "use with care": "..",
+    "do not use": "xx",
     "re-plan": "//",
     "done": None,
 }  # distinguishable without colour, too
@@ -77,6 +86,8 @@ _HATCHES: Final = {
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.
 _STRIP: Final = 0.07
+# Height of the energy axis over the largest energy shown.
+_HEADROOM: Final = 1.1
 _MOST_PARTS: Final = 6
 # height of the figure in a file, and of one of its axes on a page [inch]
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
@@ -278,10 +289,16 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     for row in plan.flights:
         mark_span(axes, (row.start, row.end), "flight")
         if row.window:
+            kind = _name_window_kind(row)
             axes.axvspan(
-                *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
-                edgecolor="white", linewidth=0, label=f"rigid, {row.status}",
-            )  # fmt: skip
+                *row.window,
+                ymax=_STRIP,
+                facecolor=_COLOURS[kind],
+                hatch=_HATCHES[kind],
+                edgecolor="white",
+                linewidth=0,
+                label=f"rigid: {kind}",
+            )
             figures.note(
                 axes,
                 _label_window(row.number, row.window, span),
@@ -289,13 +306,22 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
                 (0, 2),
                 ha="center",
             )
-    low, high = axes.get_ylim()
+    _show_flights(axes, plan)
+    shown = history.between(*axes.get_xlim())[1]
+    low = min(0.0, float(shown.min(initial=0.0)))
+    high = _HEADROOM * float(shown.max(initial=0.0)) or 1.0
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
     # below the energies only the windows are drawn
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
-    _show_flights(axes, plan)
     _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=page)
     return figure
+
+
+def _name_window_kind(row: PlannedFlight) -> str:
+    """Return the verdict on a window that this run supports, else what is to be done about it."""
+    if row.status == "supported" and row.decision:
+        return row.decision.verdict
+    return row.status
 
 
 def _show_flights(axes: Axes, plan: RunPlan) -> None:

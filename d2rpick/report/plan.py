@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.pair.grades import USE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import format_in_full, format_saved_share
 from d2rpick.report.fields import (
@@ -22,7 +22,7 @@ from d2rpick.report.situation import describe_input
 from d2rpick.report.suggestion import describe_given_up_time
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
@@ -219,17 +219,31 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Return how many windows can be used now, and which of them only with care."""
+    """Return how many windows can be used now, which of them only with care, and which planned ones not at all."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
         which = f"flight {number}: " if len(plan.flights) > 1 else ""
         return f"{which}{decision.verdict}"
-    careful = [str(number) for number, decision in decisions if decision.verdict != USE]
-    flights = f"flight{'s' * (len(careful) > 1)} {', '.join(careful)}"
-    which = f" ({flights} with care)" if careful else ""
+    careful, poor = (
+        [number for number, decision in decisions if decision.verdict == verdict]
+        for verdict in (USE_WITH_CARE, DO_NOT_USE)
+    )
+    limits = []
+    if careful:
+        limits.append(f"{_name_flights(careful)} with care")
+    if poor:
+        limits.append(f"{DO_NOT_USE} {_name_flights(poor)}")
+    if len(poor) == len(decisions):
+        return limits[0]
+    which = f" ({'; '.join(limits)})" if limits else ""
     open_ones = sum(row.status != "done" for row in plan.flights)
-    return f"use {len(decisions)} of {open_ones} windows now{which}"
+    return f"use {len(decisions) - len(poor)} of {open_ones} windows now{which}"
+
+
+def _name_flights(numbers: Sequence[int]) -> str:
+    plural = "s" if len(numbers) > 1 else ""
+    return f"flight{plural} {', '.join(map(str, numbers))}"
 
 
 def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
@@ -239,7 +253,7 @@ def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = "print the cards with -f card, and run the deck with them from the start"
     if plan.done:
-        cards = "print the cards with -f card; they hold the windows that are done too"
+        cards += "; they hold the windows that are done too"
     again = "; then plan the others from that run (--done)" if waiting else ""
     return [("next", f"{cards}{again}")]
 

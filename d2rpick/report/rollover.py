@@ -136,7 +136,7 @@ def _get_recommended_tr(answer: PairSuggestion) -> float | None:
 
 
 def _list_short_values(outcome: Outcome) -> list[tables.Cell]:
-    """Return the cells of a run with four digits: runs already differ in the second."""
+    """Return a run's table cells with four digits: runs already differ in the second digit."""
     return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 

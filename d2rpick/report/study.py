@@ -259,7 +259,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return each reason once why pairs of runs are not better, and what would improve them."""
+    """Return, without duplicates, why the runs' pairs are not better, and what would improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs

@@ -94,9 +94,10 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
     best = trade_off.recommended
-    if best is None or best.best is None or best.decision is None:
+    decision = best.decision_with_cure if best else None
+    if best is None or best.best is None or decision is None:
         return [("no pair to use", "no td in the window has an acceptable tr")]
-    return list_verdict_lines(best.decision, best.best.tr, best.td)
+    return list_verdict_lines(decision, best.best.tr, best.td)
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:

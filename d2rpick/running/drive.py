@@ -442,7 +442,7 @@ class Observer:
         )
 
     def _get_needed_wait(self, start: float, now: float) -> float | None:
-        """Return the wait for a flight since ``start``; the user's, unless nothing vibrates [time]."""
+        """Return the wait after ``start`` [time]: the user's, but the record's if nothing vibrates; None if unknown."""
         shown_wait = self._motion.wait(start, now)
         at_rest = shown_wait is not None and shown_wait.source == "at-rest"
         if self._given is not None and not at_rest:

@@ -45,7 +45,7 @@ _TAIL_SIZE: Final = 1 << 14
 # error begins, and how many lines it has.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
-# A whole restart has at least this share of the size of the starter's.
+# A complete restart file has at least this share of the size of the one that the starter wrote.
 _WHOLE: Final = 0.98
 # Time that a solver has to stop, and pause between two checks whether it has [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05

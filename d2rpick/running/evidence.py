@@ -113,7 +113,7 @@ class GrowingEvidence:
         self._of_parts.append(witness)
 
     def _add_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Append which parts have changed their momentum up to each of these states; give it, shape (k, parts)."""
+        """Record which parts have changed their momentum by each of these states, and return that, shape (k, parts)."""
         if self._first_momenta is None:
             self._first_momenta = momenta.values[0]
         moved = (momenta.values != self._first_momenta).any(axis=2)

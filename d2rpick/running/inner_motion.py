@@ -38,8 +38,8 @@ _FEWEST_STATES: Final = 4
 _AT_REST: Final = 1e-3
 # A swing that has lasted for so many times the longest half period before it may last for any time.
 _MUCH_LONGER: Final = 2.0
-# A swing without a push that takes more than 1.5 times half of the period of the deck is the rotation of a body.  One
-# that was pushed is cut to 2.5 times that.
+# Limits in half periods according to the deck: a longer free swing is the rotation of a body, and a pushed swing counts
+# as no longer than the second limit.
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
 # A period is known to 10 %: a given wait may be shorter than half of it by so much.
 _EXACT: Final = 0.9

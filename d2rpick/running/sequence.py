@@ -15,7 +15,7 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Kinds of legs: deformable; rigid, and the flight may end in it; rigid again up to the td that is known by now.
+# Kinds of legs: deformable; rigid, in which the flight may end; rigid, computed again up to the td now known.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are the same if they differ by less than so many states: the history of a leg may end one state early.

@@ -200,7 +200,7 @@ def follow(
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
         if watch.reads_what_is_new:
-            pause = min(pause, _LONGEST)  # only the first look costs more
+            pause = min(pause, _LONGEST)  # only the first look reads everything
         remaining = end - time.monotonic()
         if remaining <= 0 or (watch.ended and lasting is None):
             yield watch.state()
@@ -209,7 +209,7 @@ def follow(
 
 
 def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
-    """Give the files of a run that are not empty, and later legs in the same folder."""
+    """Return the non-empty files of a run, including those of later legs in the same folder."""
     try:
         paths = expand(names)
     except FormatError as error:

@@ -1,4 +1,4 @@
-"""Tell for each state since when no force has acted on some parts, or on the whole model, by the states up to it.
+"""Find for each state since when no force has acted on given parts or the model, from the states up to it.
 
 From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
 momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
@@ -162,7 +162,7 @@ class GrowingWitness:
         )
 
     def last_without(self, first: int) -> int:
-        """Return the last state up to which no force shows from ``first`` on."""
+        """Return the last state before a force appears, counting from ``first``."""
         return find_farthest(
             first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
         )
@@ -235,7 +235,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is as high as at ``first`` again [time]; None if that was before ``last``."""
+        """Return when the centre of mass is as high as at ``first`` again [time]; None if before ``last``."""
         begin, end = self._columns["momentum"].rows[[first, last]]
         gained = end - begin
         duration = float(self.time[last] - self.time[first])

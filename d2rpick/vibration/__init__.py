@@ -94,7 +94,7 @@ def _find_modal(
 def _find_swings(
     history: History, within: Span, _: VibratingTogether
 ) -> SignedModel | None:
-    """Count the swings of the energy if they come down to a floor."""
+    """Count the swings of the energy, provided that they return to a common minimum."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(*within))

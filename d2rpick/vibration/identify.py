@@ -276,7 +276,7 @@ class _Record(NamedTuple):
         start = float(time[0])
         end = float(time[-1])
         scale = float(np.ptp(energy))
-        # older versions of numpy report an overflow where they divide numbers this small, and divide rightly
+        # older numpy versions warn of an overflow when dividing numbers this small, though the result is right
         with np.errstate(over="ignore"):
             scaled = energy / scale
         return cls((time - start) / (end - start), scaled, start, end, scale)

@@ -195,7 +195,7 @@ class Prediction(NamedTuple):
     swing: float
 
     def turned(self) -> Prediction:
-        """Return the prediction of the internal energy that corresponds to this one of the kinetic energy."""
+        """Return the prediction of the internal energy that matches this prediction of the kinetic energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
 
@@ -293,7 +293,7 @@ def fit_spectrum(
 
 
 def _average_blocks(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
-    """Return the means of a spectrum over blocks centred at some times [energy]."""
+    """Return the means of a spectrum over blocks centred at the given times [energy]."""
     waves_and_mean = (spectrum.lines, spectrum.mean)
     means = [
         (waves.waves(time) @ (waves.weights * grid.gain(waves.poles))).real

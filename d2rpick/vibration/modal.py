@@ -78,7 +78,7 @@ _FINER: Final = 4
 # share.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# The half-width of R^2, before anything is known to be wrong.
+# Initial half-width of the band of R^2, before it is widened for known errors.
 _LEAST_HALF: Final = 0.006
 _VAGUE_HALF: Final = (
     0.2  # half-width of R^2 of vague modes; well-identified ones have 0.02 to 0.1

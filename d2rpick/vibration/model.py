@@ -112,7 +112,7 @@ class Vibration:
 
     @property
     def signed(self) -> SignedParts | None:
-        """Return the parts whose signs are relied on; None if they are not."""
+        """Return the parts whose signs are relied on, None if no signs are."""
         return self.parts if self.basis == "parts" else None
 
     @property
@@ -154,7 +154,7 @@ class Vibration:
 
     @cached_property
     def least_residual(self) -> float | None:
-        """Return the least residual of all tr that save much, for a vibration of many modes; None for others [-]."""
+        """Return the smallest residual among all tr that save much, for a vibration of many modes, else None [-]."""
         if self.basis != "modal" or self.profile is None or self.compared is None:
             return None
         last = self.td - NEAR_TD * (self.td - self.compared.first)

@@ -149,7 +149,7 @@ class Oscillator:
         centre, velocity = self._centre(start)
 
         def displacement(share: float) -> Values:
-            """Return the displacement of the mass with this share of the deformation."""
+            """Return the displacement of the mass that takes this share of the deformation."""
             swing = share * amplitude * turn_row
             terms = [
                 swing.real,
@@ -215,7 +215,7 @@ class Oscillator:
         return mass / (self.frame_mass + self.mass)
 
     def _centre(self, state: State) -> tuple[Values, Values]:
-        """Return displacement and velocity of the centre of mass; (8) is the velocity."""
+        """Return displacement and velocity of the centre of mass; the velocity is that of eq. (8) of the paper."""
         frame = self._share(self.frame_mass)
         suspended = self._share(self.mass)
         return (

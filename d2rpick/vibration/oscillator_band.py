@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Half-width of the band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
 # Effect of the hidden share if it consists of harmonics of a nonlinear spring: between the peaks, which stay in step,
-# R is off by up to half of this many times the share.
+# R is off by up to half of the product of this factor and the share.
 _HARMONIC_COUNTS: Final = 8.0
 
 

@@ -179,7 +179,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
-        """Return how each of them vibrates; the sign of a deformation as a whole is arbitrary."""
+        """Return the motion of each part that has a sign; the overall sign of a deformation is arbitrary."""
         return tuple(motion for motion in self._all if isinstance(motion, PartMotion))
 
     @property

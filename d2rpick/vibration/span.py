@@ -166,9 +166,9 @@ def most_described(
 def _find_reach_of_fit(
     history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification
 ) -> Span | None:
-    """Give the `span_of` a fit, from the middle of what it was fitted to if the anchor lies in that.
+    """Return the span of a fit, grown from the middle of its window if the anchor lies in that window.
 
-    All times in it have the same but for rounding, and many td ask for it: none of them shall have it of another.
+    Many td share one span; starting from the middle of the window gives all of them the same span.
     """
     key = (fit.mode, fit.rms, fit.structure, bounds)
     middle = (fit.start + fit.end) / 2

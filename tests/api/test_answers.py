@@ -32,6 +32,7 @@ from tests.command import (
     run as run_command,
     run_json,
 )
+from tests.drops import drop, write_run_files
 from tests.energies import require
 from tests.sample_deck import DECK as SAMPLE_DECK
 
@@ -512,12 +513,16 @@ def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(
 
 
 @pytest.mark.slow
-def test_cards_are_those_of_the_command_line() -> None:
+def test_cards_are_those_of_the_command_line(tmp_path: Path) -> None:
     ids: Any = {"merge": 1, "swset": (11, 12), "step_cap": 1e-6}
-    run = d2.read(MATSUM)
-    chosen, plan = (
+    run, at_rest = d2.read(MATSUM), d2.read(write_run_files(drop(), tmp_path))
+    poor = (
         d2.suggest(run, 0.37, parts=1, replay=False),
         d2.plan(run, parts=1, replay=False, min_quality="poor"),
+    )
+    good = (
+        d2.suggest(at_rest, 0.27, parts=1, replay=False),
+        d2.plan(at_rest, parts=1, replay=False),
     )
     options = (
         "--merge",
@@ -529,19 +534,22 @@ def test_cards_are_those_of_the_command_line() -> None:
         "1e-6",
         "-f",
         "card",
-        MATSUM,
     )
-    for library_answer in (chosen, plan):
-        card, (name, *words) = library_answer.card(**ids), library_answer.command
-        assert str(card) == run_command(name, *words[:-1], *options).stdout
-        assert require(card).verified
+    for library_answer in (*poor, *good):
+        card = library_answer.card(**ids)
+        assert str(card) == run_command(*library_answer.command, *options).stdout
+        assert require(card).verified is (library_answer in good)
     times = ["--tr", "0.1", "--td", "0.37", "--part", "box"]
     alone = d2.card([(0.1, 0.37)], run=run, parts="box", margin=0.001)
     assert (
         str(alone)
         == run_command("card", *times, "--margin", "0.001", "--history", MATSUM).stdout
     )
-    assert alone.verdicts[0].verified
+    assert alone.verdicts[0].decision.verdict == "do not use"
+    assert not alone.verdicts[0].verified
+    of_rest = d2.card([(0.01, 0.27)], run=at_rest, parts="box", margin=0.001)
+    assert of_rest.verdicts[0].decision.verdict == "use"
+    assert of_rest.verdicts[0].verified
     bare = (
         "card",
         "--solver",

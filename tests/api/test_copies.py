@@ -174,15 +174,11 @@ def test_none_is_the_default_everywhere() -> None:
         )
         == verified
     )
-    planned = loose.plan(
-        run,
-        min_rigid=None,
-        done=None,
-        before=None,
-        parts=None,
-        after=None,
-        replay=False,
-    )
+    of_plan = dict.fromkeys(("min_rigid", "done", "before", "parts", "after"))
+    planned = loose.plan(run, **of_plan, min_quality=None, replay=False)
+    assert planned == d2.plan(run, replay=False)
+    planned = loose.plan(run, **of_plan, min_quality="poor", replay=False)
+    assert planned.windows
     assert planned == d2.plan(run, replay=False, min_quality="poor")
     explored = loose.explore(
         run, td=None, td_window=(0.069, 0.07), steps=None, replay=False

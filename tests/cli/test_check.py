@@ -610,9 +610,9 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
         f["message"] for f in check_report["findings"] if f["rule"] == "D2R204"
     )
     assert (
-        "nothing in the history shows when the load is over; give that time as `after`"
-        in message
-    )
+        "the history does not show when the load ends; "
+        "give that time with --after (in Python: after)"
+    ) in message
     assert "D2R204" not in list_rules(
         run_json("check", "main.k", "--history", "rising.csv", "--after", "0.2")
     )

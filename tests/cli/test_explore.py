@@ -145,9 +145,11 @@ def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
     ]
     table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout
     assert f"... and {len(exploration) - 3} more td" in table
-    assert run("explore", *WINDOW, "-f", "markdown", ENERGY).stdout.startswith(
-        "|  | td |"
-    )
+    answer, *_, markdown_table = run(
+        "explore", *WINDOW, "-f", "markdown", ENERGY
+    ).stdout.split("\n\n")
+    assert answer == run_json("explore", *WINDOW, ENERGY)["answer"]
+    assert markdown_table.startswith("|  | td |")
     picture = tmp_path / "x.svg"
     assert run("explore", *WINDOW, "-q", "--plot", str(picture), ENERGY).exit_code == 0
     assert b"<svg" in picture.read_bytes()
@@ -192,3 +194,18 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
     (offer_at_td,) = (offer for offer in document["offers"] if offer["td"] == 0.5)
     assert offer_at_td["reason"] in " ".join(run_result.stdout.split())
     assert document["recommended"] is None
+
+
+def test_what_would_be_better_is_the_pair_that_suggest_names() -> None:
+    window = ("--td-window", "0.06", "0.066", ENERGY)
+    answers = [
+        run(command, *window, "-q").stdout.splitlines()
+        for command in ("suggest", "explore")
+    ]
+    cures = [
+        [line.removeprefix("to improve").strip() for line in lines if "improve" in line]
+        for lines in answers
+    ]
+    assert (
+        cures == [["use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%"]] * 2
+    )

@@ -251,7 +251,8 @@ def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
         shutil.copy(ENERGY, here / name)
         assert (
             run(
-                *command, "--no-verify", "--report", f"{kind}.html", "--", name
+                *(*command, "--no-verify", *accept_poor(command)),
+                *("--report", f"{kind}.html", "--", name),
             ).exit_code
             == 0
         )
@@ -267,6 +268,11 @@ def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
     counts = [Tags.of(page) for page in pages.values()]
     assert counts[0] == counts[1]
     assert not find_unseen(pages["hostile"]) & {*"\x1b\x9b\x85\u202e\u2066"}
+
+
+def accept_poor(command: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the options that let a command pass with the poor pair of an energy level alone."""
+    return ("--min-quality", "poor") if command[0] == "verify" else ()
 
 
 class Tags(HTMLParser):

@@ -1,24 +1,26 @@
 """The command ``plan`` in all formats."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import d2rpick as d2
+from d2rpick.choice.question import Settings, read_reference
+from d2rpick.choice.td.plan import plan_run
+from d2rpick.histories.names import Selection
 from d2rpick.report.formats import DisplayOptions
-from tests.command import ENERGY, put, read_refusal, run, run_json
+from d2rpick.report.plan import give_plan_sentence
+from tests.command import ENERGY, join_wrapped_lines, put, read_refusal, run, run_json
 from tests.computed import locate_stored, read_starter
 from tests.drops import drop, write_run_files
 from tests.json_schemas import check_by_schema, run_json_checked
 
 pytestmark = pytest.mark.slow
 FINE = 4e-4  # time between states [s], fine enough to show a landing that comes slightly later
-PART = (
-    "--part",
-    "box",
-    "--no-verify",
-)  # no oscillator describes the run, and none is searched
+# No oscillator describes the run, and none is searched; its flights with vibration are poor, and planned all the same.
+PART = ("--part", "box", "--no-verify", "--min-quality", "poor")
 
 DECK = """*KEYWORD
 *CONTROL_TERMINATION
@@ -75,7 +77,9 @@ def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
         assert all(
             f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in all_windows
         )
-        assert "plan this one from the run switched so" in " ".join(text.split())
+        assert "plan this one from a run that was switched in that window" in " ".join(
+            text.split()
+        )
 
 
 def read_csv_rows(text: str) -> list[dict[str, object]]:
@@ -96,7 +100,7 @@ def read_csv_rows(text: str) -> list[dict[str, object]]:
 def test_a_poor_window_is_called_poor() -> None:
     """The level may match while most of the vibration is kinetic at td."""
     box = locate_stored("drop2T01.gz")
-    plan = d2.plan(d2.read(box), parts="all")
+    plan = d2.plan(d2.read(box), parts="all", min_quality="poor")
     document = plan.to_dict()
     rows = [row for row in document["windows"] if row["status"] == "supported"]
     assert [row["quality"] for row in rows] == ["good", "poor"]
@@ -113,9 +117,36 @@ def test_a_poor_window_is_called_poor() -> None:
         assert alone["quality"] == row["quality"]
     text = plan.text("table", DisplayOptions())
     assert (
-        f"flight {rows[1]['flight']}   poor: how the deformations at tr and td lie"
+        f"flight {rows[1]['flight']}   do not use: how the deformations at tr and td lie"
         in text
     )
+    sentence = " ".join(text.partition("\nnext")[0].split())
+    assert f"(do not use flight {rows[1]['flight']})" in sentence
+    assert "with care" not in sentence
+
+
+def test_the_first_sentence_recommends_no_poor_window(history: list[str]) -> None:
+    arguments = ("plan", "-q", *PART, *history)
+    rows = run_json(*arguments)["windows"]
+    planned = [row for row in rows if row["status"] == "supported"]
+    assert [row["verdict"] for row in planned] == ["use", "do not use"]
+    sentence = run(*arguments).stdout
+    number = planned[1]["flight"]
+    assert sentence.startswith(
+        f"use 1 of {len(rows)} windows now (do not use flight {number}): make rigid from"
+    )
+
+
+def test_where_all_planned_windows_are_poor_none_is_recommended(
+    history: list[str],
+) -> None:
+    plan = plan_run(
+        read_reference(history, Selection(parts=("box",))),
+        Settings(replay=False, min_quality="poor"),
+    )
+    poor = [row._replace(status="supported") for row in plan.flights[1:]]
+    sentence = give_plan_sentence(replace(plan, flights=tuple(poor)))
+    assert sentence.startswith("do not use flights 2, 3: make rigid from ")
 
 
 def test_the_card_holds_the_supported_windows_and_passes_check(
@@ -188,12 +219,14 @@ def test_one_oscillator_is_one_flight() -> None:
 def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     file = locate_stored("drop2T01.gz")
     arguments = ("--part", "flying", "--tr", "0", "--td", "0.27")
-    result = run("verify", "-q", *arguments, file).stdout.splitlines()[0]
-    assert result.endswith(
-        "by the energy level alone: tr lies in the flight, and nothing vibrates there"
-    )
+    verdict, why, *others = run("verify", "-q", *arguments, file).stdout.splitlines()
+    assert verdict == "use     tr = 0, td = 0.27"
+    assert why == "why     nothing vibrates in the flight up to td"
+    assert "basis      energy: nothing vibrates" in others
+    assert "flight     from 0 (" in "\n".join(others)
     chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
-    assert "keeps        everything: nothing vibrates in the flight up to td" in chosen
+    kept = "the same as in the reference: nothing vibrates in the flight up to td"
+    assert f"expect  {kept}\n" in chosen
     card = run(
         "card",
         "-q",
@@ -238,7 +271,8 @@ def test_the_next_window_is_planned_from_the_switched_run(
     ).stdout
     assert "as planned" in result
     assert "than planned" in result
-    assert "run from the start with those that are done and these" in result
+    assert "run the deck with them from the start" in result
+    assert "they hold the windows that are done too" in join_wrapped_lines(result)
     new = [
         (row["tr"], row["td"])
         for row in plan_answer["windows"]
@@ -308,6 +342,8 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         "all",
         "--node",
         node,
+        "--min-quality",
+        "poor",
         "--deck",
         str(deck),
         "--write-deck",

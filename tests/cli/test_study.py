@@ -102,7 +102,8 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
     }
     for form in ("table", "markdown"):
         text = run(*STUDY, *sources, "-f", form).stdout
-        assert f"{document['common_tr']:g}, acceptable in 3 of 3 runs" in text
+        common = f"common tr = {document['common_tr']:g}, for 3 of 4 runs"
+        assert re.match(rf"(\* )?{document['common_verdict']}:? +{common}", text)
         assert form == "table" or all(
             source in text for source in sources
         )  # a table wraps long names
@@ -338,13 +339,13 @@ def test_a_run_that_kills_its_process_is_a_row(
     # As the system does if memory runs out.
     (tmp_path / "sitecustomize.py").write_text(
         "import os, d2rpick.choice.runs.study as study\n"
-        "ask = study.ask\n"
+        "judge_run = study.judge_run\n"
         "def kill(question, source):\n"
-        "    return os.abort() if source.endswith('deadly.csv') else ask(question, source)\n"
-        "kill.__module__, kill.__qualname__ = 'd2rpick.choice.runs.study', 'ask'\n"
-        "study.ask = kill\n"
+        "    return os.abort() if source.endswith('deadly.csv') else judge_run(question, source)\n"
+        "kill.__module__, kill.__qualname__ = 'd2rpick.choice.runs.study', 'judge_run'\n"
+        "study.judge_run = kill\n"
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     args = (*STUDY[:-1], "2", "-f", "json", runs[0], "deadly.csv", *runs[1:])
     with start_program(*args, cwd=tmp_path, text=True) as process:
         text, _ = process.communicate(timeout=30)

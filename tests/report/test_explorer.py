@@ -16,9 +16,10 @@ import pytest
 
 from d2rpick.choice.td.suggest_td import STEPS
 from d2rpick.histories.digits import format_window
-from d2rpick.report.page import read_resource
+from d2rpick.report.page import CLASSES, read_resource
 from d2rpick.report.tables import format_measure, format_short
 from tests.command import ENERGY, ROLLOVER, run
+from tests.computed import locate_stored
 
 pytest.importorskip("selenium", reason="selenium is not installed")
 
@@ -266,6 +267,9 @@ def check(browser: Browser) -> float:
         expected["residual"] = format_measure(best["residual"])
         expected["kinetic"] = format_measure(suggestion["kinetic_share"])
         expected["tolerance"] = f"±{best['timing_tolerance']:.1e}"
+        expected["verdict"] = suggestion["verdict"]
+        expected["why"] = suggestion["verdict_reason"]
+        expected["cure"] = suggestion["cure"] or ""
     expected["level"] = format_short(suggestion["energy_td"])
     assert {name: said_by_page[name] for name in expected} == expected
     assert said_by_page["typed"] == expected["td"]
@@ -306,14 +310,14 @@ def test_td_dragged_to_some_places_shows_the_digits_of_suggest(
     mouse.click_and_hold(browser.find(".handle")).perform()
     over = browser.find(".energy .u-over")
     first, last = browser.driver.execute_script(ENDS)
-    shown_sentences = set()
-    for td_index in np.linspace(first, last, 8).astype(int).tolist():
+    shown_td = set()
+    for pixel in np.linspace(first, last, 8).astype(int).tolist():
         mouse.move_to_element_with_offset(
-            over, td_index - over.size["width"] // 2, -9
+            over, pixel - over.size["width"] // 2, -9
         ).perform()
-        shown_sentences.add(check(browser))
+        shown_td.add(check(browser))
     mouse.release().perform()
-    assert len(shown_sentences) > 6
+    assert len(shown_td) > 6
     last = browser.value("td")
     mouse.move_to_element(over).perform()
     assert browser.value("td") == last
@@ -328,14 +332,14 @@ def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     x, y = browser.driver.execute_script(
         "const box = document.querySelector('.handle').getBoundingClientRect(); return [box.x + 22, box.y + 99]"
     )
-    check_report = check(browser)
+    td_before = check(browser)
     for kind, points in (
         ("Start", [{"x": x, "y": y}]),
         ("Move", [{"x": x + 25, "y": y + 9}]),
         ("End", []),
     ):
         browser.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
-    assert check(browser) > check_report
+    assert check(browser) > td_before
 
 
 @mark_for_browser
@@ -501,6 +505,26 @@ def test_the_pair_of_the_first_card_is_not_told_twice(
 
 
 @mark_for_browser
+def test_no_line_of_the_first_card_stands_again_below_its_pair(
+    tmp_path: Path, browser: Browser
+) -> None:
+    chain = ("--part", "spring1,spring2", locate_stored("chain_referenceT01.gz"))
+    options = ("--td", "0.13505", "--cost-share", "0.9")
+    browser.open(write_page(tmp_path, "suggest", *options, *chain))
+    names_on_card = {name.text for name in browser.all(".card:has(.badge) dt")}
+    assert {"why", "rigid for", "saves"} <= names_on_card
+    assert "kinetic fraction" in list_names_below(browser)
+    assert not names_on_card & list_names_below(browser)
+    browser.find(".handle").send_keys(Keys.ARROW_LEFT)
+    assert {"verdict", "why", "rigid for", "saves"} <= list_names_below(browser)
+
+
+def list_names_below(browser: Browser) -> set[str]:
+    """Return the names of the visible values of the pair that is explored."""
+    return {name.text for name in browser.all(".now dt") if name.is_displayed()}
+
+
+@mark_for_browser
 def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None:
     browser.open(box)
     for _ in range(3):
@@ -615,6 +639,17 @@ def compute_contrast(first_colour: str, second_colour: str) -> float:
     return (light + 0.05) / (dark + 0.05)
 
 
+def test_each_verdict_has_the_colour_of_its_grade() -> None:
+    style = read_resource("style.css")
+    colours = {"use": "good", "care": "care", "refused": "bad"}
+    assert set(colours) == set(CLASSES.values())
+    for name, colour in colours.items():
+        assert f"\n.badge.{name} {{ color: var(--{colour}); }}" in style
+        assert re.search(
+            rf"\.card\.{name} {{ border-color: var\(--{colour}\); }}", style
+        )
+
+
 def test_letters_and_marks_stand_out_in_light_and_dark() -> None:
     themes = [
         dict(re.findall(r"--(\w+): (#\w{6})", block))
@@ -623,7 +658,7 @@ def test_letters_and_marks_stand_out_in_light_and_dark() -> None:
     assert len(themes) == 2
     for colours in themes:
         for ground in ("ground", "panel"):
-            for name in ("ink", "soft", "good", "bad"):
+            for name in ("ink", "soft", "good", "care", "bad"):
                 assert compute_contrast(colours[name], colours[ground]) >= 4.5, (
                     name,
                     ground,

@@ -48,7 +48,7 @@ TOLD = {
     ),
     "a poor pair": (
         ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 1,
-        ("do not usetr0.0128853td0.064", "wrong by 96%"), ("Verified",),
+        ("do not usetr0.0128853td0.064", "wrong by 96%"), ("Verified", "d2rpick card"),
     ),
     "a pair that verifies": (
         ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY), 0,

@@ -9,7 +9,7 @@ from hypothesis import example, given, strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest_in_history
-from d2rpick.choice.pair.together import VibratingTogether
+from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.question import Settings
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import Memory, Samples
@@ -123,7 +123,7 @@ def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doub
         Memory(),
     )
     around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
-    together = VibratingTogether(record, Flight())
+    together = PartsTogether(record, Flight())
 
     def find(flight: Span | None, *, doubtful: bool) -> Mapping[str, Any]:
         return find_models(

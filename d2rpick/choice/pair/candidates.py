@@ -144,7 +144,7 @@ class Judged:
         energy, measured = measure_all(vibrations, tr, ends)
         level_error = measures.level_error(energy, energy_td)
         if at_rest.any():
-            # the ratio of two round-off energies is no error
+            # the ratio of two round-off energies is not a meaningful error
             level_error[at_rest] = 0.0
             measured = {
                 name: np.where(at_rest, np.nan, column)
@@ -253,7 +253,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Candidates of one td in some order; each is made when it is looked up in ``judged``.
+    """Lazy sequence of the candidates of one td, in a given order; each is built when it is looked up.
 
     ``order`` has the rows of the candidates in ``judged``; they are ranked if ``ranked`` is True.  ``recommended`` is
     the place of the recommended candidate in ``order``, None without one.

@@ -11,7 +11,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.pair.together import VibratingTogether
+from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
@@ -194,9 +194,9 @@ class Situation:
         return self.settings.margin or 0.0
 
     @cached_property
-    def together(self) -> VibratingTogether:
+    def together(self) -> PartsTogether:
         """Parts that vibrate together in the flight."""
-        return VibratingTogether(self.history, self.flight)
+        return PartsTogether(self.history, self.flight)
 
     @cached_property
     def expected_margin(self) -> Margin:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-class VibratingTogether:
+class PartsTogether:
     """Parts that vibrate together in a flight: whether all of them were chosen, and their kinetic energy."""
 
     def __init__(self, history: History, flight: Flight) -> None:

@@ -285,7 +285,7 @@ def _is_inside(times: Samples, windows: Samples) -> Samples:
 
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Leave out points on a straight line: keep the ends of the windows, then add the worst point of each gap."""
+    """Thin out a curve: keep the ends of the windows, then add the point farthest from the line in each gap."""
     points = np.flatnonzero(np.isin(times, windows))
     while True:
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))

@@ -136,7 +136,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs and the window around it that they share [time]; None with the reason.
+    """One tr for all judged runs and the window around it that they share [time]; else None and the reason.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors of the runs at this tr, in their order: residuals, or

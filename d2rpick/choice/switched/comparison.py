@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest deviation of the momentum after td; beyond this share of it the motion differs from the reference run [-].
+# Largest deviation of the momentum after td, as a share of it; beyond it the motion differs from the reference [-].
 MOST_MOMENTUM_ERROR = 0.05
 # Smaller momenta than this share of the largest of the run count as this share: a resting body cannot deviate much [-].
 _AT_REST = 0.01

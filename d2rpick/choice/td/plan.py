@@ -368,7 +368,7 @@ def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
 def _mark_status(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[PlannedFlight]:
-    """Mark windows to be planned again after the first that locks in energy, and after a contact while rigid."""
+    """Mark windows to be planned again: after the first that locks in energy, or after a contact of rigid parts."""
     in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
     if in_contact:

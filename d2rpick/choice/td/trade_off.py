@@ -13,6 +13,7 @@ from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.pair.candidates import judge_candidates
+from d2rpick.choice.pair.grades import GOOD
 from d2rpick.choice.pair.quality import EQUALLY_GOOD, rank_candidates, rank_judged
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
@@ -64,7 +65,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The pair by which offers are compared; None if no tr is recommended."""
+        """The recommended pair of this td, by which different td are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -115,6 +116,14 @@ class Offer(AnswerAtTd):
     def decision(self) -> Decision | None:
         """Verdict on the recommended pair, with its reason."""
         return self.answer.decision
+
+    @cached_property
+    def decision_with_cure(self) -> Decision | None:
+        """The verdict with the better pair that ``suggest`` names, for which the peaks of the flight are searched."""
+        decision = self.decision
+        if decision is None or decision.grade == GOOD:
+            return decision
+        return suggest_at(self.situation, ranked=self.answer.candidates).decision
 
     @property
     def quality(self) -> Quality | None:

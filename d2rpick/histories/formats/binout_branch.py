@@ -326,7 +326,7 @@ class Branch(Database):
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Return the possible counts of a variable: one per state or per part, or the count in the first state."""
+        """Return the plausible numbers of values: one per state, one per part, or as many as in the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}

@@ -127,7 +127,7 @@ class Blocks(Database):
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
-            # A second request is mostly followed by others: one comparison serves all.
+            # A second request is usually followed by more, so all are compared once.
             self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
@@ -228,7 +228,7 @@ class Blocks(Database):
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:
-        """Return the run that contains a state, and the position of the state in the run."""
+        """Return the stretch of equal layouts that contains a state, and the state's index in it."""
         for run in self:
             if state < run.repeats:
                 return run, state
@@ -307,7 +307,7 @@ class Blocks(Database):
     def _new(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int]:
-        """Parse a block whose layout was not met recently; return example, stride and count."""
+        """Parse a block with a new layout; return an example state, the bytes per state and the number of states."""
         following = self._find(position + 1)
         if following is None:
             last = Stretch(position, self._end - position, 1, position)

@@ -162,7 +162,7 @@ class Lsda:
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        """Walk the records from a byte on, and collect the directories of the wanted branches."""
+        """Walk the records from a byte offset on, and collect the directories of the wanted branches."""
         data = self.data
         unpack = self._head.unpack_from
         head = self._head.size
@@ -376,7 +376,7 @@ class Lsda:
 def _read_lsda_header(
     data: Content, source: str
 ) -> tuple[int, str, struct.Struct, struct.Struct]:
-    """Return the byte at which records begin, the byte order, the form of a record head and the form of a type."""
+    """Return the offset of the first record, the byte order, and the formats of record headers and type codes."""
     header = data[:8]
     if not recognises(header):
         problem = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"

@@ -301,7 +301,7 @@ def _decimals(field: str) -> int:
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equidistant and their step needs fewer than these decimals."""
+    """Return True if the times are equally spaced and their step can be written with fewer decimals than this."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
