@@ -126,8 +126,10 @@ class PairVerdict(AnswerAtTd):
 
         Any tr within the timing tolerance is that pair.
         """
+        if self.switched is None or not self.switched.objections:
+            return False
         good = self._good_pair
-        if self.switched is None or not self.switched.objections or good is None:
+        if good is None:
             return False
         tr = self.candidate.tr
         is_same_tr = abs(good.tr - tr) <= (self.candidate.timing_tolerance or 0.0)

@@ -96,7 +96,7 @@ class Memory:
         return result
 
     def __reduce__(self) -> tuple[type[Memory], tuple[()]]:
-        return Memory, ()  # a copy in another process starts empty
+        return type(self), ()  # a copy in another process starts empty
 
 
 @dataclass(frozen=True, eq=False, repr=False)

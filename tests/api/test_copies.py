@@ -29,6 +29,7 @@ ANSWERS: dict[str, Callable[[], Any]] = {
         d2.read(MATSUM), 0.37, deck=SAMPLE_DECK, **OF_BOX
     ),
     "verify": lambda: d2.verify(d2.read(ENERGY), 0.0135867, 0.0687534),
+    "verify a poor pair": lambda: d2.verify(d2.read(ENERGY), 0.0128855, 0.064),
     "explore": lambda: d2.explore(d2.read(MATSUM), steps=3, **OF_BOX),
     "plan": lambda: d2.plan(d2.read(MATSUM), **OF_BOX),
     "parts": lambda: d2.parts(d2.read(MATSUM), replay=False),
