@@ -60,7 +60,7 @@ class Markup(str):
     __slots__ = ()
 
 
-class Section(Markup):
+class PageSection(Markup):
     """A section of a page, with its title and the id to which a link in the contents leads."""
 
     name: str
@@ -167,16 +167,16 @@ def _compute_digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def build_section(title: str, *content: str) -> Section:
+def build_section(title: str, *content: str) -> PageSection:
     """Return a section with a title."""
     return _make_section(title, make_element("h2", title), *content)
 
 
-def _make_section(title: str, *content: str) -> Section:
+def _make_section(title: str, *content: str) -> PageSection:
     """Return a section with an id made from its title."""
     letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
     anchor = f"section-{''.join(letters)}"
-    section = Section(make_element("section", *content, id=anchor))
+    section = PageSection(make_element("section", *content, id=anchor))
     section.name = title
     section.anchor = anchor
     return section
@@ -184,7 +184,7 @@ def _make_section(title: str, *content: str) -> Section:
 
 def build_contents(content: Iterable[str]) -> Markup:
     """Return links to the sections of a page, nothing if it is short."""
-    sections = [part for part in content if isinstance(part, Section)]
+    sections = [part for part in content if isinstance(part, PageSection)]
     if len(sections) < _LONG:
         return Markup()
     links = (
@@ -469,7 +469,7 @@ def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup
     yield build_command(command, stdin)
 
 
-def build_command(command: Sequence[str], stdin: bool = False) -> Section:
+def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
     """Return the arguments that repeat an answer as a command line to paste."""
     stdin_note = (
         [make_element("p", "with the same history on standard input:")] if stdin else []

@@ -528,3 +528,19 @@ def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) 
         run(*STUDY, "absent.csv", "--report", str(page), "--overwrite").exit_code == 2
     )
     assert "None: no run could be judged" in page.read_text()
+
+
+def test_a_study_of_one_run_gives_the_verdict_of_suggest() -> None:
+    """The error of the pair is above 0.5, but worth little in the next contact."""
+    question = (
+        "--td",
+        "0.37",
+        "--part",
+        "flying",
+        str(ROOT / "sample_data/rollover_box.matsum"),
+    )
+    suggestion = run_json("suggest", *question)
+    study = run_json("study", *question)
+    assert suggestion["candidates"][0]["residual"] > 0.5
+    assert study["common_verdict"] == suggestion["verdict"] == "use with care"
+    assert study["runs"][0]["verdict"] == suggestion["verdict"]

@@ -185,8 +185,12 @@ class StudyOfRuns:
             return None
         grades = [row.quality for row in self.runs if row.quality]
         for row, error in zip(self.runs, self.common.errors, strict=True):
-            if error is not None and row.basis != "energy":
-                grades.append(grade_residual(error))
+            if error is None or row.residual is None or row.basis == "energy":
+                continue
+            # the grade of its own pair may be better than by its residual: the error is worth little
+            at_common_tr = grade_residual(error)
+            if GRADES.index(at_common_tr) < GRADES.index(grade_residual(row.residual)):
+                grades.append(at_common_tr)
         return min(grades, key=GRADES.index, default=None)
 
     @property
