@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
+from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.switching import (
     BY_SENSOR,
     BY_TIME,
@@ -207,8 +208,8 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
             missing.append(f"*{keyword}")
             continue
         card = cards[-1]
-        value = card.real(card.rows[0], 0)
-        curve = card.integer(card.rows[0], 2).value
+        value = card.real(card.rows[0], DATABASE["DT"])
+        curve = card.integer(card.rows[0], DATABASE["LCUR"]).value
         interval = value.value * card.transform.time
         if value.problem or curve:
             continue
