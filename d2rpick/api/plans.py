@@ -221,11 +221,13 @@ class Plan(RunAnswer, planning.RunPlan):
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
         """Return the card of the next run; None if no parts are named, or the bodies of the deck cannot be switched."""
+        from d2rpick.choice.judged_card import complete_printing, list_switched
+
         try:
-            suited, _ = cards.by_deck(self.question)
+            printing, _ = cards.complete(self.question)
         except DeckError:
             return None
-        if suited.request(self.question).whom(self.history):
+        if list_switched(complete_printing(printing, self.history)):
             return self.printed(cards)
         return None
 

@@ -559,19 +559,16 @@ def find_solver(history_format: str) -> str:
 def print_cards(
     windows: Sequence[Times],
     printing: Printing,
-    solver: str = DEFAULT,
     remarks: Sequence[str] = (),
 ) -> PrintedCard:
-    """Print the card for some windows.
+    """Print the card of rigid windows.
 
     Parameters
     ----------
     windows : sequence of (float, float)
         tr and td of each window [time of the model], 0 <= tr < td, each after the one before.
     printing : Printing
-        Parts or bodies to switch, and further options.
-    solver : str
-        A key of `SOLVERS`.
+        Solver, parts or bodies to switch, and further options.
     remarks : sequence of str
         Further comment lines.
 
@@ -587,4 +584,4 @@ def print_cards(
     >>> card.windows
     ((0.02, 0.09), (0.2, 0.3))
     """
-    return SOLVERS[solver].cards(windows, printing, remarks)
+    return SOLVERS[printing.solver or DEFAULT].cards(windows, printing, remarks)

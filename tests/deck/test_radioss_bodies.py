@@ -107,7 +107,9 @@ def write_bodies(
     bodies = find_bodies(main, parts)
     printing = Printing(node=bodies.nodes, end=0.4, name="box", starter=bodies.cards)
     name = write_deck(
-        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main,
+        print_cards([(0.1, 0.2)], printing._replace(solver="radioss")),
+        str(tmp_path / "next"),
     )[0]
     return bodies.nodes, read_run(name), name
 
@@ -222,7 +224,9 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
         replaced=bodies.replaced,
     )
     name = write_deck(
-        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main,
+        print_cards([(0.1, 0.2)], printing._replace(solver="radioss")),
+        str(tmp_path / "next"),
     )[0]
     starter_of_copy = read_run(name).starter
     assert starter_of_copy
