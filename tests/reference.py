@@ -38,9 +38,9 @@ _WARNINGS_TOPIC_INTRODUCTIONS: Final = {
     "Health of the run": "[Checks](checks.md#health-of-the-reference-run) lists the limits and their sources."
 }
 _JSON_INTRODUCTION: Final = (
-    "This page lists the keys that `-f json` and `-f ndjson` print. The folder `d2rpick/schemas` of the package contains "
-    "the schemas. Within one schema number, keys are only added. `null` means unknown. A name with dots is a key within "
-    "a key, and `[]` stands for each item of a list."
+    "This page lists the keys that `-f json` and `-f ndjson` print. The folder `d2rpick/schemas` of the package "
+    "contains the schemas. Within one schema number, keys are only added. `null` means unknown. A name with dots is a "
+    "key within a key, and `[]` stands for each item of a list."
 )
 _COMMANDS_INTRODUCTION: Final = (
     "This page lists every command with all its options, as `d2rpick COMMAND --help` prints them. HISTORY is a file, a "
