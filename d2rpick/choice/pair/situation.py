@@ -333,6 +333,8 @@ def examine_td(
             get_outer_window,
         )
 
+        # the energy alone shows a slightly different flight to each td; signs of parts are followed in few windows,
+        # since times at which a load still acts are told from the vibration
         around = get_outer_window(history, around)
         inner = get_inner_window(history, fitted)
         fitted = inner if inner.start < td <= inner.end else fitted
