@@ -301,15 +301,28 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
     )
 
 
-def test_too_few_states_per_period_recommend_nothing() -> None:
+def test_too_few_states_per_period_are_not_to_be_used() -> None:
     time = np.linspace(0, 10, 141)
     history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     answer = suggest_in_history(
         history, 8.0, Settings()
     )  # 6 states in each period of the energy
     assert answer.situation.basis == "energy"
-    assert answer.recommended is None
-    assert any("states per period" in note for note in answer.candidates[0].notes)
+    quality = require(answer.quality)
+    assert quality.grade == "poor"
+    assert any("6.03 states per period" in reason for reason in quality.reasons)
+
+
+def test_fewer_states_per_period_never_tell_more() -> None:
+    """A mode of 9 states per period is graded like one of half as many, though only the first is found as a mode."""
+    time = np.linspace(0, 10, 211)
+    history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
+    thinned = make_energy_history(history.energy[::2], time[::2])
+    fine, coarse = (
+        suggest_in_history(run, 8.0, Settings()) for run in (history, thinned)
+    )
+    assert require(fine.quality).grade == require(coarse.quality).grade == "poor"
+    assert abs(require(fine.recommended).tr - require(coarse.recommended).tr) < 0.01
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:

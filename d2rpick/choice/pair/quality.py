@@ -15,6 +15,7 @@ from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.model import count_states_of_oscillator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -334,9 +335,9 @@ def _list_causes_of_record(situation: Situation) -> list[Cause]:
                 "name the internal energy with `energy` or `parts`",
             )
         )
-    states = count_states_per_period(energy)
-    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        states_text = f"the record has {states:.2g} states per period"
+    states = _count_fewest_states(situation, energy)
+    if states < MIN_SAMPLES_PER_PERIOD:
+        states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
@@ -344,6 +345,16 @@ def _list_causes_of_record(situation: Situation) -> list[Cause]:
             )
         )
     return causes
+
+
+def _count_fewest_states(situation: Situation, energy: Samples) -> float:
+    """Return the states per period of the energy up to td, or of an oscillator near it, whichever has fewer."""
+    fit = situation.evidence.fit
+    counts = (
+        count_states_per_period(energy),
+        count_states_of_oscillator(situation.history, fit) if fit else None,
+    )
+    return min((states for states in counts if states is not None), default=np.inf)
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:

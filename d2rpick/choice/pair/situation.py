@@ -330,8 +330,10 @@ def examine_td(
         # imported here: better evidence does not need it
         from d2rpick.vibration.modal_span import (
             get_inner_window,
+            get_outer_window,
         )
 
+        around = get_outer_window(history, around)
         inner = get_inner_window(history, fitted)
         fitted = inner if inner.start < td <= inner.end else fitted
     models = find_models(
