@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
@@ -11,18 +11,18 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
+from d2rpick.base.memory import remember
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
 from d2rpick.histories.digits import sum_times_as_read
-from d2rpick.vibration import find_models
+from d2rpick.vibration import find_models, find_part_signs
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
     Identification,
     identify,
-    judge_given,
 )
 from d2rpick.vibration.model import (
     Evidence,
@@ -33,12 +33,11 @@ from d2rpick.vibration.model import (
     model_at,
 )
 from d2rpick.vibration.span import (
-    Fits,
     Span,
     estimate_hidden_share,
     find_described_span,
+    find_longest_described,
     find_span,
-    most_described,
 )
 
 if TYPE_CHECKING:
@@ -94,9 +93,15 @@ def _find_faint_fluctuation(history: History, start: float) -> float:
     """
     energies = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
-    highest = history.known.once("highest", lambda: find_largest(history.energy))
+    highest = _find_highest_energy(history)
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
+
+
+@remember
+def _find_highest_energy(history: History) -> float:
+    """Return the largest absolute energy of a record [energy]."""
+    return find_largest(history.energy)
 
 
 class AnswerAtTd:
@@ -134,7 +139,7 @@ class AnswerAtTd:
 class Situation:
     """A history as seen from one td [time], with the flight and the vibration around td.
 
-    ``evidence`` describes the vibration that was found, ``fits`` remembers the fits that were tried.
+    ``evidence`` describes the vibration that was found.
     """
 
     history: History
@@ -142,7 +147,6 @@ class Situation:
     settings: Settings
     flight: Flight
     evidence: Evidence
-    fits: Fits = field(default_factory=Fits)
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -201,7 +205,7 @@ class Situation:
     @cached_property
     def expected_margin(self) -> Margin:
         """Margin that a chosen td keeps: the given one, or the time by which the next contact may come earlier."""
-        return find_margin(self.history, self.flight, self.settings, self.fits)
+        return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
     def at_rest(self) -> bool:
@@ -216,7 +220,7 @@ class Situation:
     @cached_property
     def bodies(self) -> Bodies | None:
         """Drift in flight of the rigid bodies that the parts become; None without data of parts."""
-        return find_drift_of_bodies(self.history, self.flight, self.settings, self.fits)
+        return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
         """Return the position error at td of a body frozen at each of ``times`` [length]; NaN if unknown."""
@@ -264,15 +268,13 @@ def examine_td(
     history: History,
     td: float,
     settings: Settings,
-    fits: Fits | None = None,
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and the vibration in it.
+    """Find the flight around ``td`` and the vibration in it; what many td share is computed once for the history.
 
-    ``fits`` are those of an earlier call for the same record with the same settings, except ``after``.  Use ``quick``
-    for a choice among many td: an oscillator that describes most of the record, including td, is not searched again,
-    and the misfit of a refused oscillator is not computed.
+    Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
+    searched again, and the misfit of a refused oscillator is not computed.
 
     Raises
     ------
@@ -299,19 +301,16 @@ def examine_td(
         at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
     else:
         at = td
-    fits = Fits() if fits is None else fits
-    fit, span = _find_oscillator(
-        history, at, settings, seen_evidence, fits, quick=quick
-    )
+    fit, span = _find_oscillator(history, at, settings, seen_evidence, quick=quick)
     described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
-        history, td, settings, seen_evidence, fits
+        history, td, settings, seen_evidence
     )
     flight = _find_flight_at(history, td, settings, seen_evidence, described)
     is_given = settings.oscillator is not None
     evidence = Evidence(
         fit, span, is_given, prescribed=is_given or settings.fit_window is not None
     )
-    situation = Situation(history, td, settings, flight, evidence, fits)
+    situation = Situation(history, td, settings, flight, evidence)
     if not settings.replay:
         return situation
     first = float(history.time[0])
@@ -334,15 +333,12 @@ def examine_td(
 
         inner = get_inner_window(history, fitted)
         fitted = inner if inner.start < td <= inner.end else fitted
-    models = find_models(
-        history,
-        around,
-        fitted,
-        settled,
-        lambda: is_doubtful(situation.whole),
-        fits,
-        situation.together,
-    )
+    models = find_part_signs(history, around)
+    is_known = any(model.signed for model in models.values())
+    if fitted is not None and not is_known and is_doubtful(situation.whole):
+        models |= find_models(
+            history, fitted, settled or fitted, together=situation.together
+        )
     if models:
         return replace(situation, evidence=evidence._replace(models=models))
     return situation
@@ -351,19 +347,16 @@ def examine_td(
 def make_look(
     history: History,
     settings: Settings,
-    fits: Fits | None = None,
     since: float | None = None,
     *,
     quick: bool = True,
 ) -> Look:
     """Return a function that examines a record at a td, and remembers its answer for each td.
 
-    ``fits`` are those of an earlier call with the same settings.  No flight is assumed to begin before ``since``
-    [time].  ``quick`` has the same meaning as in the examination of one td.
+    No flight is assumed to begin before ``since`` [time].  ``quick`` has the same meaning as in the examination of one
+    td.
     """
-    look = partial(
-        examine_td, history, settings=settings, fits=fits or Fits(), quick=quick
-    )
+    look = partial(examine_td, history, settings=settings, quick=quick)
     return cache(look if since is None else lambda td: _limit_start(look(td), since))
 
 
@@ -412,7 +405,6 @@ def _find_oscillator(
     td: float,
     settings: Settings,
     evidence: Seen,
-    fits: Fits,
     *,
     quick: bool,
 ) -> tuple[Identification | None, Span | None]:
@@ -432,31 +424,22 @@ def _find_oscillator(
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return _add_hidden_share(history, fit, fits), span
+        return _add_hidden_share(history, fit), span
     if settings.oscillator:
-        judge = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = find_described_span(
-            history, td, bounds, judge, whole=whole, memory=fits
+            history, td, bounds, settings.oscillator, whole=whole
         )
         return fit, span
-    identify_mode = fits.remembered("one", partial(identify, memory=fits))
-    quickly = partial(identify_mode, quick=True)
-    longest_fit = fits.once(
-        ("most", bounds, whole),
-        lambda: most_described(history, bounds, quickly, whole=whole, memory=fits),
-    )
+    longest_fit = find_longest_described(history, bounds, whole)
     if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
         span, fit = longest_fit
     else:
-        fitter = quickly if quick else identify_mode
-        span, fit = find_described_span(
-            history, td, bounds, fitter, whole=whole, memory=fits
-        )
-    return _add_hidden_share(history, fit, fits), span
+        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
+    return _add_hidden_share(history, fit), span
 
 
 def _find_window_of_modes(
-    history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
+    history: History, td: float, settings: Settings, evidence: Seen
 ) -> Described | None:
     """Return a window that modes describe, if only the energy can show a flight; else None."""
     if evidence.flight or evidence.refusal or not settings.replay:
@@ -472,26 +455,27 @@ def _find_window_of_modes(
         guess = None
     else:
         guess = Span(quiet.start, last if quiet.end is None else quiet.end)
-    described = find_described(history, td, guess, fits)
+    described = find_described(history, td, guess)
     if described is None:
         return None
     return Described(*described.span, described.vibration.vibration_energy)
 
 
-def _add_hidden_share(
-    history: History, fit: Identification, fits: Fits
-) -> Identification:
+def _add_hidden_share(history: History, fit: Identification) -> Identification:
     """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    window = history.between(fit.start, fit.end)
-    mode = fit.mode
+    return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
 
-    def add_share() -> Identification:
-        share = estimate_hidden_share(*window, mode)
-        return fit._replace(hidden_share=max(fit.hidden_share, share))
 
-    return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)
+@remember
+def _estimate_what_is_hidden(
+    history: History, start: float, end: float, _: float, *, fit: Identification
+) -> Identification:
+    """Return a fit with the hidden share; one fit has one result, by which situations see that they share it."""
+    assert fit.mode is not None
+    share = estimate_hidden_share(*history.between(start, end), fit.mode)
+    return fit._replace(hidden_share=max(fit.hidden_share, share))
 
 
 def _skip_first_quarter(
