@@ -17,6 +17,7 @@ from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.histories.digits import sum_times_as_read
 from d2rpick.vibration import find_models, find_part_signs
 from d2rpick.vibration.identify import (
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration import SignedModel
 
     Look = Callable[[float], "Situation"]
 
@@ -57,8 +59,6 @@ _SOLVER_ERROR: Final = 1e-5
 _FAINT: Final = 1e-4
 # Printed digits: a constant energy may alternate between two printed values, each off by half a digit.
 _QUANTA: Final = 2
-# Share of a flight before the contact that ends it which is not tested, since the contact may have begun [-].
-_BEFORE_CONTACT: Final = 0.03
 
 
 def is_at_rest(
@@ -68,11 +68,12 @@ def is_at_rest(
 
     ``flight`` is (start, end) [time], with end None if it is unknown.  Free flight excites no vibration: whatever
     vibrates in a part of the flight has vibrated from its start.  So the whole flight is tested if its end is known,
-    not only the time up to td.  Plastic work does not matter: the test is on the fluctuation about the level, however
-    high the level is.  With ``deformed`` (a vibration is known) only the test for round-off is made.
+    not only the time up to td, but for the margin in which the contact may have begun.  Plastic work does not matter:
+    the test is on the fluctuation about the level, however high the level is.  With ``deformed`` (a vibration is known)
+    only the test for round-off is made.
     """
     start, end = flight
-    last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
+    last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
@@ -281,6 +282,33 @@ def examine_td(
     RangeError
         If td, ``after`` or the fit window lie outside the record, or the record has fewer than 3 states.
     """
+    _check_times(history, td, settings)
+    seen = find_seen_flight(history, td)
+    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
+    if seen.refusal and seen.flight:
+        fitted_at = (seen.flight.start + seen.flight.end) / 2
+    else:
+        fitted_at = td
+    fit, span = _find_oscillator(history, fitted_at, settings, seen, quick=quick)
+    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
+        history, td, settings, seen
+    )
+    flight = _find_flight_at(history, td, settings, seen, described)
+    is_given = settings.oscillator is not None
+    is_prescribed = is_given or settings.fit_window is not None
+    evidence = Evidence(fit, span, is_given, prescribed=is_prescribed)
+    situation = Situation(history, td, settings, flight, evidence)
+    if not settings.replay:
+        return situation
+    is_flying = seen.flight is not None and not seen.refusal
+    models = _find_other_models(situation, is_flying=is_flying)
+    if models:
+        return replace(situation, evidence=evidence._replace(models=models))
+    return situation
+
+
+def _check_times(history: History, td: float, settings: Settings) -> None:
+    """Raise RangeError for a record with fewer than 3 states, and for times outside the record."""
     if history.time.size < 3:
         if history.time.size == 1:
             count = "1 state was"
@@ -294,54 +322,37 @@ def examine_td(
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen_evidence = find_seen_flight(history, td)
-    flying = None if seen_evidence.refusal else seen_evidence.flight
-    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
-    if seen_evidence.refusal and seen_evidence.flight:
-        at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
-    else:
-        at = td
-    fit, span = _find_oscillator(history, at, settings, seen_evidence, quick=quick)
-    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
-        history, td, settings, seen_evidence
-    )
-    flight = _find_flight_at(history, td, settings, seen_evidence, described)
-    is_given = settings.oscillator is not None
-    evidence = Evidence(
-        fit, span, is_given, prescribed=is_given or settings.fit_window is not None
-    )
-    situation = Situation(history, td, settings, flight, evidence)
-    if not settings.replay:
-        return situation
+
+
+def _find_other_models(
+    situation: Situation, *, is_flying: bool
+) -> dict[str, SignedModel]:
+    """Find the models of the vibration that are needed beside the oscillator; ``is_flying``: td is seen to fly."""
+    history = situation.history
+    td = situation.td
+    flight = situation.flight
     first = float(history.time[0])
     last = float(history.time[-1])
     # without evidence of the next contact nothing is known about the time after td
-    end = flight.end or (last if flying or span else td)
-    around = Span(min(td, first if flight.start is None else flight.start), end)
-    fitted = settled = None
-    if flight.start is not None:
-        fitted = Span(flight.start, flight.end or last)
-        if flight.settled is None:
-            settled = fitted
-        else:
-            settled = fitted._replace(start=flight.settled)
-    if fitted is not None and flight.source == "energy":
+    end = flight.end or (last if is_flying or situation.evidence.span else td)
+    start = first if flight.start is None else flight.start
+    models = find_part_signs(history, Span(min(td, start), end))
+    is_sign_known = any(model.signed for model in models.values())
+    if flight.start is None or is_sign_known or not is_doubtful(situation.whole):
+        return models
+    in_flight = Span(flight.start, flight.end or last)
+    settled = in_flight
+    if flight.settled is not None:
+        settled = in_flight._replace(start=flight.settled)
+    if flight.source == "energy":
         # imported here: better evidence does not need it
-        from d2rpick.vibration.modal_span import (
-            get_inner_window,
-        )
+        from d2rpick.vibration.modal_span import get_inner_window
 
-        inner = get_inner_window(history, fitted)
-        fitted = inner if inner.start < td <= inner.end else fitted
-    models = find_part_signs(history, around)
-    is_known = any(model.signed for model in models.values())
-    if fitted is not None and not is_known and is_doubtful(situation.whole):
-        models |= find_models(
-            history, fitted, settled or fitted, together=situation.together
-        )
-    if models:
-        return replace(situation, evidence=evidence._replace(models=models))
-    return situation
+        inner = get_inner_window(history, in_flight)
+        in_flight = inner if inner.start < td <= inner.end else in_flight
+    return models | find_models(
+        history, in_flight, settled, together=situation.together
+    )
 
 
 def make_look(
