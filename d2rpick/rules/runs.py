@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
+from d2rpick.deck.radioss_columns import AFTER_DELAY
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Objection, RunCase
 from d2rpick.rules.rule import (
@@ -563,6 +564,6 @@ def _check_sensor_stop(case: RunCase) -> Iterator[Objection]:
     for card in case.run.starter.named("SENSOR") if case.run.starter else ():
         rows = card.rows[1:2] if card.words[1:2] == ("TIME",) else ()
         for row in rows:
-            if stop := row.text[20:40].strip():
+            if stop := AFTER_DELAY["number"].cut(row.text).strip():
                 problem = f"{stop} follows Tdelay on the same line, where it is not read, so the sensor has no Tstop"
                 yield row.field(2), f"{problem}; write it on a line of its own"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import list_names
 from d2rpick.deck.force_switching import find_delay_without_chatter
+from d2rpick.deck.ls_dyna_columns import SENSOR_CONTROL
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, SwitchHeader, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
@@ -390,8 +391,10 @@ def _check_sensor_control(case: Case) -> Iterator[Objection]:
 def _find_controlled(card: Card) -> Iterator[int]:
     """Yield the id of the switch set that a *SENSOR_CONTROL switches, if it switches one."""
     for row in card.data[:1]:
-        if card.word(row, 1).value == "DEF2RIG":
-            yield card.integer(row, 2).value + card.transform.rest
+        if card.word(row, SENSOR_CONTROL["TYPE"]).value == "DEF2RIG":
+            yield (
+                card.integer(row, SENSOR_CONTROL["TYPEID"]).value + card.transform.rest
+            )
 
 
 def _make_delayed_deck(wait: str) -> Example:

@@ -1,5 +1,5 @@
-"""Rules D2R101-102, D2R105, D2R111, D2R114-115 and D2R201-207: the window times, also compared with an energy
-history.
+"""Rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the window times, also compared with an
+energy history.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
+from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.switching import (
     BY_SENSOR,
     BY_TIME,
@@ -208,8 +209,8 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
             missing.append(f"*{keyword}")
             continue
         card = cards[-1]
-        value = card.real(card.rows[0], 0)
-        curve = card.integer(card.rows[0], 2).value
+        value = card.real(card.rows[0], DATABASE["DT"])
+        curve = card.integer(card.rows[0], DATABASE["LCUR"]).value
         interval = value.value * card.transform.time
         if value.problem or curve:
             continue
@@ -490,6 +491,20 @@ def _check_quality(case: Case) -> Iterator[Objection]:
     Fix: Use the pair that the finding names. If it names none, do what it says would improve the pair.
     """
     return _report_faults(case, "D2R209")
+
+
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(".0128853", "0.064", "--max-residual 0.5"))
+@make_rule_decorator(
+    "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
+)
+def _check_limits(case: Case) -> Iterator[Objection]:
+    """A limit of a recommendation was given, --max-residual or --max-kinetic-share, and the pair exceeds it, or the
+    history does not show whether it does. d2rpick suggest recommends no pair beyond the same limit.
+
+    Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
+    """
+    return _report_faults(case, "D2R210")
 
 
 @set_passing(*_PASSING)
