@@ -15,10 +15,11 @@ from d2rpick.choice.answers import (
     verify_in_history,
     verify_run,
 )
-from d2rpick.choice.judged_card import CardRequest, print_judged_card
+from d2rpick.choice.judged_card import complete_printing, print_judged_card
 from d2rpick.choice.pair.candidates import Pair
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.question import Reference, Settings, read_reference
+from d2rpick.deck.printed_card import Printing
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
@@ -378,6 +379,6 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
         [require(box.recommended)[:2]],
         box.situation.history,
         judge,
-        CardRequest("ls-dyna"),
+        complete_printing(Printing(solver="ls-dyna"), box.situation.history),
     )
     assert fits.computed == fits_made
