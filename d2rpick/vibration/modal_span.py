@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
@@ -14,7 +15,7 @@ from d2rpick.vibration.span import Span
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.histories.history import History, Memory, Samples
+    from d2rpick.histories.history import History, Samples
 
 # Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
@@ -35,7 +36,7 @@ class ModalWindow(NamedTuple):
 
 
 def find_described(
-    history: History, td: float, guess: Span | None, memory: Memory
+    history: History, td: float, guess: Span | None
 ) -> ModalWindow | None:
     """Find a window around td whose modes go on by themselves; None if none is found.
 
@@ -46,32 +47,24 @@ def find_described(
         [time]
     guess : Span or None
         Where the energy seems to keep its level [time].
-    memory : Memory
-        Of the record: what was identified in a window is looked for once.
     """
     for window in _list_windows(history, td, guess):
-        described = _described_from(history, window, memory)
+        described = _grow_described(history, window)
         if described is not None:
             return described
     return None
 
 
-def _described_from(
-    history: History, window: Span, memory: Memory
-) -> ModalWindow | None:
+@remember
+def _grow_described(history: History, window: Span) -> ModalWindow | None:
     """Grow a window whose modes go on by themselves; None if they do not.
 
-    What comes out depends on the window alone, not on the td that was asked for first.
+    The result depends on the window alone, not on the td that was asked for first.
     """
-    key = ("described by modes", *window)
-    return memory.once(key, lambda: _look_in(history, window, memory))
-
-
-def _look_in(history: History, window: Span, memory: Memory) -> ModalWindow | None:
-    vibration = identify_window(history, window, memory)
+    vibration = identify_window(history, window)
     if vibration is None or not vibration.convinces:
         return None
-    return _grow_window(history, ModalWindow(vibration, window), memory)
+    return _grow_window(history, ModalWindow(vibration, window))
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
@@ -121,23 +114,27 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
     )
 
 
-def identify_window(
-    history: History, window: Span, memory: Memory
-) -> ModalVibration | None:
+def identify_window(history: History, window: Span) -> ModalVibration | None:
     """Identify the modes of the states in a window, once for all windows that hold the same states."""
-    time, energy = history.between(*window)
-    return memory.once(("lines", *get_ends(time)), lambda: identify_modal(time, energy))
+    time, _ = history.between(*window)
+    return _identify_states(history, *get_ends(time)) if time.size else None
 
 
-def _grow_window(
-    history: History, described: ModalWindow, memory: Memory
-) -> ModalWindow:
+@remember
+def _identify_states(
+    history: History, first: float, last: float
+) -> ModalVibration | None:
+    """Identify the modes of the states from one to another, by their times."""
+    return identify_modal(*history.between(first, last))
+
+
+def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
     """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
     for _ in range(_MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
             break
-        vibration = identify_window(history, span, memory)
+        vibration = identify_window(history, span)
         if vibration is None or not vibration.convinces:
             break
         described = ModalWindow(vibration, span)
