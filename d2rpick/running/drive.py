@@ -26,7 +26,7 @@ from d2rpick.running.sequence import (
     Order,
     choose_next_leg,
     collect_joined_legs,
-    find_window,
+    find_next_window,
 )
 from d2rpick.running.swing import find_swing
 
@@ -329,7 +329,7 @@ class Driver:
         """
         if legs[-1].findings.contact is None or first.number == 1:
             return ""
-        window = find_window(legs, self.limits)
+        window = find_next_window(legs, self.limits)
         if window.reason:
             return ""
         deformable_legs = collect_joined_legs(first._replace(kind=LOAD), legs)[:-1]
