@@ -126,6 +126,11 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
         spread + drift / speed, rel=1e-6
     )
     assert estimate_landing_spread(history, flight, None) == spread
+    for turning in (2.0, -0.5 * speed):  # the rotation moves the surface that touches
+        moved = estimate_landing_spread(history, flight, drift, turning)
+        assert moved == pytest.approx(spread + drift / (speed + turning), rel=1e-6)
+    receding = estimate_landing_spread(history, flight, drift, -speed)
+    assert receding == pytest.approx(spread + drift / speed, rel=1e-6)
     margin_kept = compute_margin(history, flight, place=drift)
     assert margin_kept.time == max(
         LEAST_MARGIN * require(flight.end), require(margin_kept.spread)

@@ -336,7 +336,14 @@ def _find_other_models(
     # without evidence of the next contact nothing is known about the time after td
     end = flight.end or (last if is_flying or situation.evidence.span else td)
     start = first if flight.start is None else flight.start
-    models = find_part_signs(history, Span(min(td, start), end))
+    around = Span(min(td, start), end)
+    is_guessed = flight.start is not None and flight.source == "energy"
+    if is_guessed:
+        # imported here: better evidence does not need it
+        from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
+
+        around = get_outer_window(history, around)
+    models = find_part_signs(history, around)
     is_sign_known = any(model.signed for model in models.values())
     if flight.start is None or is_sign_known or not is_doubtful(situation.whole):
         return models
@@ -344,10 +351,7 @@ def _find_other_models(
     settled = in_flight
     if flight.settled is not None:
         settled = in_flight._replace(start=flight.settled)
-    if flight.source == "energy":
-        # imported here: better evidence does not need it
-        from d2rpick.vibration.modal_span import get_inner_window
-
+    if is_guessed:
         inner = get_inner_window(history, in_flight)
         in_flight = inner if inner.start < td <= inner.end else in_flight
     return models | find_models(

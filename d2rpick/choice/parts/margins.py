@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.memory import remember
-from d2rpick.flight.margin import Margin, compute_margin
+from d2rpick.flight.margin import (
+    Margin,
+    compute_margin,
+    find_direction_of_approach,
+)
 
 if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
@@ -50,12 +54,20 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
     bodies = find_drift_of_bodies(history, flight, settings)
-    position_error = (
-        None
-        if bodies is None
-        else _find_largest_position_error(bodies, flight.start, flight.end)
-    )
-    return compute_margin(history, flight, place=position_error)
+    if bodies is None:
+        return compute_margin(history, flight)
+    position_error = _find_largest_position_error(bodies, flight.start, flight.end)
+    turning = compute_turning_speed(history, flight, bodies)
+    return compute_margin(history, flight, place=position_error, turning=turning)
+
+
+def compute_turning_speed(history: History, flight: Flight, bodies: Bodies) -> float:
+    """Return what the rotation of the bodies adds to their speed towards a contact where they touch [length/time].
+
+    0 if the momenta do not show a direction, or no deck shows how the bodies turn.
+    """
+    direction = find_direction_of_approach(history, flight)
+    return 0.0 if direction is None else bodies.compute_speed_at_front(direction)
 
 
 def _find_largest_position_error(
