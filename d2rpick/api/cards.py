@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
-from d2rpick.api.request import OPTIONS, Request
+from d2rpick.api.request import CHOOSING_FOR_CARDS, OPTIONS, Request
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.options import (
     POSITIVE,
@@ -19,7 +19,6 @@ from d2rpick.base.options import (
     make_option_name,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.options import CHOOSING_FOR_CARDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -13,7 +13,8 @@ from click.core import ParameterSource
 from d2rpick.api.cards import SETTINGS, Cards, list_solvers
 from d2rpick.api.request import JUDGING, write_option
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.options import UNLIMITED, Number, list_options
+from d2rpick.base.options import UNLIMITED, list_options
+from d2rpick.base.ranges import Number
 from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown_settings
 from d2rpick.cli import COMMANDS
 
