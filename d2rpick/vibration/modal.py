@@ -210,7 +210,7 @@ class ModalVibration:
         Second harmonic of a line that is, or may be, that of a stiffening spring, over the line; 0 without one [-].
     source : str
         The energy that the lines were found in.
-    second : Reading or None
+    second : ModalVibration or None
         What the lines of the kinetic energy say, beside those of the internal energy.
     last_resort : bool
         Whether nothing better is known, so that more doubts are allowed.
@@ -228,7 +228,7 @@ class ModalVibration:
     swinging: float = 0.0
     bent: float = 0.0
     source: str = "internal energy"
-    second: Reading | None = None
+    second: ModalVibration | None = None
     last_resort: bool = False
     kinetic: ClassVar = ""
     undescribed: ClassVar = "outside the part of the flight whose modes were identified"
@@ -351,7 +351,9 @@ class ModalVibration:
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         width_of_neglected = np.zeros_like(squared)
         if self.second is not None:
-            width_of_neglected = np.abs(self.second.residual_squared(tr, td) - squared)
+            second = self.second.reading.residual_squared(tr, td)
+            room = self.second.half_width(tr, td)
+            width_of_neglected = np.maximum(np.abs(second - squared) - room, 0.0)
         return np.asarray(
             _LEAST_HALF
             + _compute_effect_of_deformation(_NOT_LINEAR, squared)
@@ -496,13 +498,13 @@ def identify_modal(
 def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Return the result of the internal energy, its band widened to that of the kinetic energy, else the latter."""
+    """Return the result of the internal energy, its band widened towards that of the kinetic one, else the latter."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
         return kinetic
     if internal.signed:
-        return replace(internal, second=kinetic.reading)
+        return replace(internal, second=kinetic)
     return kinetic if _can_decide(internal, kinetic) else internal
 
 
