@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Least margin as a share of the flight. Landings of 36 computed runs (a car-like structure, a box with a block inside,
 # OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
-SHARE: Final = 0.03
+LEAST_MARGIN: Final = 0.03
 # Fewest states in which a force is looked for.
 _FEWEST: Final = 3
 # A contact grazes the body if its force stays below this share of the largest force on the body, or if it has changed
@@ -69,7 +69,7 @@ def compute_margin(
         return Margin(given, "given")
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
-    share = SHARE * (flight.end - flight.start)
+    share = LEAST_MARGIN * (flight.end - flight.start)
     spread = estimate_landing_spread(history, flight, place, turning)
     if spread is None or spread <= share:
         margin = Margin(share, "flight", spread)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.flight.margin import SHARE
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.window import FEWEST
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Limits(NamedTuple):
             return self.margin
         if idle and self.shortest:
             return self.shortest
-        return max(self.shortest, SHARE * flight)
+        return max(self.shortest, LEAST_MARGIN * flight)
 
     @property
     def same(self) -> float:

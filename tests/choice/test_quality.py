@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -26,7 +25,6 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.report.formats import DisplayOptions
 from d2rpick.report.suggestion import as_table
-from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.energies import make_energy_history, read_rollover, require
 from tests.reading import read_solved
@@ -100,9 +98,9 @@ def test_the_order_of_candidates(
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     """A jump from 49.6 to 82.4 ms, for td 3 ms later, would gain nothing: the mean energy after td hardly changes."""
-    history, known_fits, grades = read_solved("carT01.gz", parts).history, Fits(), []
+    history, grades = read_solved("carT01.gz", parts).history, []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
-        situation = examine_td(history, td, Settings(), known_fits)
+        situation = examine_td(history, td, Settings())
         best = require(next(rank_candidates([situation])).chosen)
         assert require(best.level_error) < 0.06
         grades.append(best.tr)
@@ -135,12 +133,6 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
     assert first(0.09) == best
 
 
-@cache
-def make_fits(_: float) -> Fits:
-    """Return the fits of a record, which do not depend on the limits."""
-    return Fits()
-
-
 @pytest.mark.parametrize(
     "limits",
     [{}, {"max_kinetic_share": 0.9, "max_residual": 0.95}, {"tolerance": 1e-3}],
@@ -152,7 +144,7 @@ def make_fits(_: float) -> Fits:
 def test_candidates_are_kept_together_as_one_by_one(
     history: History, td: float, limits: dict[str, float]
 ) -> None:
-    situation = examine_td(history, td, Settings(**limits), make_fits(td))  # type: ignore[arg-type]
+    situation = examine_td(history, td, Settings(**limits))  # type: ignore[arg-type]
     ranked = next(rank_candidates([situation]))
     assert len(ranked) > 3
     kept_flags = ranked.kept.tolist()

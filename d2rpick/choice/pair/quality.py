@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import list_names
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
@@ -15,6 +16,7 @@ from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.model import count_states_of_oscillator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
 
 # Errors of a deformation within this difference of the smallest are equally good [-]; the earliest safe tr wins then.
 EQUALLY_GOOD = 0.02
@@ -280,9 +282,12 @@ def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
     elif best.residual > POOR_RESIDUAL:
         causes.append(_describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
-        causes += situation.history.known.once(
-            ("flaws of the energy", situation.flight.start, situation.td),
-            lambda: _list_causes_of_record(situation),
+        fit = situation.evidence.fit
+        causes += _list_causes_of_record(
+            situation.history,
+            situation.flight.start,
+            situation.td,
+            count_states_of_oscillator(situation.history, fit) if fit else None,
         )
     return causes
 
@@ -320,12 +325,18 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     )
 
 
-def _list_causes_of_record(situation: Situation) -> list[Cause]:
-    """Return the causes why no level can be read from the samples of the flight up to td."""
-    start = situation.flight.start
-    _, energy = situation.history.between(
-        -np.inf if start is None else start, situation.td
-    )
+@remember
+def _list_causes_of_record(
+    history: History,
+    start: float | None,
+    td: float,
+    states_of_oscillator: float | None,
+) -> tuple[Cause, ...]:
+    """Return the causes why no level can be read from the samples of the flight, from its start up to td.
+
+    ``states_of_oscillator`` is the number of states per period of an oscillator near td, None without one.
+    """
+    _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
         causes.append(
@@ -334,16 +345,17 @@ def _list_causes_of_record(situation: Situation) -> list[Cause]:
                 "name the internal energy with `energy` or `parts`",
             )
         )
-    states = count_states_per_period(energy)
-    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        states_text = f"the record has {states:.2g} states per period"
+    counts = (count_states_per_period(energy), states_of_oscillator)
+    states = min((count for count in counts if count is not None), default=np.inf)
+    if states < MIN_SAMPLES_PER_PERIOD:
+        states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
                 "write the energies more often",
             )
         )
-    return causes
+    return tuple(causes)
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:

@@ -25,7 +25,6 @@ from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
 from d2rpick.vibration.measures import kinetic_share, vertices
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -135,7 +134,6 @@ def choose_td(
     history: History,
     window: tuple[float, float] | None,
     settings: Settings,
-    fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
@@ -154,9 +152,8 @@ def choose_td(
     RangeError
         If the window lies outside the record, or without one nothing in it shows a flight.
     """
-    fits = fits or Fits()
-    window = window or find_longest_flight(history, settings, fits)
-    look = make_look(history, settings, fits, since)
+    window = window or find_longest_flight(history, settings)
+    look = make_look(history, settings, since)
     situation, inside = find_best_known(look, history, window)
     choose = _choose_by_level if situation.vibration.unknown else _choose_by_residual
     choose = _choose_by_modes if situation.basis == "modal" else choose
@@ -182,7 +179,7 @@ def choose_td(
         else None
     )
     return Chosen(
-        make_look(history, settings, fits, since, quick=False)(td),
+        make_look(history, settings, since, quick=False)(td),
         window,
         inside,
         pair[1] if pair else None,
