@@ -12,7 +12,7 @@ from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.opening import Source, open_sources
 from d2rpick.histories.source import open_files, open_source
-from d2rpick.running.record import find_last_states, skip_states
+from d2rpick.running.record import find_last_states, hold_back_states, skip_states
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -120,7 +120,8 @@ class Looks:
             run = open_sources(whole_states, self._selection)
             points = _find_resume_points(run)
         run = add_surroundings(run, self._inventory)
-        return Reference.of(run, self._selection).history, points
+        history = Reference.of(run, self._selection).history
+        return hold_back_states(history), points
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
