@@ -56,9 +56,9 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     assert "residual unknown" in " ".join(judged.reasons)
 
 
-@given(rows)
+@given(rows, st.sampled_from([0.0, 0.2]))
 def test_the_order_of_candidates(
-    candidate_rows: list[tuple[float, float, int, bool]],
+    candidate_rows: list[tuple[float, float, int, bool]], alike: float
 ) -> None:
     rigid, error = (
         np.array([row[0] for row in candidate_rows]),
@@ -73,7 +73,12 @@ def test_the_order_of_candidates(
         np.array([row[3] for row in candidate_rows], dtype=bool),
     )
     order_found = order_by_quality(
-        group, error, rigid, is_out_of_place, np.full(3, EQUALLY_GOOD)
+        group,
+        error,
+        rigid,
+        is_out_of_place,
+        np.full(3, EQUALLY_GOOD),
+        np.full(3, alike),
     ).tolist()
     assert sorted(order_found) == list(range(len(candidate_rows)))
     assert [candidate_rows[i][2] for i in order_found] == sorted(group.tolist())
@@ -81,13 +86,13 @@ def test_the_order_of_candidates(
         ranked = [
             candidate_rows[i] for i in order_found if candidate_rows[i][2] == number
         ]
-        near = min(row[1] for row in ranked) + EQUALLY_GOOD
+        near = max(min(row[1] for row in ranked) + EQUALLY_GOOD, alike)
         good = [row for row in ranked if row[1] <= near]
         longest = max(row[0] for row in good)
         late = [row for row in good if row[0] < 0.9 * longest]
-        early = sorted(
-            (row for row in good if row not in late), key=lambda row: (row[3], -row[0])
-        )
+        long = [row for row in good if row not in late]
+        best = min(row[1] for row in long) + EQUALLY_GOOD
+        early = sorted(long, key=lambda row: (row[3], row[1] > best, -row[0], row[1]))
         rows_far_off = sorted(
             (row for row in ranked if row[1] > near), key=lambda row: (row[1], -row[0])
         )
@@ -404,10 +409,15 @@ def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> N
 
     def places(rounding: float) -> list[int]:
         noise = rounding * rng.standard_normal(count)
-        room = np.full(1, EQUALLY_GOOD)
-        return [
-            *map(int, order_by_quality(group, error + noise, rigid, out_of_place, room))
-        ]
+        order = order_by_quality(
+            group,
+            error + noise,
+            rigid,
+            out_of_place,
+            np.full(1, EQUALLY_GOOD),
+            np.zeros(1),
+        )
+        return [*map(int, order)]
 
     assert places(1e-16) == places(1e-7) == places(0.0)
     places_above = [
