@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.errors import HistoryError
 from d2rpick.histories.history import Given, History
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ class GrowingRecord:
         self._history: History | None = None
 
     def add(self, states: History) -> None:
-        """Append states; HistoryError if they have other quantities than the states so far."""
+        """Append states, which have the quantities of the states so far."""
         tables = list_tables(states)
         self._latest_tables = tables
         arrays = [_get_arrays(table) for table in tables]
@@ -69,12 +68,6 @@ class GrowingRecord:
             self._columns = [
                 {name: GrowingColumn() for name in table} for table in arrays
             ]
-        if [table.keys() for table in arrays] != [
-            table.keys() for table in self._columns
-        ]:
-            raise HistoryError(
-                "the states that were added hold other quantities than those before them"
-            )
         for columns, table in zip(self._columns, arrays, strict=True):
             for name, rows in table.items():
                 columns[name].add(rows)
@@ -166,11 +159,13 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
 def _count_known_states(table: Table, last_state: Table) -> int | None:
     """Return the states of a table up to the last one that was known; None if that is not in it."""
+    arrays, last_values = _get_arrays(table), _get_arrays(last_state)
+    if arrays.keys() != last_values.keys():
+        return None
     if not last_state.time.size:
         return 0
     count = int(np.searchsorted(table.time, last_state.time[0], side="right"))
-    arrays, last_values = _get_arrays(table), _get_arrays(last_state)
-    if not count or arrays.keys() != last_values.keys():
+    if not count:
         return None
     for name, rows in arrays.items():
         largest = float(np.max(np.nan_to_num(np.abs(rows)), initial=0.0))
