@@ -413,13 +413,14 @@ class Observer:
         if self._given is not None and not idle:
             longer = shown_wait is not None and shown_wait.time > self._given
             why = f"as given, but {why}" if longer else "as given"
+        flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
-        swing = find_swing(history, free, tr)
+        swing = find_swing(history, free, tr) if flies else None
         return LegFindings(
             free=free,
             wait=wait,
             why=why,
-            flies=bool(flights) and flights[-1].end is None,
+            flies=flies,
             tr=tr,
             idle=idle,
             short=self._find_short_flights(order, wait),
