@@ -415,7 +415,9 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     td = add_unit("td", history.time_unit)
     rigid.set(
-        ylabel="saved processor time" if cost else "rigid time", xlabel=td, ylim=(0, None)
+        ylabel="saved processor time" if cost else "rigid time",
+        xlabel=td,
+        ylim=(0, None),
     )
     for axes in panels:
         for offer, colour, name in (
