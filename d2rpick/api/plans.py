@@ -278,7 +278,7 @@ def plan(
     >>> import d2rpick as d2
     >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="flying")
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
-    [(0.124, 0.37)]
+    [(0.143, 0.345)]
     """
     shortest = arguments.check_optional_number("min_rigid", min_rigid, NOT_NEGATIVE)
     windows = arguments.check_windows("done", done)

@@ -125,7 +125,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Rate of damping proportional to mass.", NOT_NEGATIVE
     )
     v0: float | None = _make_oscillator_option(
-        "Velocity of the frame at time 0; the rest is at rest.", TIME, "vz0"
+        "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
     )
     no_verify: bool = make_option(
         "Judge by the energy level alone, without an oscillator.",
