@@ -35,7 +35,7 @@ class Choosing(TypedDict, total=False):
 
     ``after``: end of the load, ``landing``: the next contact (default: determined from the record).  ``margin``: time
     kept free after the load and before the next contact (default 0; if td is chosen or the landing is given, it is
-    derived).  ``tolerance``: largest lock-in error, or level error if no oscillator is known (0.2).
+    derived).  ``tolerance``: largest frozen-deformation error, or level error if no oscillator is known (0.2).
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: used instead of
     the identified one, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the only
     window in which the oscillator is identified.  ``replay`` False: judge by the energy level alone.  ``strict``:
@@ -354,9 +354,7 @@ def read_choosing(choosing: Choosing) -> dict[str, Any]:
     arguments: dict[str, Any] = dict(choosing)
     oscillator = _check_oscillator(arguments.pop("oscillator", None))
     if (oscillator is None) != (arguments.get("v0") is None):
-        raise ValueError(
-            "oscillator and v0 go together: the one vibrates because of the other"
-        )
+        raise ValueError("give oscillator and v0 together")
     if arguments.get("tolerance", 0.0) is None:
         del arguments["tolerance"]
     check_grade(arguments.get("min_quality"))

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
-_ONLY_JUDGED: Final = (
-    "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
-)
+_ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
 
 
 class CardOptions(TypedDict, total=False):

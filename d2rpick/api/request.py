@@ -191,7 +191,7 @@ class Request:
         *(NOT_NEGATIVE, "T"),
     )
     tolerance: float = make_option(
-        "Largest lock-in error, or level error if no oscillator describes the record.",
+        "Largest frozen-deformation error, or level error if no oscillator describes the record.",
         FRACTION,
         "L",
         default=0.2,
@@ -242,7 +242,7 @@ class Request:
         GRADES,
     )
     cost_share: float | None = make_option(
-        "Share of the cost of a time step that the elements of the switched parts take, to predict the run time.",
+        "Share of the cost of a time step that the elements of the switched parts take, to predict the CPU time.",
         *(FRACTION, "C"),
     )
     step_ratio: float | None = make_option(
@@ -292,7 +292,7 @@ class Request:
         """Refuse options that need a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
-                "`step_ratio` needs `cost_share` or `deck` too: the run time needs both"
+                "`step_ratio` needs `cost_share` or `deck` too: the CPU time depends on both"
             )
         if self.weights is not None and self.deck is None:
             raise ArgumentError(

@@ -65,11 +65,12 @@ class Settings:
 
     ``after``: end of the load, ``landing``: next contact (None: found from the record).  ``margin``: time kept clear
     after the load and before the next contact (None: 0, but if td is chosen or the landing given, what
-    `d2rpick.flight.margin` derives before the contact).  ``tolerance``: limit of the lock-in error, or of the level
-    error without an oscillator [-].  ``max_kinetic_share``, ``max_residual``: further limits of a recommendation, or
-    None [-].  ``oscillator``: given instead of identified.  ``fit_window``: window in which the oscillator is
-    identified.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr of a flight that is not
-    certain.  ``keep_vibration``: grade the vibration itself, even if its error is small relative to the next contact.
+    `d2rpick.flight.margin` derives before the contact).  ``tolerance``: limit of the frozen-deformation error
+    (without an oscillator of the level error) [-].  ``max_kinetic_share``, ``max_residual``: further limits of a
+    recommendation, or None [-].  ``oscillator``: given instead of identified.  ``fit_window``: window in which the
+    oscillator is identified.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr of a flight
+    that is not certain.  ``keep_vibration``: grade the vibration itself, even if its error is small relative to the
+    next contact.
     ``min_quality``: lowest grade of a pair that is planned, and that a deck passes with.
     ``cost_share``: share of the switched parts in the cost of a step; without it the run time stays unknown.
     ``step_ratio``: time step while rigid over that while deformable.  ``bodies``: rigid bodies that the parts become,

@@ -268,7 +268,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Lowest ratio of the mean energy after td to the reference's; the highest is as far above 1.",
+        "Lowest allowed ratio of the mean energy after td to that of the reference run; the highest is as far above 1.",
         FRACTION,
         "E",
     ),
@@ -342,7 +342,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     """List which parts of a run may be switched, and what sets of parts save.
 
     Each part is listed with its elements, material, mass and energy, and a verdict with its reasons.  Sets of parts
-    follow with the processor time that they save, and the recommended set.  --part adds a set to the comparison.
+    follow with the CPU time that they save, and the recommended set.  --part adds a set to the comparison.
 
     Examples
     --------
@@ -419,7 +419,7 @@ def plan(
 ) -> None:
     """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
 
-    HISTORY supports the windows up to and including the first that locks in energy, which moves the later landings.
+    HISTORY supports the windows up to and including the first that freezes vibration energy: it shifts later landings.
     Run with these windows, then plan the next ones from the switched run, with --done.
 
     Examples

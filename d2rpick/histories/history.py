@@ -375,7 +375,7 @@ class History:
         legs = find_later_legs(self.source)
         if not legs:
             return ""
-        return f"; in the same folder is {', '.join(legs)}, a later leg of the run? Name it too"
+        return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
 
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` are in the record."""

@@ -22,14 +22,14 @@ _LEG: Final = row(
     Field("kind", "text", "load, probe or rigid"),
     Field("length", "number"),
     Field("cycles", "integer?"),
-    Field("cpu", "number?", "processor time [s]"),
+    Field("cpu", "number?", "CPU time [s]"),
 )
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
     Field("legs", many(_LEG), "in the order they were computed, with those that were thrown away"),
     Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda answer: answer.saved[0]),
-    Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda answer: answer.saved[1]),
+    Field("saved_by_time", "number?", "the same, by the CPU time of the engine runs", lambda answer: answer.saved[1]),
 ))  # fmt: skip
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 
@@ -95,7 +95,7 @@ def list_savings(answer: Driven) -> list[tuple[str, str]]:
     """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
     words = zip(
         answer.saved,
-        ("by the cost model", "by the processor time of its legs"),
+        ("by the cost model", "by the CPU time of its engine runs"),
         strict=True,
     )
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]

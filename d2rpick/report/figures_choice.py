@@ -226,11 +226,11 @@ def _draw_energy(
     for number, band in enumerate(
         merge_windows(bands, (view.end - view.start) / STRETCHES)
     ):
-        label = "_" if number else "acceptable tr"
+        label = "_" if number else "admissible tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
     for acceptable, fill, name in (
-        (True, GOOD, "acceptable"),
-        (False, "none", "not acceptable"),
+        (True, GOOD, "admissible"),
+        (False, "none", "not admissible"),
     ):
         marked = [
             candidate for candidate in candidates if candidate.acceptable == acceptable
@@ -415,7 +415,9 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     td = add_unit("td", history.time_unit)
     rigid.set(
-        ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None)
+        ylabel="saves (share of the CPU time)" if cost else "rigid time",
+        xlabel=td,
+        ylim=(0, None),
     )
     for axes in panels:
         for offer, colour, name in (
@@ -474,7 +476,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
             label="_",
         )
     if answer.common.window:
-        mark_span(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
+        mark_span(axes, answer.common.window, "admissible in all runs", GOOD, alpha=0.2)
     _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
     axes.set(

@@ -132,7 +132,7 @@ CANDIDATE: Final = row(
     Field(
         "run_time_share",
         "size?",
-        "expected run time over that of the reference, with --cost-share",
+        "expected CPU time over that of the reference run; null without --deck or --cost-share",
     ),
     Field(
         "same_swing",
@@ -315,7 +315,7 @@ FRAME: Final = (
           "nothing of it is used",
           lambda answer: _get_history_holder(answer).settings.by_deck),
     Field("weights", maybe(row(*WEIGHTS, closed=True)),
-          "the cost of elements that the run time rests on; null where it does not rest on any", _get_weights),
+          "the cost of elements from which the CPU time is estimated; null if there are none", _get_weights),
 )  # fmt: skip
 
 

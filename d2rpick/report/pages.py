@@ -484,7 +484,7 @@ def _build_set_card(best: PartSet | None) -> Markup:
         "span",
         make_element("i", "saves about"),
         f"{best.saving:.0%}",
-        make_element("i", " of the processor time"),
+        make_element("i", " of the CPU time"),
     )
     listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
     return make_element(
@@ -519,7 +519,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         )
     ]
     cards = cards or [make_element("p", "No flight was switched.")]
-    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
+    caption = "Internal energy while the parts are deformable, with the rigid windows; while rigid it means nothing"
     flights = [(window.free, window.contact or window.td) for window in switched]
     rigid = [(window.tr, window.td) for window in switched]
     return build_document(

@@ -45,7 +45,7 @@ _POSITION: Final = (
     "position_error_assumes",
 )
 # Columns that are left out first if the table would be too wide.
-_SPARE: Final = ("margin", "processor time", "out of place", "error")
+_SPARE: Final = ("margin", "CPU time", "out of place", "error")
 
 
 def _get_time(row: PlannedFlight, at: int) -> float | None:
@@ -253,7 +253,7 @@ def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = "print the cards with -f card, and run the deck with them from the start"
     if plan.done:
-        cards += "; they hold the windows that are done too"
+        cards += "; they contain the windows that are done too"
     again = "; then plan the others from that run (--done)" if waiting else ""
     return [("next", f"{cards}{again}")]
 
@@ -322,7 +322,7 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
         if row.candidate and row.candidate.position_error_assumes
     ]
     if assumed:
-        deck_hint = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        deck_hint = "; `deck` shows which do" if plan.settings.bodies is None else ""
         listed = ", ".join(
             f"flight {row.number} by {_format_place_error(row)}" for row in assumed
         )
@@ -342,7 +342,7 @@ def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]
         for row in plan.flights
     )
     unknown = [
-        *["processor time"] * (plan.settings.cost_share is None),
+        *["CPU time"] * (plan.settings.cost_share is None),
         *["out of place"] * (not placed),
     ]
     return tables.fill_table(
@@ -383,7 +383,7 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "tr": lambda row: _get_time(row, 0),
     "td": lambda row: _get_time(row, 1),
     "rigid for": lambda row: row.rigid_time,
-    "processor time": lambda row: tables.format_if_known(
+    "CPU time": lambda row: tables.format_if_known(
         row.candidate.run_time_share if row.candidate else None, ".0%"
     ),
     "error": format_pair_error,

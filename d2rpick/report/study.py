@@ -86,7 +86,7 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
     Field("agree", "flag?", "Whether the intervals tr_low to tr_high of these runs have a time in common."),
     Field("common_tr", "number?",
-          "The tr of all runs where they agree, else the earliest that is acceptable in every run of status ok or none "
+          "The tr of all runs where they agree, else the earliest that is admissible in every run of status ok or none "
           "and within the timing tolerance of each, where there is one.", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "What to do with common_tr, by the worst run: its own pair, and its error at this tr.",
@@ -109,11 +109,11 @@ _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
-          "Windows of acceptable tr, and those in which the error is at most 0.05 above that of tr."),
+          "Intervals of admissible tr, and those in which the error is at most 0.05 above that of tr."),
     Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
     Field("asked", "text", "Stands for the options and the version."),
     Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
-    Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
+    Field("profile", maybe(_CURVE), "Times and errors of admissible tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3

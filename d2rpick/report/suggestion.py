@@ -48,7 +48,7 @@ CANDIDATE: Final = row(
 
 # Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+_IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 
 
 def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
@@ -74,14 +74,15 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     *keys.FRAME,
     Field("td", "number"),
     Field("td_window", "span?",
-          "where td was chosen: --td-window, or the longest flight; null where it was given"),
+          "range in which td was chosen: --td-window, or the longest flight; null if td was given"),
     Field("longer_pair", maybe(keys.PAIR),
-          "the longest acceptable pair in td_window, where much rigid time was given up for quality",
+          "the longest pair in td_window with an admissible tr, if much rigid time was given up for a smaller error",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     Field("candidates", many(CANDIDATE), get=_add_decisions),
     Field("acceptable_windows", maybe(many(_WINDOW)),
-          "on basis energy: windows in which every tr is acceptable, null on another basis", _list_acceptable_windows),
+          "on basis energy: intervals in which every tr is admissible, null on another "
+          "basis", _list_acceptable_windows),
     Field("recommended", maybe(keys.TIMES)),
     *keys.QUALITY,
     keys.HEALTH,
@@ -183,7 +184,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     if saves := format_saving(best):
         lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
-        lines.append(("keeps", "no switch keeps this vibration"))
+        lines.append(("keeps", "nothing of the vibration: no tr can keep it"))
     if exact := format_accuracy(best):
         lines.append(("tr", exact))
     return lines
@@ -206,7 +207,7 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
     """Return in which respect the better pair is better."""
     recommended = answer.recommended
     if recommended is None:
-        return "there an acceptable tr exists"
+        return "it has an admissible tr"
     if better.residual is not None and recommended.residual is not None:
         residuals = [
             tables.format_measure(pair.residual) for pair in (better, recommended)
@@ -214,14 +215,14 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
         return f"residual {residuals[0]} instead of {residuals[1]}"
     level = answer.situation.vibration.whole.energy(better.td)
     own_level = answer.situation.energy_td
-    return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
+    return f"the energy at td is {level / own_level:.3g} times as high, so more of the vibration can be kept"
 
 
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
     if answer.windows:
-        lines = [("acceptable", describe_acceptable_windows(answer.windows, chosen))]
+        lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
     else:
         lines = []
     best = answer.chosen
@@ -245,14 +246,14 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
     """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
-    taken += " (`deck` tells which do)" if taken and not deck else ""
+    taken += " (`deck` shows which do)" if taken and not deck else ""
     if best.position_error_part is None:
-        return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
+        return f"in place at td{taken}, as far as the parts show: none moves relative to the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
     bound_text = "at least " if best.position_error_is_lower_bound else ""
     size = f"{bound_text}{best.position_error:.2g}"
-    return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    return f"out of place by {size} at td{body}{taken}: {best.position_error_part} is frozen at another place"
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
@@ -263,7 +264,10 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
         better_quality = f"residual {tables.format_measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
+    return (
+        f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for a "
+        "smaller error"
+    )
 
 
 def describe_acceptable_windows(
@@ -321,7 +325,7 @@ def build_candidate_table(
         "direction": lambda c: {True: "same", False: "opposite", None: None}[
             c.sign_match
         ],
-        "lock-in error": lambda c: tables.format_measure(c.lock_in_error),
+        "frozen-deformation error": lambda c: tables.format_measure(c.lock_in_error),
         "residual": lambda c: tables.format_measure(c.residual),
         "timing tolerance": lambda c: tables.format_if_known(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,

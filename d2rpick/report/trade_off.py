@@ -34,7 +34,7 @@ OFFER: Final = row(
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
     Field("reason", "text?", "why no tr is recommended", lambda offer: offer.answer.why_none or None),
-    Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
+    Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: intervals in which every tr is admissible",
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
@@ -59,7 +59,7 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+_NOT_HALVED: Final = "halves the error and keeps half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -96,7 +96,7 @@ def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     best = trade_off.recommended
     decision = best.decision_with_cure if best else None
     if best is None or best.best is None or decision is None:
-        return [("no pair to use", "no td in the window has an acceptable tr")]
+        return [("no pair to use", "no td in the range has an admissible tr")]
     return list_verdict_lines(decision, best.best.tr, best.td)
 
 
@@ -126,10 +126,10 @@ def give_answer(trade_off: TradeOff) -> str:
     step = trade_off.step
     unit = trade_off.situation.history.time_unit
     if start is None:
-        return "no td in the window has an acceptable tr"
+        return "no td in the range has an admissible tr"
     start_text = f"td = {start.td:.6g}" + ("" if trade_off.asked else " saves the most")
     if start.best is None:
-        quality_text = f"{start_text} has no acceptable tr"
+        quality_text = f"{start_text} has no admissible tr"
         return (
             quality_text
             if step is None
@@ -141,7 +141,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"{start_text}: {_format_offer_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
+        return f"{quality_text}; no other td in the range {'is better' if small else _NOT_HALVED}"
     distance = _describe_distance(start, step, unit)
     error_change = _describe_error_change(start, step)
     cost_change = _describe_cost_change(start, step)
@@ -152,18 +152,19 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
     *keys.FRAME,
     Field("td", "number?", "the td that was asked for", lambda trade_off: trade_off.asked and trade_off.asked.td),
     Field("td_window", "span",
-          "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
+          "the explored range of td: the given one or the longest flight, less the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
     Field("answer", "text", "the shortest sensible answer", give_answer),
     Field("recommended", maybe(keys.TIMES)),
     Field("start", "number?",
-          "td of the offer that the answer starts from: the one asked for, else the one that saves most",
+          "td of the offer that the answer starts from: the given one, else the one that is rigid for longest",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
+          "the nearest Pareto-optimal td with at most half the error at start, else the recommended "
+          "one if its error is smaller",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
-          "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
+          "by ascending td: a grid, the peaks of the energy, the given td and the recommended one"),
 ))  # fmt: skip
 
 
@@ -178,7 +179,7 @@ def _describe_error_change(start: Offer, step: Offer) -> str:
     """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
-        return "brings the level below twice the mean energy"
+        return "brings the energy at td below twice its mean"
     assert step.error is not None
     halves = _HALF[0] * start.error <= step.error <= _HALF[1] * start.error
     return f"{'halves the error' if halves else 'cuts the error'} to {step.error:.3f}"
@@ -189,8 +190,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no processor time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's processor time"
+            return "costs no CPU time"
+        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's CPU time"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -204,7 +205,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 def _format_offer_error(offer: Offer) -> str:
     """Return the error of an offer with its name."""
     if offer.error is None:
-        return "a level above twice the mean energy"
+        return "an energy above twice its mean"
     if offer.basis == "energy":
         return (
             f"error {tables.format_measure(offer.error)} (shortfall of the level at td)"
@@ -262,7 +263,7 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "kinetic fraction": lambda offer: tables.format_measure(offer.kinetic_share),
     "rigid for": lambda offer: offer.rigid_time,
     "of simulated time": _make_getter_of_best("rigid_fraction", ".1%"),
-    "processor time": _make_getter_of_best("run_time_share", ".0%"),
+    "CPU time": _make_getter_of_best("run_time_share", ".0%"),
     "timing tolerance": _make_getter_of_best("timing_tolerance", ".1e"),
     "verdict": lambda offer: (
         format_in_short(offer.decision) if offer.decision else offer.answer.why_none

@@ -51,7 +51,7 @@ EXPLANATIONS: Final = {
         "Check which contact acts. Write the momenta of the parts, which show whether it acts on them.",
     ),
     "cost-unknown": Explanation(
-        "The processor time that is saved cannot be estimated. The verdict on the pair does not depend on it.",
+        "The CPU time that is saved cannot be estimated. The verdict on the pair does not depend on it.",
         "Name the parts to be switched with --part, and the deck of the run with --deck.",
     ),
     "cut-runs": Explanation(
@@ -336,7 +336,7 @@ EXPLANATIONS: Final = {
         "Leave the part out of --part.",
     ),
     "weights-by-analogy": Explanation(
-        "The cost of some element formulations was not measured, so the saved processor time is a rough "
+        "The cost of some element formulations was not measured, so the saved CPU time is a rough "
         "estimate. The "
         "verdict on the pair does not depend on it.",
         "Calibrate with runs of your solver: d2rpick calibrate.",

@@ -355,7 +355,7 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
         return
     if candidate.lock_in_error is not None:
         error = candidate.lock_in_error
-        quantity = "lock-in error"
+        quantity = "frozen-deformation error"
     elif candidate.level_error is not None:
         error = candidate.level_error
         quantity = "level error"

@@ -436,7 +436,8 @@ def _check_times_of_history(case: Case) -> Iterator[Objection]:
 def _check_locked_in_error(case: Case) -> Iterator[Objection]:
     """While a part is rigid it keeps the deformation that it had at tr, and it springs back at td. This deformation
     should be the one that the part would have at td: same energy, same direction. d2rpick judges the parts that share a
-    window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in error
+    window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the
+    frozen-deformation error
     if an oscillator describes the history, else the level error.
 
     Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.

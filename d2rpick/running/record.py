@@ -68,7 +68,7 @@ class GrowingRecord:
             table.keys() for table in self._columns
         ]:
             raise HistoryError(
-                "the states that were added hold other quantities than those before them"
+                "the new states have other quantities than those before them"
             )
         for columns, table in zip(self._columns, arrays, strict=True):
             for name, rows in table.items():

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 # Cures of a pair that is not admissible: one for any pair, and one for a recommended pair whose finished switched run
 # contradicts the recommendation.
-CHOOSE_ANOTHER: Final = "choose another pair, as d2rpick suggest names it"
+CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
-    "check that the switched run was switched at these times and differs from the reference run in nothing else; "
+    "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
 # A worst case within this difference of the expected residual is shown as the same [-].
@@ -91,13 +91,11 @@ class Decision(NamedTuple):
     def expected(self) -> str:
         """Description of the expected time after td."""
         if self.at_rest:
-            return (
-                "the same as in the reference: nothing vibrates in the flight up to td"
-            )
+            return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
         if self.kept is not None:
             parts.append(
-                f"{format_bounds(self.kept)} of the reference's mean energy after td"
+                f"{format_bounds(self.kept)} of the mean energy of the reference run after td"
             )
         if self.residual is not None:
             parts.append(f"vibration wrong by {self.residual:.1%}")

@@ -93,8 +93,8 @@ def find_alike_windows(
 ) -> Samples:
     """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
 
-    The timing tolerance of a candidate is the time by which it may be off before its lock-in error grows by 0.05.  On
-    the energy alone the level error replaces the lock-in error.
+    The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
+    0.05.  On the energy alone the level error replaces that error.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _compute_residual_left(situation: Situation) -> float:
-    """Return the lock-in error that --max-residual allows in addition to the kinetic fraction: R^2 = L^2 + K [-]."""
+    """Return the frozen-deformation error that --max-residual allows besides the kinetic fraction K: R^2 = L^2 + K."""
     limit = situation.settings.max_residual
     share = situation.kinetic_share
     if limit is None:

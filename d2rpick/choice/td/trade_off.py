@@ -335,12 +335,12 @@ def _warn_about_window(
         kept_clear = window[1] - inside[1]
         yield Caution(
             "margin-kept",
-            f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
+            f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
         )
     if not any(map(_is_comparable, offers)):
         yield Caution(
             "no-candidate",
-            "no td in the window has an acceptable tr that saves anything",
+            "no td in the range has an admissible tr",
         )
 
 
