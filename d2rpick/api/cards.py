@@ -21,6 +21,7 @@ from d2rpick.api.request import (
 )
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.judged_card import CardRequest
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
@@ -323,6 +325,15 @@ class JudgedCard(NamedTuple):
     def verified(self) -> bool:
         """True if all windows are verified."""
         return all(verdict.verified for verdict in self.verdicts)
+
+    @property
+    def worst(self) -> Decision | None:
+        """Verdict on the worst of the judged windows; None if none was judged."""
+        return min(
+            (verdict.decision for verdict in self.verdicts),
+            key=lambda decision: GRADES.index(decision.grade),
+            default=None,
+        )
 
     @property
     def passed(self) -> bool:

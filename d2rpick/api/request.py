@@ -38,6 +38,8 @@ JUDGING: Final = (
     "landing",
     "margin",
     "tolerance",
+    "max_kinetic_share",
+    "max_residual",
     "min_quality",
 )
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
@@ -197,7 +199,7 @@ class Request:
         default=0.2,
     )
     max_kinetic_share: float | None = make_option(
-        "Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K"
+        "Reject a td with a larger kinetic fraction.", NOT_NEGATIVE, "K"
     )
     max_residual: float | None = make_option(
         "Reject a pair with a larger residual.", NOT_NEGATIVE, "R"

@@ -156,9 +156,6 @@ def suggest(
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
     answer = suggest_for_question(question, wanted)
-    # a given td is answered, however poor it is
-    min_grade = request.min_quality or ("poor" if td is not None else "fair")
-    passed = answer.decision is not None and answer.decision.reaches(min_grade)
     new_cautions = [
         caution
         for caution in answer.cautions
@@ -178,11 +175,13 @@ def suggest(
                 for caution in collect_cautions(judged_card)
                 if caution not in answer.cautions
             ]
-        return output.finish(
-            objection=not (output.card(judged_card, new_cautions) and passed),
-        )
+        output.card(judged_card, new_cautions)
+        decision = judged_card.worst if judged_card else None
+        return output.finish_by_verdict(decision, question.settings.min_quality)
     output.answer(answer)
-    return output.finish(objection=not passed)
+    # a given td is answered, however poor it is; only a card must not be used unseen
+    min_quality = request.min_quality or ("poor" if td is not None else "fair")
+    return output.finish_by_verdict(answer.decision, min_quality)
 
 
 @options.make_command
@@ -247,9 +246,8 @@ def explore(
     )
     output.answer(answer)
     chosen = answer.recommended
-    min_grade = question.settings.min_quality
-    passed = chosen and chosen.decision and chosen.decision.reaches(min_grade)
-    output.finish(objection=not passed)
+    decision = chosen.decision if chosen else None
+    output.finish_by_verdict(decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -310,7 +308,7 @@ def verify(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish(objection=not answer.decision.reaches(question.settings.min_quality))
+    output.finish_by_verdict(answer.decision, question.settings.min_quality)
 
 
 @options.make_command

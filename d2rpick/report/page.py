@@ -481,20 +481,38 @@ def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
     )
 
 
-def build_solver_input(times: tuple[float, float], record: PageContext) -> Markup:
-    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+def build_solver_input(
+    decision: Decision, times: tuple[float, float], record: PageContext
+) -> Markup:
+    """Return the D2R card of a pair, or the command that prints it; folded below the verdict "do not use"."""
     title = "Solver input"
+    contents = _list_solver_input(times, record)
+    if decision.verdict != DO_NOT_USE:
+        return build_section(title, *contents)
+    badge = make_element("span", decision.verdict, class_="badge refused")
+    return build_section(
+        title,
+        make_element("p", badge),
+        make_element("p", f"{decision.reason}. To improve: {decision.cure}."),
+        make_element(
+            "details",
+            make_element("summary", "Show the card that must not be used"),
+            *contents,
+        ),
+    )
+
+
+def _list_solver_input(
+    times: tuple[float, float], record: PageContext
+) -> tuple[Markup, ...]:
+    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
     card = record.card
     assert card is not None
     if card.refusal:
-        return build_section(
-            title,
-            make_element(
-                "p", f"No card can be printed for these times: {card.refusal}"
-            ),
-        )
+        text = f"No card can be printed for these times: {card.refusal}"
+        return (make_element("p", text),)
     if card.text:
-        return build_section(title, make_element("pre", card.text, tabindex="0"))
+        return (make_element("pre", card.text, tabindex="0"),)
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += ["--solver", card.solver] if card.solver else []
     line = make_element(
@@ -502,9 +520,7 @@ def build_solver_input(times: tuple[float, float], record: PageContext) -> Marku
         quote_shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
         class_="wrap",
     )
-    return build_section(
-        title, make_element("p", "Printed, and judged again as printed, by"), line
-    )
+    return (make_element("p", "Printed, and judged again as printed, by"), line)
 
 
 def _build_input(situation: Situation, run: OpenedRun) -> Markup:

@@ -125,9 +125,9 @@ def _build_lower_sections(
     yield build_section("Candidates", *_build_candidates(answer))
     yield page.build_part_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
-    if answer.recommended:
+    if answer.recommended and answer.decision:
         yield page.build_solver_input(
-            (answer.recommended.tr, answer.recommended.td), record
+            answer.decision, (answer.recommended.tr, answer.recommended.td), record
         )
 
 
@@ -215,7 +215,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         )
     yield from page.build_evidence(situation, answer.health, record)
     if record.card:
-        yield page.build_solver_input(times, record)
+        yield page.build_solver_input(answer.decision, times, record)
 
 
 def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:

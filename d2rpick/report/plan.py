@@ -45,7 +45,8 @@ _POSITION: Final = (
     "position_error_assumes",
 )
 # Columns that are left out first if the table would be too wide.
-_SPARE: Final = ("margin", "CPU time", "out of place", "error")
+_OUT_OF_PLACE: Final = "out of place"
+_SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "error")
 
 
 def _get_time(row: PlannedFlight, at: int) -> float | None:
@@ -184,6 +185,8 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
     else:
         rows = "no flight"
     below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
+    if _OUT_OF_PLACE not in rows.partition("\n")[0]:
+        below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
     steps = tables.format_in_line(list_next_steps(plan), 4)
@@ -335,6 +338,17 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
     return lines
 
 
+def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return the position errors that the remarks do not name, for a table without a column for them."""
+    return [
+        (f"flight {row.number}", f"out of place at td by {_format_place_error(row)}")
+        for row in plan.flights
+        if row.candidate
+        and row.candidate.position_error is not None
+        and not row.candidate.position_error_assumes
+    ]
+
+
 def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of all flights; CPU time and position error only if they are known."""
     placed = any(
@@ -343,7 +357,7 @@ def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]
     )
     unknown = [
         *["CPU time"] * (plan.settings.cost_share is None),
-        *["out of place"] * (not placed),
+        *[_OUT_OF_PLACE] * (not placed),
     ]
     return tables.fill_table(
         {name: cell for name, cell in _COLUMNS.items() if name not in unknown},
@@ -387,7 +401,7 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
         row.candidate.run_time_share if row.candidate else None, ".0%"
     ),
     "error": format_pair_error,
-    "out of place": _format_place_error,
+    _OUT_OF_PLACE: _format_place_error,
     "verdict": lambda row: row.decision.verdict if row.decision else None,
     "when": lambda row: _WHEN[row.status],
 }

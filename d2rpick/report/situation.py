@@ -45,7 +45,7 @@ def list_situation_heading(
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
-    kinetic = "" if share is None else f", kinetic share {format_measure(share)}"
+    kinetic = "" if share is None else f", kinetic fraction {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", describe_input(situation.history)),

@@ -96,7 +96,7 @@ def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     best = trade_off.recommended
     decision = best.decision_with_cure if best else None
     if best is None or best.best is None or decision is None:
-        return [("no pair to use", "no td in the range has an admissible tr")]
+        return [("no pair to use", _explain_why_no_pair(trade_off))]
     return list_verdict_lines(decision, best.best.tr, best.td)
 
 
@@ -127,7 +127,9 @@ def give_answer(trade_off: TradeOff) -> str:
     unit = trade_off.situation.history.time_unit
     if start is None:
         return "no td in the range has an admissible tr"
-    start_text = f"td = {start.td:.6g}" + ("" if trade_off.asked else " saves the most")
+    start_text = f"td = {start.td:.6g}"
+    if not trade_off.asked:
+        start_text += f" {_describe_longest(start)}"
     if start.best is None:
         quality_text = f"{start_text} has no admissible tr"
         return (
@@ -166,6 +168,19 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
     Field("offers", many(OFFER),
           "by ascending td: a grid, the peaks of the energy, the given td and the recommended one"),
 ))  # fmt: skip
+
+
+def _explain_why_no_pair(trade_off: TradeOff) -> str:
+    """Explain why no td has a pair by the td of the highest energy, of which most could be kept."""
+    if not trade_off.offers:
+        return "no td in the range has an admissible tr"
+    highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
+    return f"no td in the range has an admissible tr; td = {highest.td:.6g}: {highest.answer.why_none}"
+
+
+def _describe_longest(start: Offer) -> str:
+    """Return in which respect the td from which the comparison starts exceeds the others."""
+    return "is rigid for longest" if start.saving is None else "saves the most CPU time"
 
 
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:

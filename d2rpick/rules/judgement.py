@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
+from d2rpick.choice.pair.quality import list_exceeded_limits
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
@@ -279,10 +280,13 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     error.
     """
     faults = [*_judge_flight(verdict), *_judge_error(verdict)]
-    if not verdict.admissible and not faults:
+    situation, decision = verdict.situation, verdict.decision
+    exceeded = list_exceeded_limits(situation, verdict.candidate)
+    if exceeded:
+        faults.append(Fault("D2R209", False, "; ".join((*exceeded, decision.cure))))
+    elif not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
-    situation, decision = verdict.situation, verdict.decision
     if verdict.admissible and not decision.reaches(situation.settings.min_quality):
         what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
         yield Fault("D2R209", False, what)
@@ -350,7 +354,7 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     if situation.at_rest:
         return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
     if candidate.sign_match is False:
-        quantity = "the deformation at tr has the opposite sign of that at td"
+        quantity = "at tr the deformation has the opposite direction"
         yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
         return
     if candidate.lock_in_error is not None:

@@ -448,7 +448,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0122659", "0.064"))
 @make_rule_decorator(
-    "D2R202", ERROR, "the deformation at tr has the opposite sign of that at td", BOTH
+    "D2R202", ERROR, "at tr the deformation has the opposite direction", BOTH
 )
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
@@ -485,7 +485,7 @@ def _check_kinetic_share(case: Case) -> Iterator[Objection]:
 def _check_quality(case: Case) -> Iterator[Objection]:
     """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
     not show that they will be right. Judged as d2rpick verify does. --min-quality good also reports pairs that are
-    only fair, --min-quality poor reports none.
+    only fair, --min-quality poor reports none. A pair beyond --max-residual or --max-kinetic-share is reported too.
 
     Fix: Use the pair that the finding names. If it names none, do what it says would improve the pair.
     """

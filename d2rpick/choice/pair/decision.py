@@ -81,11 +81,12 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.quality.reasons:
-            return "; ".join(self.quality.reasons)
-        if self.at_rest:
+        if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
-        return _explain_why_good(self.quality, self.residual)
+        reasons = "; ".join(self.quality.reasons)
+        if not reasons:
+            return _explain_why_good(self.quality, self.residual)
+        return f"{reasons}{_explain_raised_grade(self.quality)}"
 
     @property
     def expected(self) -> str:
@@ -169,11 +170,15 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f": it is wrong by {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
-    share = quality.worth.share if quality.worth else 0.0
-    reasons = "; ".join(quality.alone.reasons)
-    return (
-        f"{reasons}, but that is at most {share:.2%} of the energy of the next contact"
-    )
+    return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
+
+
+def _explain_raised_grade(quality: Quality) -> str:
+    """Explain why the error of the vibration hardly matters; empty if the vibration is graded by itself."""
+    if quality.worth is None or quality.alone.grade == quality.vibration.grade:
+        return ""
+    share = quality.worth.share
+    return f", but that is at most {share:.2%} of the energy of the next contact"
 
 
 def format_bounds(kept: Kept) -> str:

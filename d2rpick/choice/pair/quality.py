@@ -142,7 +142,7 @@ def list_exceeded_limits(situation: Situation, candidate: Candidate) -> tuple[st
     """Return a message for each of --max-kinetic-share and --max-residual that is exceeded or cannot be judged."""
     settings = situation.settings
     limits = (
-        ("kinetic share", situation.kinetic_share, settings.max_kinetic_share),
+        ("kinetic fraction", situation.kinetic_share, settings.max_kinetic_share),
         ("residual", candidate.residual, settings.max_residual),
     )
     messages = []
