@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
-from d2rpick.base.errors import DeckError, give_if_written
+from d2rpick.base.errors import D2RPickError, DeckError, give_if_written
 from d2rpick.base.files import write_as_a_whole
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
-    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.trade_off import TradeOff
     from d2rpick.report.formats import DisplayOptions
@@ -175,28 +174,34 @@ class RunAnswer(Paged):
         """Return what a page shows besides the answer, with the card of the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
-        card = self._card(cards, *chosen) if chosen else None
-        return PageContext(
+        context = PageContext(
             self.question.reference.run,
             command,
             judging,
-            card,
             explorer=self._explorer([explored]),
         )
+        if chosen is None:
+            return context
+        return self._add_card(context, cards or Cards(), *chosen)
 
-    def _card(
-        self, cards: Cards | None, situation: Situation, tr: float
-    ) -> SolverInput:
-        """Return the card of a tr with the notes of the run's deck, or the reason why there is none."""
-        from d2rpick.choice.judged_card import SolverInput, print_solver_input
+    def _add_card(
+        self, context: PageContext, cards: Cards, situation: Situation, tr: float
+    ) -> PageContext:
+        """Add the card of a tr to a page, or the reason why it cannot be printed."""
+        from d2rpick.choice.judged_card import complete_printing, print_pair
+        from d2rpick.deck.printed_card import Printing
 
         try:
-            suited, _ = (cards or Cards()).by_deck(self.question)
+            printing, _ = cards.complete(self.question)
         except DeckError as error:
-            return SolverInput("", "part", refusal=str(error))
-        return print_solver_input(
-            self.question.reference, situation, tr, suited.request(self.question)
-        )
+            return context._replace(printing=Printing(), refusal=str(error))
+        completed = complete_printing(printing, situation.history)
+        context = context._replace(printing=completed)
+        try:
+            card = print_pair(self.question.reference, situation, tr, printing)
+        except D2RPickError as error:
+            return context._replace(refusal=str(error))
+        return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
         """Return what can be explored on a page, and the command line that asks for each td."""

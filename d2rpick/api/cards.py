@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
-from d2rpick.api.request import (
-    OPTIONS,
+from d2rpick.api.request import OPTIONS, Request
+from d2rpick.base.errors import ArgumentError, Caution
+from d2rpick.base.options import (
     POSITIVE,
     TIME,
     UNLIMITED,
-    Number,
     Option,
-    Request,
     list_options,
     make_option,
     make_option_name,
 )
-from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.options import CHOOSING_FOR_CARDS
 from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
@@ -28,9 +27,9 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Parts
     from d2rpick.api.asked import RunQuestion
+    from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
-    from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
@@ -62,44 +61,19 @@ class CardOptions(TypedDict, total=False):
     wall: int | None
 
 
-class Judging(CardOptions, total=False):
-    """Options of a card, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
+if TYPE_CHECKING:
 
-    after: float | None
-    landing: float | None
-    margin: float | None
-    tolerance: float | None
+    class Judging(CardOptions, JudgingOptions, total=False):
+        """Options of a card, and how the windows are judged."""
 
 
 def _check_option(name: str, value: Any, option: Option) -> Any:
-    """Return a value converted to the kind of its option."""
+    """Return a value converted to the kind of its option; the solvers are known only where a card is printed."""
     from d2rpick.api import arguments
 
-    kind = option.kind
-    if option.many:
-        return arguments.list_part_names(name, value)
-    if option.pair:
-        is_pair = (
-            hasattr(value, "__len__")
-            and hasattr(value, "__iter__")
-            and getattr(value, "ndim", 1) == 1
-        )
-        if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
-            raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
-        return tuple(
-            arguments.check_whole_number(name, number, _IDS.start) for number in value
-        )
-    if isinstance(kind, range):
-        return arguments.check_whole_number(name, value, kind.start)
-    if isinstance(kind, Number):
-        return arguments.check_number(name, value, kind)
-    if not isinstance(value, str):
-        raise TypeError(f"{name} is {value!r}, a text was expected")
-    if kind == "solver" and value not in list_solvers():
-        raise ValueError(
-            f"{name} is {value!r}, one of {', '.join(list_solvers())} was expected"
-        )
-    return value
+    if option.kind == "solver":
+        option = option._replace(kind=tuple(list_solvers()))
+    return arguments.check_option(name, value, option)
 
 
 def list_solvers() -> Sequence[str]:
@@ -146,13 +120,6 @@ class Cards:
     wall: int | None = make_option(
         "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
     )
-    starter: str = ""  # cards to be added to the starter deck
-    sensor: int = 901  # first free id of sensors
-    delete_nodal_bodies: bool = False  # see Printing
-    delete_node_sets: bool = False
-    replaced: tuple[
-        int, ...
-    ] = ()  # main nodes of bodies to be removed from the starter deck
 
     @classmethod
     def of(cls, arguments_of_card: CardOptions) -> Cards:
@@ -179,22 +146,13 @@ class Cards:
             if name != "solver" and getattr(self, name) not in (None, ())
         ]
 
-    def printing(self, parts: Sequence[int] = ()) -> Printing:
-        """Return the content of a card besides its times and its solver."""
-        from d2rpick.deck.printed_card import Printing
-
+    def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
+        """Return what is printed with the given options, and these parts to switch."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_numbers("--node", self.node))
-        return Printing(
-            part=tuple(parts),
-            starter=self.starter,
-            sensor=self.sensor,
-            replaced=self.replaced,
-            delete_nodal_bodies=self.delete_nodal_bodies,
-            delete_node_sets=self.delete_node_sets,
-            **values,
-        )
+        solver = self.solver or printing.solver
+        return printing._replace(solver=solver, part=tuple(parts), **values)
 
     def check_solver(self, solver: str) -> None:
         """Refuse options that have no place in the input of ``solver``."""
@@ -217,58 +175,67 @@ class Cards:
                     hint = f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
-    def by_deck(self, question: RunQuestion) -> tuple[Cards, tuple[str, ...]]:
+    def complete(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
         """Complete the options of a card from the deck of the run, unless they are given.
 
-        The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
-        deleted, and the rigid bodies that switch the parts.  Notes say which bodies it lacks.
+        Notes say which rigid bodies the deck lacks.
 
         Raises
         ------
         DeckError
             If the deck cannot be read, or rigid bodies of it cannot switch the parts.
+        ArgumentError
+            If an option has no place in the input of the solver.
         """
+        from d2rpick.deck.printing import find_solver
+
+        printing, notes = self._suit_deck(question)
+        parts = parse_numbers("--part", question.on_card)
+        printing = self.replace_in(printing, parts)
+        history_format = question.reference.history.format
+        self.check_solver(printing.solver or find_solver(history_format))
+        return printing, notes
+
+    def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
+        """Return what the deck of the run requires of a card, and notes on the bodies that it lacks.
+
+        The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
+        deleted, and the rigid bodies that switch the parts.
+        """
+        from d2rpick.deck.printed_card import Printing
+
+        printing = Printing()
         deck = question.deck
-        parts = [part.id for part in question.reference.history.parts or ()]
         if deck is None:
-            return self, ()
+            return printing, ()
+        from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
+        parts = [part.id for part in question.reference.history.parts or ()]
         suiting = find_suiting(deck, parts)
-        cards = replace(self, solver=self.solver or suiting.solver)
-        if suiting.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
-            cards = replace(
-                cards,
-                swset=cards.swset or suiting.swset,
+        solver = self.solver or suiting.solver
+        printing = printing._replace(solver=solver)
+        if SOLVERS[solver].title != SOLVERS[suiting.solver].title:
+            return printing, ()
+        if suiting.solver == "ls-dyna":
+            return printing._replace(
+                swset=suiting.swset or printing.swset,
                 delete_nodal_bodies=suiting.delete_nodal_bodies,
                 delete_node_sets=suiting.delete_node_sets,
-            )
-            return cards, ()
-        from d2rpick.deck.printing import SOLVERS
-
-        if SOLVERS[cards.solver or ""].title != SOLVERS[suiting.solver].title:
-            return cards, ()
-        end = suiting.end if cards.end is None else cards.end
-        cards = replace(cards, name=cards.name or suiting.name, end=end)
-        if not parts or cards.node:
-            return cards, ()
+            ), ()
+        name = suiting.name or printing.name
+        printing = printing._replace(name=name, end=suiting.end)
+        if not parts or self.node:
+            return printing, ()
         from d2rpick.deck.radioss_bodies import find_bodies
 
         bodies = find_bodies(deck, parts)
-        cards = replace(
-            cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced
-        )
-        return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
-
-    def request(self, question: RunQuestion) -> CardRequest:
-        """Return how the card of a run is printed."""
-        from d2rpick.choice.judged_card import CardRequest
-
-        request = CardRequest(
-            self.solver, self.printing(parse_numbers("--part", question.on_card))
-        )
-        self.check_solver(request.of(question.reference.history)[0])
-        return request
+        return printing._replace(
+            node=tuple(bodies.nodes),
+            replaced=bodies.replaced,
+            starter=bodies.cards,
+            sensor=bodies.sensor,
+        ), bodies.notes
 
 
 # Keys in the settings that apply to all commands; other keys apply to the rules of check, or to one command.
@@ -360,20 +327,26 @@ def print_judged_card(
     """
     from d2rpick.api.card_in_deck import collect_objections
     from d2rpick.choice.answers import verify_run
-    from d2rpick.choice.judged_card import print_judged_card
-    from d2rpick.deck.printing import SOLVERS
+    from d2rpick.choice.judged_card import (
+        add_deck_bodies,
+        complete_printing,
+        print_judged_card,
+    )
+    from d2rpick.deck.printing import DEFAULT, SOLVERS
 
-    cards, notes = cards.by_deck(question)
     reference = question.reference
-    request = cards.request(question).by(question.settings)
+    printing, notes = cards.complete(question)
+    printing = complete_printing(
+        add_deck_bodies(printing, question.settings), reference.history
+    )
     judge = judge or partial(verify_run, reference, settings=question.settings)
-    result = print_judged_card(windows, reference.history, judge, request, done)
-    solver, printing = request.of(reference.history)
+    result = print_judged_card(windows, reference.history, judge, printing, done)
+    solver = SOLVERS[printing.solver or DEFAULT]
     if result is None:
-        raise ArgumentError(name_needed_argument(SOLVERS[solver]))
+        raise ArgumentError(name_needed_argument(solver))
     card, verdicts = result
     card = replace(card, notes=(*notes, *card.notes))
-    if printing.merge or SOLVERS[solver].switches != "part":
+    if printing.merge or solver.switches != "part":
         apart = 0
     else:
         apart = len(printing.part)
@@ -418,8 +391,8 @@ def card(
     parts : number or several, optional
         The parts to be switched; with a run that has parts by title too.
     **options
-        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run ``after``, ``landing``,
-        ``margin``, ``tolerance``.
+        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run also how it is
+        judged, see ``d2rpick.api.choosing.JudgingOptions``.
 
     Returns
     -------
@@ -445,7 +418,7 @@ def card(
     arguments_of_card: dict[str, Any] = dict(options)
     judging: Any = {
         name: arguments_of_card.pop(name)
-        for name in ("after", "landing", "margin", "tolerance")
+        for name in CHOOSING_FOR_CARDS
         if name in arguments_of_card
     }
     return print_card(
@@ -460,30 +433,30 @@ def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
     """Print the card of windows, judged as printed if there is a run."""
-    from d2rpick.deck.printing import DEFAULT, SOLVERS, print_cards
+    from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
         request.without_history()
-        solver = cards.solver or DEFAULT
-        return JudgedCard(
-            print_cards(windows, _print_without_history(request, cards, solver), solver)
-        )
+        return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
     from d2rpick.api.asked import (
         ask_run,
     )  # imported here since a card alone does not need numpy
 
     question = ask_run(run, request, card_alone=True)
-    wanted = cards.request(question)
-    module = SOLVERS[wanted.of(question.reference.history)[0]]
-    if wanted.printing.part and module.switches != "part":
-        raise ArgumentError(_ONLY_JUDGED.format(module.title))
+    solver = cards.solver or find_solver(question.reference.history.format)
+    cards.check_solver(solver)
+    parts = parse_numbers("--part", question.on_card)
+    if parts and SOLVERS[solver].switches != "part":
+        raise ArgumentError(_ONLY_JUDGED.format(SOLVERS[solver].title))
     return print_judged_card(question, cards, windows)
 
 
-def _print_without_history(request: Request, cards: Cards, solver: str) -> Printing:
-    """Return the content of a card without a history; raise ArgumentError if something is missing."""
-    from d2rpick.deck.printing import SOLVERS
+def _complete_alone(request: Request, cards: Cards) -> Printing:
+    """Return what is printed without a history; raise ArgumentError if something is missing."""
+    from d2rpick.deck.printed_card import Printing
+    from d2rpick.deck.printing import DEFAULT, SOLVERS
 
+    solver = cards.solver or DEFAULT
     cards.check_solver(solver)
     module = SOLVERS[solver]
     if not {"part": request.part, "node": cards.node}[module.switches]:
@@ -494,4 +467,4 @@ def _print_without_history(request: Request, cards: Cards, solver: str) -> Print
         raise ArgumentError(
             f"a card for {module.title} needs `end`, the end of the run, or a `run`"
         )
-    return cards.printing(parse_numbers("--part", request.part))
+    return cards.replace_in(Printing(), parse_numbers("--part", request.part))

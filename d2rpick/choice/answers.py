@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
-    from d2rpick.vibration.span import Fits
 
 # Number of pairs at other peaks that may fail the full examination before the search is given up.
 _MOST_REFUSED = 3
@@ -154,7 +153,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is used if its td is ``td``, else its fits.
+    """Judge one pair; the situation ``earlier`` is used if its td is ``td``.
 
     Raises
     ------
@@ -164,8 +163,7 @@ def verify_in_history(
     _check_order(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
-    fits = earlier.fits if earlier else None
-    return verify_at(examine_td(history, td, settings, fits), tr)
+    return verify_at(examine_td(history, td, settings), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> PairVerdict:
@@ -176,7 +174,6 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     RangeError
         If tr lies outside the record or is not before td.
     """
-    settings = situation.settings
     td = situation.td
     _check_order(tr, td)
     situation.history.energy_at(tr, "tr")
@@ -184,15 +181,13 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     candidate = judged[0]
     is_known = situation.flight.start is not None
     share = situation.kinetic_share
-    if settings.max_kinetic_share is None:
-        limit = POOR_KINETIC_SHARE
-    else:
-        limit = settings.max_kinetic_share
+    exceeded = list_exceeded_limits(situation, candidate)
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    td_ok = None if share is None else share <= limit
-    if outside:
+    limits_td = situation.settings.max_kinetic_share is not None
+    td_ok = None if share is None else limits_td or share <= POOR_KINETIC_SHARE
+    if outside or any(excess.is_td_wrong for excess in exceeded):
         td_ok = False
     return PairVerdict(
         situation=situation,
@@ -200,7 +195,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
         tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
         admissible=bool(judged.kept[0]),
-        reasons=(*candidate.notes, *list_exceeded_limits(situation, candidate)),
+        reasons=(*candidate.notes, *(excess.message for excess in exceeded)),
         cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
 
@@ -311,7 +306,8 @@ class PairSuggestion(AnswerAtTd):
         """Decide on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
         limits = list_exceeded_limits(self.situation, candidate)
-        return decide(self.situation, candidate, objections=(*objections, *limits))
+        messages = (excess.message for excess in limits)
+        return decide(self.situation, candidate, objections=(*objections, *messages))
 
     @property
     def quality(self) -> Quality | None:
@@ -447,9 +443,7 @@ def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, as if that td had been given."""
     # an oscillator is searched again, the reason why there is none is not
     quick = situation.evidence.span is None
-    return examine_td(
-        situation.history, td, situation.settings, situation.fits, quick=quick
-    )
+    return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
@@ -474,7 +468,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     if situation.td > situation.latest_td:
         return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
     nearest = ranked[0]
-    reasons = "; ".join((*nearest.notes, *list_exceeded_limits(situation, nearest)))
+    exceeded = list_exceeded_limits(situation, nearest)
+    reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
     return f"no tr is admissible; the best of {len(ranked)}, tr = {nearest.tr:.6g}: {reasons}"
 
 
@@ -487,15 +482,13 @@ def suggest_in_run(
     settings: Settings,
     *,
     with_better: bool = True,
-    fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high), or for None in the longest flight [time].
 
-    With ``with_better`` False no better td is searched for a given td.  ``fits`` are those of an earlier call for the
-    record with the same settings.  If td is chosen, no flight is assumed to begin before ``since``, and ``times`` are
-    tried besides the energy peaks, by default an even grid [time].
+    With ``with_better`` False no better td is searched for a given td.  If td is chosen, no flight is assumed to begin
+    before ``since``, and ``times`` are tried besides the energy peaks, by default an even grid [time].
 
     Raises
     ------
@@ -509,14 +502,14 @@ def suggest_in_run(
             choose_td,
         )
 
-        chosen = choose_td(reference.history, td, settings, fits, since, times)
+        chosen = choose_td(reference.history, td, settings, since, times)
         answer = suggest_at(chosen.situation)
         answer = replace(
             answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
         )
     else:
         answer = suggest_at(
-            examine_td(reference.history, td, settings, fits), with_better=with_better
+            examine_td(reference.history, td, settings), with_better=with_better
         )
     return _add_health(answer, reference.run)
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_run
 from d2rpick.choice.pair.grades import DO_NOT_USE
-from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
 
 if TYPE_CHECKING:
@@ -18,48 +16,39 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Reference, Settings
+    from d2rpick.deck.printed_card import PrintedCard, Printing, Times
     from d2rpick.histories.history import History
 
 
-class CardRequest(NamedTuple):
-    """Options of a card before its times are known; without a ``solver`` it is the one that wrote the history.
+def complete_printing(printing: Printing, history: History) -> Printing:
+    """Complete the options of a card from a history.
 
-    The history completes ``printing``: its chosen parts, and its end as the end of the run.
+    The history gives the solver that wrote it, its chosen parts, its end as the end of the run, and the times at which
+    a contact pushes.
     """
+    solver = printing.solver or find_solver(history.format)
+    ids = printing.part or tuple(part.id for part in history.parts or ())
+    end = float(history.time[-1]) if printing.end is None else printing.end
+    printing = printing._replace(solver=solver, part=ids, end=end)
+    if "contact" in SOLVERS[solver].takes:
+        printing = _add_pushes(printing, history, SOLVERS[solver].title)
+    return printing
 
-    solver: str | None = None
-    printing: Printing = Printing()
 
-    def of(self, history: History) -> tuple[str, Printing]:
-        """Return the solver, and the complete options of its card."""
-        ids = self.printing.part or tuple(part.id for part in history.parts or ())
-        if self.printing.end is None:
-            end = float(history.time[-1])
-        else:
-            end = self.printing.end
-        solver = self.solver or find_solver(history.format)
-        printing = self.printing._replace(part=ids, end=end)
-        if "contact" in SOLVERS[solver].takes:
-            printing = _add_pushes(printing, history, SOLVERS[solver].title)
-        return solver, printing
+def list_switched(printing: Printing) -> tuple[int, ...]:
+    """Return the parts or main nodes that a card switches; empty if none are given."""
+    switched: tuple[int, ...] = getattr(
+        printing, SOLVERS[printing.solver or DEFAULT].switches
+    )
+    return switched
 
-    def whom(self, history: History) -> tuple[int, ...]:
-        """Return the parts or main nodes that the card switches; empty if none are given."""
-        solver, printing = self.of(history)
-        switched: tuple[int, ...] = getattr(printing, SOLVERS[solver].switches)
-        return switched
 
-    def by(self, settings: Settings) -> CardRequest:
-        """Return the request with the rigid bodies of a deck as merged parts, and its inactive bodies kept inactive."""
-        bodies = tuple(body.parts for body in settings.bodies or ())
-        inactive = tuple(
-            node
-            for node in settings.kept_off
-            if node not in (*self.printing.node, *self.printing.replaced)
-        )
-        return self._replace(
-            printing=self.printing._replace(bodies=bodies, off=inactive)
-        )
+def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
+    """Add the rigid bodies of a deck as merged parts, and keep its inactive bodies inactive."""
+    bodies = tuple(body.parts for body in settings.bodies or ())
+    replaced = (*printing.node, *printing.replaced)
+    inactive = tuple(node for node in settings.kept_off if node not in replaced)
+    return printing._replace(bodies=bodies, off=inactive)
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
@@ -88,59 +77,40 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
     return printing._replace(pushed=times.spans, speed=speed) if times else printing
 
 
-class SolverInput(NamedTuple):
-    """Solver input for a pair of times: its ``text``, or ``refusal``, the reason why it cannot be printed.
-
-    Both are None if no parts to switch are given.  ``solver`` is empty for the default solver, ``switches`` names the
-    option for the parts.
-    """
-
-    solver: str
-    switches: str
-    text: str | None = None
-    refusal: str | None = None
-
-
-def print_solver_input(
-    reference: Reference, situation: Situation, tr: float, request: CardRequest
-) -> SolverInput:
-    """Print the card of ``tr`` and the td of a situation, judged by the printed times."""
-    solver, _ = request.of(situation.history)
-    solver_and_option = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
+def print_pair(
+    reference: Reference, situation: Situation, tr: float, printing: Printing
+) -> PrintedCard | None:
+    """Print the card of ``tr`` and the td of a situation, judged by the printed times; None without parts to switch."""
+    history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation
     )
-    try:
-        card = print_judged_card(
-            [(tr, situation.td)],
-            situation.history,
-            judge,
-            request.by(situation.settings),
-        )
-    except D2RPickError as error:
-        return SolverInput(*solver_and_option, refusal=str(error))
-    return SolverInput(*solver_and_option, card[0].text if card else None)
+    printing = add_deck_bodies(printing, situation.settings)
+    card = print_judged_card(
+        [(tr, situation.td)], history, judge, complete_printing(printing, history)
+    )
+    return card[0] if card else None
 
 
 def print_judged_card(
     windows: Sequence[Times],
     history: History,
     judge: Callable[[float, float], PairVerdict],
-    request: CardRequest,
+    printing: Printing,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
     """Print the card of windows with the verdicts that ``judge`` gives for the printed tr and td.
 
-    ``done`` are windows in which the run was switched already: they are printed too, but cannot be judged by it.  The
-    result is None if the parts, or the main nodes for some solvers, are not given.
+    ``printing`` is completed by the history.  ``done`` are windows in which the run was switched already: they are
+    printed too, but cannot be judged by it.  The result is None if the parts, or the main nodes for some solvers, are
+    not given.
     """
-    if not request.whom(history):
+    if not list_switched(printing):
         return None
-    solver, printing = request.of(history)
     all_windows = sorted((*done, *windows))
-    plain = print_cards(all_windows, printing, solver)
+    plain = print_cards(all_windows, printing)
     printed = plain.windows
-    if "contact" in SOLVERS[solver].takes:
+    if "contact" in SOLVERS[printing.solver or DEFAULT].takes:
         printed = _narrow_windows(printed, history)
     verdicts = tuple(
         judge(*times)
@@ -148,7 +118,7 @@ def print_judged_card(
         if requested not in done
     )
     remarks = tuple(_list_card_remarks(done, history, verdicts))
-    return print_cards(all_windows, printing, solver, remarks), verdicts
+    return print_cards(all_windows, printing, remarks), verdicts
 
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:

@@ -26,10 +26,12 @@ from d2rpick.deck.expression import (
     is_number,
     parse_number,
 )
+from d2rpick.deck.ls_dyna_columns import PARAMETER_FLAG, PARAMETERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.deck.columns import CardColumn, DataLine
     from d2rpick.deck.source import Block
 
 
@@ -40,7 +42,8 @@ _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 T = TypeVar("T", int, float, str)
 
 _LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
-_PAIRS = 4  # pairs of name and value in a line of *PARAMETER
+_PARAMETERS: Final = [*PARAMETERS]
+_FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
 
 class CardField(NamedTuple):
@@ -226,17 +229,22 @@ class Card:
         """Return the keyword as a field, for messages."""
         return CardField(f"*{self.name}", self.block, 0, 1)
 
-    def real(self, row: Row, position: int, default: float = 0.0) -> Value[float]:
+    def real(self, row: Row, column: CardColumn, default: float = 0.0) -> Value[float]:
         """Read a real number; parameters and expressions are evaluated, and a blank field gives the default."""
-        return self._number(row, position, default, float)
+        return self._number(row, column.position, default, float)
 
-    def integer(self, row: Row, position: int, default: int = 0) -> Value[int]:
+    def integer(self, row: Row, column: CardColumn, default: int = 0) -> Value[int]:
         """Read an integer; a real number without a fraction is accepted."""
-        return self._number(row, position, default, int)
+        return self._number(row, column.position, default, int)
 
-    def numbers(self, row: Row, kinds: Sequence[type[int] | type[float]]) -> list[Any]:
-        """Read the first fields of a line, each as the type in ``kinds``."""
-        return [self._number(row, at, kind(), kind) for at, kind in enumerate(kinds)]
+    def numbers(self, row: Row, line: DataLine) -> list[Any]:
+        """Read all columns of a line, which are numbers."""
+        return [
+            self.real(row, column)
+            if column.kind is float
+            else self.integer(row, column)
+            for column in line
+        ]
 
     def _number(
         self, row: Row, position: int, default: T, kind: Callable[[float], T]
@@ -255,22 +263,22 @@ class Card:
         value, problem = value_and_problem
         return Value(default if problem else value, row, problem, parameters, position)
 
-    def positive(self, row: Row, position: int) -> float | None:
+    def positive(self, row: Row, column: CardColumn) -> float | None:
         """Read a positive number; None for any other, and for all numbers of an include in other units."""
-        number = self.real(row, position)
+        number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
         return number.value
 
-    def word(self, row: Row, position: int, default: str = "") -> Value[str]:
+    def word(self, row: Row, column: CardColumn, default: str = "") -> Value[str]:
         """Read a word in upper case."""
-        text = row.cell(position)
+        text = row.cell(column.position)
         return Value(
             self.scope.text(text).upper() or default,
             row,
             "",
             find_parameters(text),
-            position,
+            column.position,
         )
 
 
@@ -389,7 +397,7 @@ class Scope:
         """Store the definitions of a ``*PARAMETER`` card."""
         options = set(keyword.split("_")[1:])
         if "DUPLICATION" in options:
-            flags = [row.cell(0) for row in rows[:1]]
+            flags = [row.cell(_FLAG.position) for row in rows[:1]]
             self._whole._latest_wins = flags[:1] in (["2"], ["4"])
             return
         target = self._local if "LOCAL" in options else self._whole._shared
@@ -461,11 +469,13 @@ def _read_definitions(
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return
+    columns = _PARAMETERS[:2] if "TYPE" in options else _PARAMETERS
+    pairs = list(zip(columns[::2], columns[1::2], strict=True))
     for row in rows:
-        for pair in range(1 if "TYPE" in options else _PAIRS):
-            name = row.cell(2 * pair)
+        for name_column, value_column in pairs:
+            name = row.cell(name_column.position)
             if name:
-                yield row, name, row.cell(2 * pair + 1)
+                yield row, name, row.cell(value_column.position)
 
 
 def _read_expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError
+from d2rpick.deck.radioss_columns import RUN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -79,7 +80,7 @@ def write_engine_lines(
 ) -> Iterator[str]:
     """Yield the lines of an engine file: its run, and the main nodes that are rigid; ``other_nodes`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
-    yield f"{leg.stop!r:>20}"
+    yield RUN.write(Tstop=leg.stop)
     if leg.cap is not None and ids:
         yield from ("/RBODY/ON", *write_numbers(ids))
     yield from write_bodies_off(

@@ -12,6 +12,12 @@ import numpy as np
 
 from d2rpick.deck import formulations, ls_dyna_loads
 from d2rpick.deck.card import LONG
+from d2rpick.deck.ls_dyna_columns import (
+    MATERIAL,
+    make_element_line,
+    make_node_line,
+    make_watched_line,
+)
 from d2rpick.deck.ls_dyna_parts import (
     DeckParts,
     SectionCard,
@@ -19,7 +25,7 @@ from d2rpick.deck.ls_dyna_parts import (
     read_parts,
     read_sections,
 )
-from d2rpick.deck.mesh import Mesh, place_fields, read_lines
+from d2rpick.deck.mesh import Mesh, read_lines
 from d2rpick.deck.model import (
     Formulation,
     Inventory,
@@ -272,11 +278,9 @@ def _read_watched_nodes(deck: Deck) -> Integers:
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
         if set(options) <= {"ID", "LOCAL"}:
-            fields: Layout = place_fields(
-                *[20 if card.width == LONG else 10] * (1 if options else 8)
-            )
+            line = make_watched_line(card.width, 1 if options else 8)
             node_ids = [
-                lines.integers(fields).ravel()
+                lines.integers(line.layout).ravel()
                 for lines in read_lines(card)
                 if len(lines)
             ]
@@ -355,7 +359,7 @@ def _read_elements(
         if not len(lines):
             continue
         if kind.name == "particle":
-            ids = lines.integers(place_fields(width, width))
+            ids = lines.integers(make_element_line(width, 0).layout)
             rows = ids[(ids > 0).all(axis=1)]
             yield (
                 kind.name,
@@ -363,9 +367,8 @@ def _read_elements(
                 rows[:, :1] + card.transform.node,
             )
             continue
-        values = lines.integers(
-            place_fields(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most)))
-        )
+        most_nodes = _TEN if kind.name == "solid" else kind.most
+        values = lines.integers(make_element_line(width, most_nodes).layout)
         if kind.name == "solid":
             values, waiting_line = _join_lines(
                 values
@@ -407,7 +410,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
         if card.name != "NODE":
             continue
         width = _get_id_width(card)
-        fields: Layout = place_fields(width, *[LONG if card.width == LONG else 16] * 3)
+        fields = make_node_line(width, LONG if card.width == LONG else 16).layout
         for lines in read_lines(card):
             if len(lines):
                 numbers = lines.integers(fields[:1])[:, 0]
@@ -419,9 +422,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
                     if card.transform.scaled
                     else line_coordinates
                 )
-                codes.append(
-                    _read_codes(lines, [*fields, (sum(fields[-1]), width)])[has_id]
-                )
+                codes.append(_read_codes(lines, fields)[has_id])
     return np.concatenate(ids), np.concatenate(coordinates), np.concatenate(codes)
 
 
@@ -491,11 +492,12 @@ def _read_materials(deck: Deck, parts: DeckParts) -> Iterator[tuple[str, Materia
         if not card.data or card.name.startswith("MAT_ADD"):
             continue
         row = card.data[0]
-        number = name_material(card, card.data[0], 0)
+        number = name_material(card, row, MATERIAL["MID"])
         name = card.name.removesuffix("_TITLE")
         is_elastic = name.removeprefix("MAT_") in _ELASTIC
         density, modulus, poisson = (
-            card.positive(row, at) if is_elastic else None for at in (1, 2, 3)
+            card.positive(row, MATERIAL[name_]) if is_elastic else None
+            for name_ in ("RO", "E", "PR")
         )
         yield (
             number,

@@ -14,6 +14,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.deck.ls_dyna_columns import (
+    BODY_LOAD,
+    CONTACT,
+    CURVE,
+    CURVE_POINT,
+    GLOBAL_CONSTRAINT,
+    LOADED_PARTS,
+    MATERIAL,
+    MOTION,
+    RIGID_MATERIAL,
+    SPC,
+    SPC_TIMES,
+)
 from d2rpick.deck.ls_dyna_parts import (
     DeckParts,
     find_rigid_materials,
@@ -21,7 +34,7 @@ from d2rpick.deck.ls_dyna_parts import (
     name_material,
     read_constraints,
 )
-from d2rpick.deck.mesh import place_fields, read_lines
+from d2rpick.deck.mesh import read_lines
 from d2rpick.deck.model import (
     Boundary,
     Gravity,
@@ -36,6 +49,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from d2rpick.deck.card import Card, Row
+    from d2rpick.deck.columns import DataLine
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
@@ -72,7 +86,6 @@ _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
 _OWN_CENTRE: Final = (9, 10, 11)  # values of DOF that add a second line
 _RELATIVE: Final = 4  # value of VAD that adds a second line
-_POINT: Final = place_fields(20, 20)  # a line of *DEFINE_CURVE: abscissa, ordinate
 # Nodes within this fraction of the model size lie on the plane of a *CONSTRAINED_GLOBAL.
 _FLAT: Final = 1e-4
 
@@ -136,24 +149,26 @@ def _read_supports(deck: Deck) -> Iterator[Hold | str]:
 def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
     """Read a line of *BOUNDARY_SPC for a node or a node set; along local axes it is always a support."""
     nodes = _find_nodes(deck, card, row)
-    fixed = [bool(card.integer(row, at).value) for at in range(2, 8)]
+    _, system, *flags = card.numbers(row, SPC)
+    fixed = [bool(flag.value) for flag in flags]
     if nodes is None:
         return _note_unknown_nodes(card)
     axes = frozenset(axis for axis in range(3) if fixed[axis])
-    along_own_axes = bool(card.integer(row, 1).value) and 0 < len(axes) < len(CODES[-1])
+    along_own_axes = bool(system.value) and 0 < len(axes) < len(CODES[-1])
     held = Hold(
         _describe_card(card),
         nodes if any(fixed) else make_ids(()),
         axes=axes,
         counts=along_own_axes,
     )
-    return held if times is None else _set_times(held, card, times, 0)
+    return held if times is None else _set_times(held, card, times, SPC_TIMES)
 
 
-def _set_times(hold: Hold, card: Card, row: Row, birth: int, death: int = 1) -> Hold:
+def _set_times(hold: Hold, card: Card, row: Row, line: DataLine) -> Hold:
     """Add the birth time and the death time of a card; missing values mean 0 and never."""
     start, end = (
-        card.real(row, at).value * card.transform.time for at in (birth, death)
+        card.real(row, line[name]).value * card.transform.time
+        for name in ("BIRTH", "DEATH")
     )
     return hold._replace(start=start, end=end if end > 0 else inf)
 
@@ -163,7 +178,7 @@ def _find_nodes(deck: Deck, card: Card, row: Row) -> Places | None:
 
     None if they are unknown.
     """
-    number = card.integer(row, 0).value
+    number = card.integer(row, SPC["NID"]).value
     single = None if "SET" in card.name.split("_") else {number + card.transform.node}
     node_ids = single or find_set_nodes(deck, card, number)
     return None if node_ids is None else make_ids(node_ids)
@@ -181,12 +196,16 @@ def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold
     """Return the support of the nodes on a plane that a *CONSTRAINED_GLOBAL fixes."""
     rows = card.lines
     if rows:
-        code, normal = (card.integer(rows[0], at).value for at in (0, 2))
+        code, normal = (
+            card.integer(rows[0], GLOBAL_CONSTRAINT[name]).value
+            for name in ("TC", "DIR")
+        )
     else:
         code, normal = (0, 0)
     if not 0 < code < len(CODES) or normal not in (1, 2, 3) or not numbers.size:
         return _note_unknown_nodes(card)
-    height = coordinates[:, normal - 1] - card.real(rows[0], 2 + normal).value
+    level = card.real(rows[0], GLOBAL_CONSTRAINT["XYZ"[normal - 1]]).value
+    height = coordinates[:, normal - 1] - level
     near = np.abs(height) <= _FLAT * float(np.nanmax(np.ptp(coordinates, axis=0)))
     return Hold(
         _describe_card(card), np.sort(numbers[near]), axes=frozenset(CODES[code])
@@ -198,12 +217,14 @@ def _read_material_supports(deck: Deck, parts: DeckParts) -> Iterator[Hold]:
     for card in find_rigid_materials(deck):
         if len(card.data) < 2:
             continue
-        name = name_material(card, card.data[0], 0)
+        name = name_material(card, card.data[0], MATERIAL["MID"])
         row = card.data[1]
-        kind = card.real(row, 0).value
-        code = card.integer(row, 1).value
+        kind = card.real(row, RIGID_MATERIAL["CMO"]).value
+        code = card.integer(row, RIGID_MATERIAL["CON1"]).value
         axes = frozenset(CODES[code] if kind > 0 and 0 < code < len(CODES) else ())
-        along_own_axes = kind < 0 and bool(card.integer(row, 2).value)
+        along_own_axes = kind < 0 and bool(
+            card.integer(row, RIGID_MATERIAL["CON2"]).value
+        )
         rigid_parts = frozenset(
             part for part, material in parts.materials.items() if material == name
         )
@@ -238,8 +259,8 @@ def _read_motions(deck: Deck) -> Iterator[Hold | str]:
             rows = rows["ID" in options :]
             row = rows[0]
             further = (
-                abs(card.integer(row, 1).value) in _OWN_CENTRE
-                or card.integer(row, 2).value == _RELATIVE
+                abs(card.integer(row, MOTION["DOF"]).value) in _OWN_CENTRE
+                or card.integer(row, MOTION["VAD"]).value == _RELATIVE
             )
             yield _read_motion(deck, card, row, options)
             rows = rows[1 + further :]
@@ -250,14 +271,15 @@ def _read_motion(
 ) -> Hold | str:
     """Read a line of *BOUNDARY_PRESCRIBED_MOTION."""
     if "RIGID" in options:
-        part = frozenset({card.integer(row, 0).value + card.transform.part})
+        number = card.integer(row, MOTION["TYPEID"]).value
+        part = frozenset({number + card.transform.part})
     else:
         part = frozenset[int]()
     nodes = make_ids(()) if part else _find_nodes(deck, card, row)
     if nodes is None:
         return _note_unknown_nodes(card)
     return _set_times(
-        Hold(_describe_card(card), nodes, part, counts=True), card, row, 7, 6
+        Hold(_describe_card(card), nodes, part, counts=True), card, row, MOTION
     )
 
 
@@ -293,7 +315,8 @@ def _read_loaded_parts(card: Card, parts: DeckParts) -> frozenset[int] | None:
     """Return the parts of a *LOAD_BODY_PARTS; None if they are unknown."""
     if card.lines:
         members = parts.members(
-            card.integer(card.lines[0], 0).value + card.transform.set_
+            card.integer(card.lines[0], LOADED_PARTS["PSID"]).value
+            + card.transform.set_
         )
     else:
         members = None
@@ -307,10 +330,12 @@ def _read_body_load(
 
     Empty if it acts in dynamic relaxation alone, None if they are unknown.
     """
-    curve, relaxing, system = (card.integer(row, at) for at in (0, 2, 6))
+    curve, relaxing, system = (
+        card.integer(row, BODY_LOAD[name]) for name in ("LCID", "LCIDDR", "CID")
+    )
     if not curve.value and relaxing.value:
         return Gravity(None, ())
-    scale = card.real(row, 1)
+    scale = card.real(row, BODY_LOAD["SF"])
     ordinates = curves.get(curve.value + card.transform.rest, ())
     # Negative, because the card accelerates the ground.
     values = find_plateaus(ordinates, -(scale.value or 1.0))
@@ -330,12 +355,12 @@ def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
     for card in deck.named("DEFINE_CURVE"):
         if card.data and card.options("DEFINE_CURVE") <= {"TITLE"}:
             row = card.data[0]
-            number = card.integer(row, 0)
-            factor = card.real(row, 3)
-            offset = card.real(row, 5)
+            number = card.integer(row, CURVE["LCID"])
+            factor = card.real(row, CURVE["SFO"])
+            offset = card.real(row, CURVE["OFFO"])
             points = np.concatenate(
                 [
-                    lines.reals(_POINT, slice(1, 2))[:, 0]
+                    lines.reals(CURVE_POINT.layout, slice(1, 2))[:, 0]
                     for lines in read_lines(card)
                     if len(lines)
                 ]
@@ -384,7 +409,7 @@ def _read_tied_contact(deck: Deck, card: Card) -> Joint | None:
     rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
     if not rows or "MPP" in options:
         return None
-    values = [card.integer(rows[0], at) for at in range(4)]
+    values = card.numbers(rows[0], CONTACT)
     if any(value.problem for value in values):
         return None
     first_id, second_id, kind, main = (value.value for value in values)

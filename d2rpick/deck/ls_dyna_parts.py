@@ -11,11 +11,28 @@ from weakref import WeakKeyDictionary
 
 from d2rpick.base.graph import find_reachable
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.deck.ls_dyna_columns import (
+    ENTITY,
+    EXTRA_NODES,
+    GENERALIZED_WELD,
+    JOINT,
+    MATERIAL,
+    NODAL_BODY,
+    NODE_PAIR,
+    PART,
+    PART_INERTIA,
+    SECTION,
+    SECTION_SIZES,
+    SET,
+    SET_COLUMN,
+    SET_MEMBERS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, CardField, Problem, Row, Value
+    from d2rpick.deck.columns import CardColumn, DataLine
     from d2rpick.deck.reader import Deck
 
 
@@ -78,7 +95,6 @@ _ELEMENT_OPTIONS: Final = {  # options whose lines have no integers in the colum
 }
 
 _BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
-_JOINT_NODES = 6
 # Second words of *CONTACT keywords that define no contact.
 _NO_CONTACTS: Final = {
     "ADD",
@@ -176,7 +192,8 @@ def read_parts(deck: Deck) -> DeckParts:
         problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted
     )
     parts.rigid_materials.update(
-        name_material(card, card.data[0], 0) for card in find_rigid_materials(deck)
+        name_material(card, card.data[0], MATERIAL["MID"])
+        for card in find_rigid_materials(deck)
     )
     for card in deck.named("PART"):
         _add_parts(card, parts)
@@ -196,9 +213,9 @@ def find_rigid_materials(deck: Deck) -> Iterator[Card]:
     )
 
 
-def name_material(card: Card, row: Row, position: int) -> str:
+def name_material(card: Card, row: Row, column: CardColumn) -> str:
     """Return the id of a material with its offset as text, or its name if the deck uses names."""
-    value = card.integer(row, position)
+    value = card.integer(row, column)
     if value.problem:
         return value.field.text.upper()
     return str(value.value + card.transform.material)
@@ -224,12 +241,13 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     at = 0
     extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
     while at + 1 < len(rows):  # title, ids, and the lines of the options
-        _add_part(card, rows[at : at + 2], name_material(card, rows[at + 1], 2), parts)
+        material = name_material(card, rows[at + 1], PART["MID"])
+        _add_part(card, rows[at : at + 2], material, parts)
         at += 2
         is_rotated = (
             "INERTIA" in options
             and at < len(rows)
-            and card.integer(rows[at], 4).value == _ROTATED
+            and card.integer(rows[at], PART_INERTIA["IRCS"]).value == _ROTATED
         )
         at += extra_lines + is_rotated
 
@@ -239,8 +257,8 @@ def _add_part(
 ) -> None:
     """Add a part by its lines of title and ids."""
     title, row = lines
-    part = card.integer(row, 0)
-    section = card.integer(row, 1)
+    part = card.integer(row, PART["PID"])
+    section = card.integer(row, PART["SECID"])
     if part.problem:
         parts.problems.append((part.field, part.problem))
     elif part.value > 0:
@@ -256,7 +274,7 @@ def _add_set(card: Card, parts: DeckParts) -> None:
     rows = card.data
     if not rows:
         return
-    first = card.integer(rows[0], 0)
+    first = card.integer(rows[0], SET["SID"])
     if first.problem:
         parts.problems.append((first.field, first.problem))
         return
@@ -321,14 +339,18 @@ def _read_node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
                 for low, high in zip(ids[::2], ids[1::2], strict=False)
                 for node in range(low, high + 1)
             ]
-        yield card.integer(card.data[0], 0).value + card.transform.set_, frozenset(ids)
+        number = card.integer(card.data[0], SET["SID"]).value
+        yield number + card.transform.set_, frozenset(ids)
 
 
 def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
     """Return the ids below the first line of a set."""
-    columns = range(1 if "COLUMN" in options else _PER_LINE)
+    columns = SET_COLUMN if "COLUMN" in options else SET_MEMBERS
     return [
-        card.integer(row, at) for row in card.data[1:] for at in columns if row.cell(at)
+        card.integer(row, column)
+        for row in card.data[1:]
+        for column in columns
+        if row.cell(column.position)
     ]
 
 
@@ -370,12 +392,13 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
         per_section = 2
         titled = False
     for at in range(titled, len(rows), per_section + titled):
-        number = card.integer(rows[at], 0)
-        elform = card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
-        layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
+        number = card.integer(rows[at], SECTION["SECID"])
+        default = 1 if kind == "SOLID" else 2
+        elform = card.integer(rows[at], SECTION["ELFORM"], default)
+        layers = card.integer(rows[at], SECTION["NIP"], 2) if kind == "SHELL" else None
         through = (layers.value or 2) if layers and not layers.problem else None
         second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
-        first = card.positive(second, 0) if second else None
+        first = card.positive(second, SECTION_SIZES["FIRST"]) if second else None
         if not number.problem:
             section = SectionCard(
                 kind, 0 if elform.problem else elform.value, first, through
@@ -425,8 +448,8 @@ def _read_nodal_rigid_bodies(
     if options - {"TITLE"}:  # further options add lines, so the keyword has one body
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
-        body = card.integer(row, 0)
-        nodes = card.integer(row, 2)
+        body = card.integer(row, NODAL_BODY["PID"])
+        nodes = card.integer(row, NODAL_BODY["NSID"])
         members = find_set_nodes(deck, card, nodes.value) if nodes.value else None
         yield Constraint(kind, body.field, body.value, members or frozenset())
 
@@ -434,8 +457,8 @@ def _read_nodal_rigid_bodies(
 def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the extra nodes of a card."""
     for row in card.rows:
-        part = card.integer(row, 0)
-        node_or_set = card.integer(row, 1)
+        part = card.integer(row, EXTRA_NODES["PID"])
+        node_or_set = card.integer(row, EXTRA_NODES["NID"])
         if row.blank or part.problem or node_or_set.problem:
             continue
         if card.name.endswith("_SET"):
@@ -458,22 +481,22 @@ def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
         return
     for row in _get_first_line(card):
         if card.name.endswith("_ID"):
-            number = card.integer(card.lines[0], 0).value
+            number = card.integer(card.lines[0], ENTITY["ID"]).value
         else:
             number = 0
-        yield _read_node_list(card, row, kind, _JOINT_NODES, number)
+        yield _read_node_list(card, row, kind, JOINT, number)
 
 
 def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Return the constraints with two nodes on a line: one per line, unless an option adds lines."""
     rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _get_first_line(card)
-    return (_read_node_list(card, row, kind, 2) for row in rows)
+    return (_read_node_list(card, row, kind, NODE_PAIR) for row in rows)
 
 
 def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the generalized weld of a card."""
     for row in _get_first_line(card):
-        members = card.integer(row, 0)
+        members = card.integer(row, GENERALIZED_WELD["NSID"])
         yield Constraint(
             kind,
             members.field,
@@ -488,10 +511,10 @@ def _get_first_line(card: Card) -> tuple[Row, ...]:
 
 
 def _read_node_list(
-    card: Card, row: Row, kind: Kind, node_count: int, number: int = 0
+    card: Card, row: Row, kind: Kind, line: DataLine, number: int = 0
 ) -> Constraint:
     """Read a constraint whose line lists its nodes."""
-    nodes = [card.integer(row, at) for at in range(node_count)]
+    nodes = [card.integer(row, column) for column in line]
     ids = frozenset(
         node.value + card.transform.node for node in nodes if node.value > 0
     )
@@ -558,7 +581,7 @@ def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entit
         if words[1:2] and words[1] in _NO_CONTACTS:
             continue
         if {"ID", "TITLE"} & {*words} and card.rows:
-            number = card.integer(card.rows[0], 0).value
+            number = card.integer(card.rows[0], ENTITY["ID"]).value
             title = card.rows[0].text[card.width :].strip()
         all_known = (
             all_known

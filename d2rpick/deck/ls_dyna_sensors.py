@@ -13,25 +13,25 @@ import math
 from itertools import count, repeat
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.deck.ls_dyna_columns import (
+    CONTROL_SWITCHES,
+    SENSOR_CONTROL,
+    SENSOR_FORCE,
+    SENSOR_SWITCH,
+)
 from d2rpick.deck.radioss_sensors import invert_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Card, Row
+    from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
     Spans = tuple[tuple[float, float], ...]  # of time
     # When the force of a contact or rigid wall is above a value, by its kind and number; None where it is not known.
     Forces = Callable[[str, int, float], Spans | None]
 
-
-# Fields of *SENSOR_CONTROL (first line, second line), *SENSOR_SWITCH and *SENSOR_DEFINE_FORCE: 10 columns each.
-_TYPE, _TYPE_ID, _NREP = 1, 2, 4
-_INITIAL, _FIRST_SWITCH, _SWITCHES = 0, 1, 7
-_SWITCH_TYPE, _SENSOR_ID, _LOGIC, _VALUE = 1, 2, 3, 4
-_FILTER, _DURATION, _DELAY = 5, 6, 7
-_FORCE_TYPE, _FORCE_ID, _DIRECTION = 1, 2, 3
 
 _OF_FORCES: Final = {"CONTACT": "contact", "RWALL": "rigid wall"}
 _MAGNITUDE: Final = "M"
@@ -63,17 +63,19 @@ def read_controls(deck: Deck) -> Iterator[Control]:
     """Yield the controls of a deck that switch parts."""
     for card in deck.named("SENSOR_CONTROL"):
         for first, second in zip(card.data[::2], card.data[1::2], strict=False):
-            if card.word(first, _TYPE).value != "DEF2RIG":
+            if card.word(first, SENSOR_CONTROL["TYPE"]).value != "DEF2RIG":
                 continue
             numbers = [
-                card.integer(second, _FIRST_SWITCH + place).value
-                for place in range(_SWITCHES)
+                card.integer(second, column).value
+                for column in CONTROL_SWITCHES
+                if column.kind is int
             ]
-            repeats = card.integer(first, _NREP).value
+            repeats = card.integer(first, SENSOR_CONTROL["NREP"]).value
             yield Control(
                 card,
-                card.integer(first, _TYPE_ID).value + card.transform.rest,
-                card.word(second, _INITIAL, "ON").value,
+                card.integer(first, SENSOR_CONTROL["TYPEID"]).value
+                + card.transform.rest,
+                card.word(second, CONTROL_SWITCHES["INITSTT"], "ON").value,
                 tuple(number + card.transform.rest for number in numbers if number),
                 math.inf if repeats < 0 else 1 + repeats,
             )
@@ -133,24 +135,28 @@ def _find_spans_of_switch(
     deck: Deck, number: int, forces: Forces | None
 ) -> Spans | str:
     """Return the spans in which the condition of a switch is met, or the reason why they are unknown."""
-    card, row = _find_row(deck.named("SENSOR_SWITCH"), number) or (None, None)
+    card, row = _find_row(
+        deck.named("SENSOR_SWITCH"), SENSOR_SWITCH["SWITID"], number
+    ) or (None, None)
     if card is None or row is None:
         return f"switch {number}, which the deck has not"
     if card.name.removesuffix("_TITLE") != "SENSOR_SWITCH":
         return f"switch {number} (*{card.name}), which is not followed"
     factor = card.transform.time
-    numbers = [card.real(row, place) for place in (_VALUE, _DURATION, _DELAY)]
+    numbers = [
+        card.real(row, SENSOR_SWITCH[name]) for name in ("VALUE", "TIMWIN", "TDELAY")
+    ]
     if problems := [value.problem for value in numbers if value.problem]:
         return f"switch {number}: {problems[0]}"
     value, duration, delay = (number.value for number in numbers)
-    above = card.word(row, _LOGIC, "LT").value == "GT"
-    if card.word(row, _SWITCH_TYPE, "SENSOR").value == "TIME":
+    above = card.word(row, SENSOR_SWITCH["LOGIC"], "LT").value == "GT"
+    if card.word(row, SENSOR_SWITCH["TYPE"], "SENSOR").value == "TIME":
         limit = value * factor
         holds: Spans | str = ((limit, math.inf),) if above else ((0.0, limit),)
-    elif card.integer(row, _FILTER).value:
+    elif card.integer(row, SENSOR_SWITCH["FILTRID"]).value:
         return f"switch {number}, whose FILTRID is not followed"
     else:
-        sensor = card.integer(row, _SENSOR_ID).value + card.transform.rest
+        sensor = card.integer(row, SENSOR_SWITCH["SENSID"]).value + card.transform.rest
         holds = _find_spans_of_sensor(deck, sensor, value, forces, above=above)
     if isinstance(holds, str):
         return holds
@@ -166,18 +172,20 @@ def _find_spans_of_sensor(
     deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
 ) -> Spans | str:
     """Return the spans in which the force of a sensor is above (or below) a value, or why they are unknown."""
-    card, row = _find_row(deck.named("SENSOR_DEFINE"), number) or (None, None)
+    card, row = _find_row(
+        deck.named("SENSOR_DEFINE"), SENSOR_FORCE["SENSID"], number
+    ) or (None, None)
     if card is None or row is None:
         return f"sensor {number}, which the deck has not"
     name = f"sensor {number} (*{card.name.removesuffix('_TITLE')}"
-    kind = _OF_FORCES.get(card.word(row, _FORCE_TYPE).value)
+    kind = _OF_FORCES.get(card.word(row, SENSOR_FORCE["FTYPE"]).value)
     if not card.name.startswith("SENSOR_DEFINE_FORCE") or kind is None:
         return f"{name}), which is not followed"
-    if (direction := card.word(row, _DIRECTION).value) != _MAGNITUDE:
+    if (direction := card.word(row, SENSOR_FORCE["VID"]).value) != _MAGNITUDE:
         return f"{name} along {direction or 'no direction'}): only a magnitude (VID M) is followed"
     if card.transform.scaled:
         return f"{name}), which is in an include in other units"
-    entity = card.integer(row, _FORCE_ID).value + card.transform.rest
+    entity = card.integer(row, SENSOR_FORCE["TYPEID"]).value + card.transform.rest
     if value < 0 or (value == 0 and not above):  # a magnitude never falls below 0
         return _ALWAYS if above else ()
     strong = forces(kind, entity, value) if forces else None
@@ -186,8 +194,10 @@ def _find_spans_of_sensor(
     return strong if above else invert_spans(strong)
 
 
-def _find_row(cards: Sequence[Card], number: int) -> tuple[Card, Row] | None:
-    """Return the line whose first field is this number, after the id offset of its include, and its card."""
+def _find_row(
+    cards: Sequence[Card], column: CardColumn, number: int
+) -> tuple[Card, Row] | None:
+    """Return the line with this number in a column, after the id offset of its include, and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )
@@ -195,7 +205,7 @@ def _find_row(cards: Sequence[Card], number: int) -> tuple[Card, Row] | None:
         (
             (card, row)
             for card, row in rows
-            if card.integer(row, 0).value + card.transform.rest == number
+            if card.integer(row, column).value + card.transform.rest == number
         ),
         None,
     )

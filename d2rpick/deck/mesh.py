@@ -14,6 +14,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import name_units
 from d2rpick.deck.expression import ExpressionError, parse_real
+from d2rpick.deck.radioss_columns import NODE, make_element_line
 from d2rpick.deck.radioss_deck import Starter, get_number
 
 if TYPE_CHECKING:
@@ -43,20 +44,7 @@ NOTHING: Final = -1  # value of a field that is not an id
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
-_WIDTH, _REAL = 10, 20
 NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
-
-
-def place_fields(*widths: int) -> Layout:
-    """Return first column and width of adjacent fields.
-
-    Examples
-    --------
-    >>> place_fields(8, 16, 16)
-    [(0, 8), (8, 16), (24, 16)]
-    """
-    ends = np.cumsum(widths).tolist()
-    return [(end - width, width) for end, width in zip(ends, widths, strict=True)]
 
 
 class Lines:
@@ -392,7 +380,7 @@ def read_elements(
     With ``damaged`` also yield elements whose ids are incomplete.
     """
     kind = KINDS[card.words[0]]
-    fields: Layout = place_fields(*[_WIDTH] * max(kind.lines))
+    fields = make_element_line(max(kind.lines)).layout
     line_ids = [
         lines.integers(fields) for lines in read_lines(card, _COMMENTS) if len(lines)
     ]
@@ -452,7 +440,7 @@ def read_nodes(cards: Iterable[Card]) -> tuple[Integers, Reals]:
     """Return ids (n,) and coordinates (n, 3) of nodes [length]."""
     ids = [np.empty(0, np.int64)]
     coordinates = [np.empty((0, 3))]
-    fields: Layout = place_fields(_WIDTH, _REAL, _REAL, _REAL)
+    fields = NODE.layout
     for card in cards:
         for lines in read_lines(card, _COMMENTS):
             if len(lines):

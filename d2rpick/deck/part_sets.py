@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.columns import write_list
+from d2rpick.deck.ls_dyna_columns import SET, SET_PART_LIST
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
 PartSets = Mapping[tuple[int, ...], int]  # id of the set by its parts (ascending)
 NO_SETS: Final[PartSets] = {}
 _MOST_LISTED: Final = 10  # parts that a card lists; more parts become a set
-_PER_LINE: Final = 8
 
 
 def number_sets(
@@ -33,7 +35,6 @@ def name_parts(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str
 def write_part_set(parts: Sequence[int], number: int) -> Iterator[str]:
     """Yield the lines of a part set."""
     yield f"$ Part set {number}: give it another id if the deck has one with this id."
-    yield from ("*SET_PART_LIST", "$#     sid", f"{number:10d}")
-    yield "$#    pid1      pid2      pid3      pid4      pid5      pid6      pid7      pid8"
-    lines = (parts[at : at + _PER_LINE] for at in range(0, len(parts), _PER_LINE))
-    yield from ("".join(f"{part:10d}" for part in line) for line in lines)
+    yield from ("*SET_PART_LIST", SET.write_names(), SET.write(SID=number))
+    yield SET_PART_LIST.write_names()
+    yield from write_list(SET_PART_LIST, parts)

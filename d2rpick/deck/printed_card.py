@@ -38,6 +38,8 @@ class Printing(NamedTuple):
 
     Attributes
     ----------
+    solver : str, optional
+        A key of `SOLVERS`; without it the card is for the solver that wrote the history, or else for LS-DYNA.
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int
@@ -72,6 +74,7 @@ class Printing(NamedTuple):
         Main nodes of the bodies that new bodies replace.
     """
 
+    solver: str | None = None
     part: tuple[int, ...] = ()
     node: tuple[int, ...] = ()
     off: tuple[int, ...] = ()

@@ -32,6 +32,13 @@ from d2rpick.deck.printed_card import (
     write_comments,
     write_number,
 )
+from d2rpick.deck.radioss_columns import (
+    DELAY,
+    FORCE_SENSOR,
+    RUN,
+    SENSOR_INPUTS,
+    STOP,
+)
 from d2rpick.deck.switch_sets import (
     Waiting,
     group_by_lead,
@@ -351,8 +358,9 @@ def _print_radioss_contact(
     windows, _, _ = _check_run(windows, printing)
     kind, number, pushes = _find_force(printing)
     timing = find_sensor_timing(windows, pushes)
-    row = f"{number:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{write_number(timing.wait, 20):>20}\n{row}\n"
+    delay = DELAY.write(Tdelay=write_number(timing.wait, 20))
+    force = FORCE_SENSOR.write(ID=number, Dir="NF", Fmin=-1.0)
+    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{delay}\n{force}\n"
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
         (timing.latest, math.inf)
     ]
@@ -406,10 +414,17 @@ def _print_sensors(
         for leg in plan_legs(windows, end, printing.step_cap)
         if leg.cap is not None
     )
+    step_warning = (
+        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
+        " if it takes fewer without switching, set --step-cap to at least the deformable time step."
+    )
+    # In the file too, since it may be used without the card.
+    comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",
-        f"{end!r:>20}",
+        RUN.write(Tstop=end),
         *write_bodies_off(printing.off),
+        *comments,
         *write_step_limit(cap),
     )
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
@@ -418,14 +433,10 @@ def _print_sensors(
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
     )
-    step_warning = (
-        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
-        " if it takes fewer without switching, set --step-cap to at least the deformable time step."
-    )
     card = _combine_card(
         tuple(windows),
         printing,
-        (*_OF_SENSORS, *instructions, step_warning, *remarks),
+        (*_OF_SENSORS, *instructions, *remarks),
         files,
         texts,
     )
@@ -445,18 +456,20 @@ def _write_sensors(
     from d2rpick.deck.radioss_sensors import NEVER
 
     clock = "/SENSOR/TIME/{}\ndeformable\n"
-    kinds = [
-        f"{clock}{write_number(start, 20):>20}\n{write_number(min(stop, NEVER), 20):>20}\n"
-        for start, stop in spans
-    ]
+    kinds = []
+    for start, stop in spans:
+        delay = DELAY.write(Tdelay=write_number(start, 20))
+        end = STOP.write(Tstop=write_number(min(stop, NEVER), 20))
+        kinds.append(f"{clock}{delay}\n{end}\n")
     kinds += further
     texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
     last = first
     for number, next_sensor in enumerate(
         range(first + 1, first + len(kinds)), start=first + len(kinds)
     ):
+        inputs = SENSOR_INPUTS.write(sens_ID1=last, sens_ID2=next_sensor)
         texts.append(
-            f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{next_sensor:10d}\n"
+            f"/SENSOR/OR/{number}\ndeformable\n{DELAY.write(Tdelay=0)}\n{inputs}\n"
         )
         last = number
     return "".join(texts), last
@@ -559,19 +572,16 @@ def find_solver(history_format: str) -> str:
 def print_cards(
     windows: Sequence[Times],
     printing: Printing,
-    solver: str = DEFAULT,
     remarks: Sequence[str] = (),
 ) -> PrintedCard:
-    """Print the card for some windows.
+    """Print the card of rigid windows.
 
     Parameters
     ----------
     windows : sequence of (float, float)
         tr and td of each window [time of the model], 0 <= tr < td, each after the one before.
     printing : Printing
-        Parts or bodies to switch, and further options.
-    solver : str
-        A key of `SOLVERS`.
+        Solver, parts or bodies to switch, and further options.
     remarks : sequence of str
         Further comment lines.
 
@@ -587,4 +597,4 @@ def print_cards(
     >>> card.windows
     ((0.02, 0.09), (0.2, 0.3))
     """
-    return SOLVERS[solver].cards(windows, printing, remarks)
+    return SOLVERS[printing.solver or DEFAULT].cards(windows, printing, remarks)

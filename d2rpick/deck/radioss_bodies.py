@@ -12,10 +12,22 @@ import numpy as np
 
 from d2rpick.base.errors import DeckError, choose_verb, name_units
 from d2rpick.deck import radioss_inventory
+from d2rpick.deck.columns import write_list
 from d2rpick.deck.geometry import Placement, compute_masses_and_steps
 from d2rpick.deck.mesh import read_nodes
 from d2rpick.deck.model import DISCRETE, Inventory
 from d2rpick.deck.pieces import count_pieces
+from d2rpick.deck.radioss_columns import (
+    AXIS_GROUP,
+    BODY_FLAGS,
+    BODY_INERTIA,
+    BODY_PRODUCTS,
+    GRAVITY,
+    ID_LIST,
+    NODE,
+    RIGID_BODY,
+    VELOCITY,
+)
 from d2rpick.deck.radioss_deck import (
     Starter,
     find_bodies_kept_off,
@@ -34,16 +46,18 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from d2rpick.deck.card import Card
+    from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.radioss_rigid import Body
 
-_PER_LINE: Final = 10
 _STAYS: Final = (
     1  # value of Ikrem with which the starter keeps the nodes in rigid walls
 )
-# Field (of 10 columns, from 0) that names the node group, in the first line below the title.
-_GROUP_OF_VELOCITY: Final = {"TRA": 6, "ROT": 6, "T+G": 6, "GRID": 6, "AXIS": 2}
-_GROUP_OF_GRAVITY: Final = 4
+# Columns of the node group, in the first line below the title.
+_GROUP_OF_VELOCITY: Final = dict.fromkeys(
+    ("TRA", "ROT", "T+G", "GRID"), VELOCITY["grnod_ID"]
+) | {"AXIS": AXIS_GROUP["grnod_ID"]}
+_GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
@@ -287,16 +301,26 @@ class _BodyWriter:
         alone = self.next("GRNOD")
         moving = "".join(self._moving(parts, alone))
         x, y, z = self._centre(parts)
-        text = f"/NODE\n{node:10d}{x:20.12g}{y:20.12g}{z:20.12g}\n"
-        rows = (parts[at : at + _PER_LINE] for at in range(0, len(parts), _PER_LINE))
-        text += f"/GRNOD/PART/{group}\nparts to be switched\n"
-        text += "".join("".join(f"{part:10d}" for part in row) + "\n" for row in rows)
-        text += f"/RBODY/{self.next('RBODY')}\nparts to be switched\n"
-        text += f"{node:10d}{0:10d}{0:10d}{0:10d}{0:20d}{group:10d}{_STAYS:10d}{0:10d}{0:10d}\n"
-        text += 2 * (3 * f"{0:20d}" + "\n") + 3 * f"{0:10d}" + "\n"
+        lines = [
+            "/NODE",
+            NODE.write(node_ID=node, X=f"{x:.12g}", Y=f"{y:.12g}", Z=f"{z:.12g}"),
+            f"/GRNOD/PART/{group}",
+            "parts to be switched",
+            *write_list(ID_LIST, parts),
+            f"/RBODY/{self.next('RBODY')}",
+            "parts to be switched",
+            RIGID_BODY.write(node_ID=node, Mass=0, grnd_ID=group, Ikrem=_STAYS),
+            BODY_INERTIA.write(Jxx=0, Jyy=0, Jzz=0),
+            BODY_PRODUCTS.write(Jxy=0, Jyz=0, Jxz=0),
+            BODY_FLAGS.write(),
+        ]
         if moving:
-            text += f"/GRNOD/NODE/{alone}\nmain node of parts to be switched\n{node:10d}\n{moving}"
-        return node, text
+            lines += [
+                f"/GRNOD/NODE/{alone}",
+                "main node of parts to be switched",
+                *write_list(ID_LIST, [node]),
+            ]
+        return node, "\n".join(lines) + f"\n{moving}"
 
     def next(self, kind: str) -> int:
         """Return an unused id above all ids of a kind of card."""
@@ -353,14 +377,14 @@ class _BodyWriter:
             ):
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)
 
-    def _reached(self, card: Card, column: int | None) -> frozenset[int]:
+    def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
         """Return the nodes of the group in a column of a card, or the nodes that it lists.
 
         Empty for a card without group.
         """
         rows = card.rows[1:]
         if column is None:
-            return frozenset(card.integer(row, 0).value for row in rows)
+            return frozenset(card.integer(row, ID_LIST["ID1"]).value for row in rows)
         members = self._groups.members(
             card.integer(rows[0], column).value if rows else 0
         )
@@ -370,18 +394,12 @@ class _BodyWriter:
             )
         return members
 
-    def _again(self, card: Card, column: int, group: int) -> str:
+    def _again(self, card: Card, column: CardColumn, group: int) -> str:
         """Return a copy of a card with a new id and another node group."""
         title, first, *further_lines = (row.text for row in card.rows)
         at = 1 + (card.words[0] == "INIVEL")
         head = "/".join(
             ["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]]
         )
-        text_before = first[: 10 * column].ljust(10 * column)
-        text_after = first[10 * (column + 1) :]
-        return (
-            "\n".join(
-                [head, title, f"{text_before}{group:10d}{text_after}", *further_lines]
-            )
-            + "\n"
-        )
+        lines = [head, title, column.put(first, group), *further_lines]
+        return "\n".join(lines) + "\n"

@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.card import Card, CardField, Row, Scope, Value
+from d2rpick.deck.columns import cut_fields
 from d2rpick.deck.expression import ExpressionError, parse_number, parse_real
+from d2rpick.deck.radioss_columns import (
+    BEGIN,
+    MERGE,
+    NODE,
+    PART,
+    RIGID_BODY,
+    RIGID_PART,
+    SOLID_FLAGS,
+)
 from d2rpick.deck.radioss_rigid import (
     BODY,
     MADE_HERE,
@@ -26,6 +36,8 @@ from d2rpick.deck.source import Block, SourceFile
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
+    from d2rpick.deck.columns import CardColumn
+
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
@@ -38,17 +50,6 @@ WITHOUT_FRAME: Final = {
     "BRIC20",
     "SHEL16",
 }
-_WIDTH: Final = 10
-# Fields (of 10 columns) of main node, sensor, group and Ikrem; the mass before the group takes two.
-_OF_BODY: Final = (
-    0,
-    1,
-    6,
-    7,
-)
-# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
-_IRIGID: Final = 5
-_OF_RIGID_PART: Final = (0, 5)
 _RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
 _ICOROTATIONAL: Final = 2  # value of Iframe
 # Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
@@ -296,7 +297,7 @@ class Starter:
         """Return the input version of /BEGIN; 0 if there is none."""
         begin_cards = [card for card in self.named("BEGIN") if card.rows]
         rows = get_lines_below_title(begin_cards[-1]) if begin_cards else ()
-        return begin_cards[-1].integer(rows[0], 0).value if rows else 0
+        return begin_cards[-1].integer(rows[0], BEGIN["Invers"]).value if rows else 0
 
     @property
     def bodies(self) -> Sequence[Body]:
@@ -316,7 +317,10 @@ class Starter:
         """Yield the bodies of /RBODY."""
         for card in self.named("RBODY"):
             for row in get_lines_below_title(card)[: get_number(card) > 0]:
-                node, sensor, group, keeps = (card.integer(row, at) for at in _OF_BODY)
+                node, sensor, group, keeps = (
+                    card.integer(row, RIGID_BODY[name])
+                    for name in ("node_ID", "sens_ID", "grnd_ID", "Ikrem")
+                )
                 stays = bool(sensor.value or keeps.value)
                 yield Body(
                     get_number(card), node, sensor.value, group.value, card, stays
@@ -325,8 +329,13 @@ class Starter:
     def _bodies_of_parts(self) -> Iterator[Body]:
         """Yield the bodies that the starter makes of parts with Irigid 1."""
         for card in self.named("PART") if self.version >= _RIGID_PARTS_SINCE else ():
-            if len(card.rows) > 2 and card.integer(card.rows[1], _IRIGID).value == 1:
-                node, sensor = (card.integer(card.rows[2], at) for at in _OF_RIGID_PART)
+            if len(card.rows) < 3:
+                continue
+            if card.integer(card.rows[1], PART["Irigid"]).value == 1:
+                node, sensor = (
+                    card.integer(card.rows[2], RIGID_PART[name])
+                    for name in ("node_ID", "sens_ID")
+                )
                 part = get_number(card)
                 yield Body(
                     0,
@@ -345,7 +354,7 @@ class Starter:
                 get_lines_below_title(card) if card.words[1:2] == ("RBODY",) else ()
             ):
                 main, main_kind, merged, kind = (
-                    card.integer(row, at).value for at in range(4)
+                    value.value for value in card.numbers(row, MERGE)
                 )
                 yield Merge(main_kind or BODY, main, kind or BODY, merged)
 
@@ -355,9 +364,10 @@ class Starter:
 
     def _node_ids(self) -> Iterator[int]:
         """Yield the ids of all nodes."""
+        column = NODE["node_ID"]
         for card in self.named("NODE"):
             for _, line in card.block.lines():
-                yield parse_id(line[:_WIDTH])
+                yield parse_id(column.cut(line))
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
@@ -365,7 +375,10 @@ class Starter:
         return {
             get_number(card): PartLine(
                 card.rows[0].text.strip(),
-                *(card.integer(row, at).value for at in range(3)),
+                *(
+                    card.integer(row, PART[name]).value
+                    for name in ("prop_ID", "mat_ID", "subset_ID")
+                ),
             )
             for card in self.named("PART")
             for row in get_lines_below_title(card)[:1]
@@ -500,22 +513,17 @@ class Starter:
 
 def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
     """Return the values of Isolid and Iframe in a line."""
-    return card.integer(row, 0).value, card.integer(row, 7).value
+    isolid = card.integer(row, SOLID_FLAGS["Isolid"])
+    iframe = card.integer(row, SOLID_FLAGS["Iframe"])
+    return isolid.value, iframe.value
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
     """Return the ids on lines with fields of 10 columns; -1 for text that is not an id."""
-    cells = [
-        row.text[start : start + _WIDTH].strip()
-        for row in rows
-        for start in range(0, len(row.text), _WIDTH)
-    ]
+    cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 
 
-def read_reals(row: Row, count: int) -> list[float]:
-    """Read numbers in fields of 20 columns; 0 for a blank, NaN for text that is not a number."""
-    return [
-        parse_real(row.text[at : at + 2 * _WIDTH])
-        for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)
-    ]
+def read_reals(row: Row, columns: Iterable[CardColumn]) -> list[float]:
+    """Read the numbers in columns of a line; 0 for a blank, NaN for text that is not a number."""
+    return [parse_real(column.cut(row.text)) for column in columns]

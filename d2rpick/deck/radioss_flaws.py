@@ -13,6 +13,16 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import format_ranges
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, read_elements, read_nodes
+from d2rpick.deck.radioss_columns import (
+    AXIS_GROUP,
+    AXIS_VELOCITY,
+    ID_LIST,
+    POINT,
+    VELOCITY,
+    VELOCITY_START,
+    WALL,
+    WALL_SIZES,
+)
 from d2rpick.deck.radioss_deck import InitialVelocity, Starter, get_number, read_reals
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 
@@ -151,7 +161,7 @@ def _check_wall(
     if not bodies or len(rows) < 2:
         return
     node, _, added, left_out, form = (
-        card.integer(rows[0], at).value for at in range(5)
+        value.value for value in card.numbers(rows[0], WALL)
     )
     if form > 0 and starter.version >= _PENALTY_SINCE:
         return
@@ -185,12 +195,12 @@ def _find_nodes_near_wall(
 ) -> frozenset[int] | None:
     """Return the nodes within the distance of a wall, on its front side; None if they are unknown."""
     rows = card.rows[1:]
-    reach, _, diameter = read_reals(rows[1], 3)
+    reach, _, diameter = read_reals(rows[1], WALL_SIZES)
     if reach == 0:
         return frozenset()
     words = set(card.name.split("/"))
     kind = next(iter(words & _GEOMETRIES), "PLANE" if words & _WITH_KIND else "")
-    points = np.array([read_reals(row, 3) for row in rows[2:5]])
+    points = np.array([read_reals(row, POINT) for row in rows[2:5]])
     if not kind or not len(points) or starter.transformed:
         return None
     ids, coordinates = groups.placed
@@ -279,18 +289,24 @@ def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
     rows = card.rows[1:]
     if kind == "NODE":
         return 0, frozenset(
-            node for row in rows if (node := card.integer(row, 0).value) > 0
+            node
+            for row in rows
+            if (node := card.integer(row, ID_LIST["ID1"]).value) > 0
         )
     axis = kind == "AXIS"
     if kind == "FVM" or len(rows) < 1 + axis:
         return 0, frozenset()
-    speeds = read_reals(rows[axis], 3 + axis)
+    line = AXIS_VELOCITY if axis else VELOCITY
+    speeds = read_reals(rows[axis], [column for column in line if column.kind is float])
     later = rows[1 + axis : 2 + axis]
     if not any(speeds) or any(
-        read_reals(row, 1)[0] or card.integer(row, 2).value for row in later
+        read_reals(row, [VELOCITY_START["Tstart"]])[0]
+        or card.integer(row, VELOCITY_START["sens_ID"]).value
+        for row in later
     ):
         return 0, frozenset()
-    return card.integer(rows[0], 2 if axis else 6).value, frozenset()
+    group_line = AXIS_GROUP if axis else VELOCITY
+    return card.integer(rows[0], group_line["grnod_ID"]).value, frozenset()
 
 
 def _check_starts(

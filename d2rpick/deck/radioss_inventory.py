@@ -15,6 +15,23 @@ from d2rpick.deck import formulations, model
 from d2rpick.deck.expression import parse_real
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, read_elements, read_nodes
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
+from d2rpick.deck.radioss_columns import (
+    AREA,
+    DENSITY,
+    ELASTIC,
+    FREE_MOTION,
+    FUNCTION_POINT,
+    GRAVITY,
+    ID_LIST,
+    INTERFACE,
+    MOTION_TIMES,
+    SHELL_SECTION,
+    SOLID_FLAGS,
+    SPRING,
+    SPRING_FUNCTION,
+    SPRING_MASS,
+    SUPPORT,
+)
 from d2rpick.deck.radioss_deck import (
     SOLIDS,
     Starter,
@@ -41,10 +58,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Row
+    from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.mesh import Integers
     from d2rpick.deck.switching import SwitchWindow
 
-_WIDTH, _REAL = 10, 20
 
 # Laws whose lines begin with density, Young's modulus and Poisson's ratio.
 _ELASTIC: Final = {
@@ -112,7 +129,6 @@ _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 _OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
 _AXES: Final = "XYZ"
-_TRANSLATIONS, _ROTATIONS = slice(3, 6), slice(7, 10)  # columns of the codes of /BCS
 
 
 class _Property(NamedTuple):
@@ -180,7 +196,7 @@ def _find_watched_nodes(starter: Starter) -> Integers:
         if card.words[1:2] == ("NODE",)
         for row in get_lines_below_title(card)
     ]
-    ids = (row.text[:_WIDTH].strip() for row in rows)
+    ids = (ID_LIST["ID1"].cut(row.text).strip() for row in rows)
     return np.unique(
         np.array(
             [int(text) for text in ids if text.isdecimal() and int(text)], np.int64
@@ -265,7 +281,8 @@ def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
         law = card.words[1]
         is_elastic = law in _ELASTIC
         modulus, poisson = (
-            _read_positive(rows, 1, at) if is_elastic else None for at in (0, _REAL)
+            _read_positive(rows, 1, column) if is_elastic else None
+            for column in ELASTIC
         )
         kind = "deformable"
         if law in _VOID:
@@ -274,7 +291,13 @@ def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
             kind = "airbag"
         yield (
             get_number(card, 2),
-            Material(f"MAT/{law}", kind, _read_positive(rows, 0, 0), modulus, poisson),
+            Material(
+                f"MAT/{law}",
+                kind,
+                _read_positive(rows, 0, DENSITY["rho"]),
+                modulus,
+                poisson,
+            ),
         )
 
 
@@ -311,7 +334,7 @@ def _read_section(type_: str, rows: Sequence[str]) -> Section:
     if type_ in _PLAIN_SHELLS:
         return _read_shell_section(rows)
     if type_ in _AREA_LINE:
-        return Section(area=_read_positive(rows, _AREA_LINE[type_], 0))
+        return Section(area=_read_positive(rows, _AREA_LINE[type_], AREA["Area"]))
     return _read_spring_section(rows) if type_ in _SPRING else Section()
 
 
@@ -335,32 +358,36 @@ def _complete_section(
 
 def _read_spring_section(rows: Sequence[str]) -> Section:
     """Read mass and stiffness of a spring; a function of the length replaces the constant stiffness."""
-    linear = len(rows) < 3 or not rows[2][:_WIDTH].strip(" 0")
+    linear = len(rows) < 3 or not SPRING_FUNCTION["fct_ID1"].cut(rows[2]).strip(" 0")
     return Section(
-        damped=_read_positive(rows, 1, _REAL) is not None,
-        mass=_read_positive(rows, 0, 0),
-        stiffness=_read_positive(rows, 1, 0) if linear else None,
+        damped=_read_positive(rows, 1, SPRING["C"]) is not None,
+        mass=_read_positive(rows, 0, SPRING_MASS["Mass"]),
+        stiffness=_read_positive(rows, 1, SPRING["K"]) if linear else None,
     )
 
 
 def _read_shell_section(rows: Sequence[str]) -> Section:
     """Read thickness and integration points of a shell; 0 points mean global integration, which counts as one."""
-    points = rows[2][:_WIDTH].strip() if len(rows) > 2 else None
+    points = SHELL_SECTION["N"].cut(rows[2]).strip() if len(rows) > 2 else None
     if points is None:
         layers = None
     else:
         layers = max(int(points) if points.isdecimal() else 0, 1)
-    return Section(thickness=_read_positive(rows, 2, 20), layers=layers)
+    return Section(
+        thickness=_read_positive(rows, 2, SHELL_SECTION["Thick"]), layers=layers
+    )
 
 
 def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
-    """Return the eight integers in the first line, of 10 columns each; 0 for other text."""
-    return [card.integer(rows[0], at).value if rows else 0 for at in range(8)]
+    """Return the flags in the first line; 0 for other text."""
+    return [
+        card.integer(rows[0], column).value if rows else 0 for column in SOLID_FLAGS
+    ]
 
 
-def _read_positive(rows: Sequence[str], row: int, start: int) -> float | None:
-    """Read a positive number in 20 columns, or None."""
-    value = parse_real(rows[row][start : start + _REAL]) if row < len(rows) else 0.0
+def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float | None:
+    """Read a positive number in a column, or None."""
+    value = parse_real(column.cut(rows[row])) if row < len(rows) else 0.0
     return value if value > 0 else None
 
 
@@ -407,9 +434,10 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
         if words[0] == "BCS" and lifted:
             yield f"{_name_card(card)}: an engine file removes supports (/BCSR), which d2rpick does not evaluate"
         elif words[1:2] == ("FGEO",):
-            group = frozenset({card.integer(rows[0], 1).value} - {0})
+            part = card.integer(rows[0], FREE_MOTION["part_ID"]).value
+            group = frozenset({part} - {0})
             nodes = model.make_ids(
-                {parse_id(row.text[:_WIDTH]) for row in rows[2:]} - {0}
+                {parse_id(ID_LIST["ID1"].cut(row.text)) for row in rows[2:]} - {0}
             )
             yield model.Hold(_name_card(card), nodes, group, counts=True)
         else:
@@ -418,8 +446,9 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
                 if words[0] == "BCS"
                 else _find_motion(card, rows)
             )
+            line = SUPPORT if words[0] == "BCS" else GRAVITY
             members = starter.group_members(
-                card.integer(rows[0], 2 if words[0] == "BCS" else 4).value
+                card.integer(rows[0], line["grnod_ID"]).value
             )
             if members is None:
                 yield f"{_name_card(card)}: the nodes of its group are unknown"
@@ -431,20 +460,24 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
     """Read a /BCS; along the axes of a skew it is always a support, unless it fixes all translations."""
-    moves, turns = (rows[0].text[at].ljust(3) for at in (_TRANSLATIONS, _ROTATIONS))
+    moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
         return None
-    skewed = bool(card.integer(rows[0], 1).value) and 0 < len(axes) < len(_AXES)
+    skewed = bool(card.integer(rows[0], SUPPORT["skew_ID"]).value) and 0 < len(
+        axes
+    ) < len(_AXES)
     return model.Hold(_name_card(card), model.make_ids(()), axes=axes, counts=skewed)
 
 
 def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
     """Read a prescribed motion with its times; with a sensor or its own units it acts at all times."""
     timed = (
-        len(rows) > 1 and not card.integer(rows[0], 3).value and not get_number(card, 2)
+        len(rows) > 1
+        and not card.integer(rows[0], GRAVITY["sens_ID"]).value
+        and not get_number(card, 2)
     )
-    start, stop = read_reals(rows[1], 4)[2:] if timed else (0.0, 0.0)
+    start, stop = read_reals(rows[1], MOTION_TIMES)[2:] if timed else (0.0, 0.0)
     is_finite = np.isfinite([start, stop]).all()
     return model.Hold(
         _name_card(card),
@@ -502,14 +535,17 @@ def _read_gravity_card(
 ) -> model.Gravity | None:
     """Read values and nodes of a /GRAV; None if they are unknown. Before its sensor is active it is 0."""
     row = get_lines_below_title(card)[0]
-    function, skew, sensor, group = (card.integer(row, at).value for at in (0, 2, 3, 4))
-    scale = read_reals(row, 5)[4] or 1.0
+    function, skew, sensor, group = (
+        card.integer(row, GRAVITY[name]).value
+        for name in ("fct_ID", "skew_ID", "sens_ID", "grnod_ID")
+    )
+    scale = read_reals(row, [GRAVITY["Fscale_y"]])[0] or 1.0
     if function:
         values = model.find_plateaus(functions.get(function, ()), scale)
     else:
         values = (scale,)
     members = starter.group_members(group) if group else (set[int](), set[int]())
-    direction = row.text[_WIDTH : 2 * _WIDTH].strip().upper() or "Z"
+    direction = GRAVITY["Dir"].cut(row.text).strip().upper() or "Z"
     if (
         not values
         or not np.isfinite(values).all()
@@ -535,7 +571,10 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
             number,
             ()
             if number in moved
-            else tuple(read_reals(row, 2)[1] for row in get_lines_below_title(card)),
+            else tuple(
+                read_reals(row, FUNCTION_POINT)[1]
+                for row in get_lines_below_title(card)
+            ),
         )
 
 
@@ -588,7 +627,7 @@ def _read_interface(
     """Return the joint of a tied interface; None if its nodes or its main part are unknown."""
     rows = get_lines_below_title(card)
     if rows:
-        group, surface = (card.integer(rows[0], at).value for at in range(2))
+        group, surface = (value.value for value in card.numbers(rows[0], INTERFACE))
     else:
         group, surface = (0, 0)
     members = starter.group_members(group)
@@ -606,5 +645,5 @@ def _list_surface_ids(card: Card) -> Iterator[int]:
     """Yield the ids below the title of a surface."""
     for row in get_lines_below_title(card):
         yield from (
-            value for at in range(10) if (value := card.integer(row, at).value) > 0
+            value.value for value in card.numbers(row, ID_LIST) if value.value > 0
         )

@@ -13,11 +13,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import find_reachable
-from d2rpick.deck.card import Row
+from d2rpick.deck.radioss_columns import DELAY, FORCE_SENSOR, SENSOR_INPUTS, STOP
 from d2rpick.deck.radioss_deck import Starter, get_lines_below_title, read_reals
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    from d2rpick.deck.card import Row
 
     Spans = tuple[tuple[float, float], ...]  # of time
     # When the force of an interface or rigid wall acts, by its kind and number; None where that is not known.
@@ -30,7 +32,6 @@ NEVER: Final = 1e20  # times from here on never come
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
 # Types of /INTER without contact force on a flying body: ties, fluids, and parts of other contacts.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
-_WIDTH: Final = 10
 _SINGLE: Final = (
     1e-6  # relative rounding of the times in a T01 file, which have seven digits
 )
@@ -79,8 +80,8 @@ def find_active_spans(
     if kind not in ("TIME", "OR", "AND", "NOT"):
         return f"sensor {number} (/SENSOR/{kind}), which is not a time sensor"
     if kind == "TIME":
-        delay = read_reals(rows[0], 1)[0] if rows else 0.0
-        stop = read_reals(rows[1], 1)[0] if len(rows) > 1 else 0.0
+        delay = read_reals(rows[0], DELAY)[0] if rows else 0.0
+        stop = read_reals(rows[1], STOP)[0] if len(rows) > 1 else 0.0
         if math.isnan(delay) or math.isnan(stop):
             return f"sensor {number}, whose time is no number"
         stop = min(
@@ -89,9 +90,9 @@ def find_active_spans(
         return ((max(delay, 0.0), stop),) if delay < stop else ()
     if len(rows) < 2:
         return f"sensor {number}, which names no other"
-    input_ids = [
-        card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)
-    ]
+    input_ids = [value.value for value in card.numbers(rows[1], SENSOR_INPUTS)]
+    if kind == "NOT":
+        input_ids = input_ids[:1]
     spans_of_inputs = [
         find_active_spans(starter, sensor_input, course, (*above, number))
         for sensor_input in input_ids
@@ -121,14 +122,14 @@ def _find_forced_spans(
     name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
     if len(rows) < 2:
         return name
-    entity = starter.sensors[number].integer(rows[1], 0).value
+    entity = starter.sensors[number].integer(rows[1], FORCE_SENSOR["ID"]).value
     contacts = course.find_contacts(_OF_FORCES[keyword], entity)
     if contacts is None:
         return name
     lowest, highest, needed = read_reals(
-        Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3
+        rows[1], (FORCE_SENSOR[name] for name in ("Fmin", "Fmax", "Tmin"))
     )
-    wait = read_reals(rows[0], 1)[0]
+    wait = read_reals(rows[0], DELAY)[0]
     if not (lowest < 0 and highest == 0) or math.isnan(wait + needed):
         return f"{name} of a size that is not followed"
     if number in course.resets:
@@ -161,7 +162,7 @@ def find_contacts_of_sensor(
         )
         if card and len(rows) > 1:
             kind = _OF_FORCES[card.words[1]]
-            entity = card.integer(rows[1], 0).value
+            entity = card.integer(rows[1], FORCE_SENSOR["ID"]).value
             force_spans.append(course.find_contacts(kind, entity))
     spans = [contacts for contacts in force_spans if contacts is not None]
     return join_spans(spans) if spans else None
@@ -176,7 +177,7 @@ def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
         else ()
     )
     if card and len(rows) > 1:
-        return [card.integer(rows[1], at).value for at in range(2)]
+        return [value.value for value in card.numbers(rows[1], SENSOR_INPUTS)]
     return []
 
 

@@ -24,6 +24,12 @@ from d2rpick.deck.card import (
     Scope,
     Transform,
 )
+from d2rpick.deck.ls_dyna_columns import (
+    ID_OFFSETS,
+    OTHER_OFFSET,
+    TRANSFORMATION,
+    UNIT_FACTORS,
+)
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -32,7 +38,6 @@ if TYPE_CHECKING:
 
 
 _CONTINUED = " +"
-_FACTORS, _OF_TIME = 3, 1  # factors of mass, time and length; index of the time factor
 UNKNOWN_KIND = "this kind of include is not read"
 
 _KEPT: Final = (
@@ -150,16 +155,21 @@ def _read_transform(
     card: Card, rows: list[Row]
 ) -> tuple[Transform, tuple[Problem, ...]]:
     """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank and a factor of 0 mean no change."""
-    positions = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
+    id_columns = [
+        *((0, ID_OFFSETS[f"ID{letter}OFF"]) for letter in "NPMS"),
+        (1, OTHER_OFFSET["IDROFF"]),
+    ]
     offsets = [
-        card.integer(rows[row], position) if row < len(rows) else None
-        for row, position in positions
+        card.integer(rows[row], column) if row < len(rows) else None
+        for row, column in id_columns
     ]
     if len(rows) > 2:
-        factors = [card.real(rows[2], at, 1.0) for at in range(_FACTORS)]
+        factors = {
+            column.name: card.real(rows[2], column, 1.0) for column in UNIT_FACTORS
+        }
     else:
-        factors = []
-    factor = factors[_OF_TIME] if factors else None
+        factors = {}
+    factor = factors.get("FCTTIM")
     node, part, material, set_, other_id = (
         value.value if value else 0 for value in offsets
     )
@@ -169,8 +179,10 @@ def _read_transform(
         for value in (*offsets, factor)
         if value and value.problem
     )
-    scaled = any(value.value not in (0.0, 1.0) for value in factors)
-    transform_id = card.integer(rows[3], 0) if len(rows) > 3 else None
+    scaled = any(value.value not in (0.0, 1.0) for value in factors.values())
+    transform_id = (
+        card.integer(rows[3], TRANSFORMATION["TRANID"]) if len(rows) > 3 else None
+    )
     # An unreadable transformation may move nodes.
     moved = transform_id is not None and (
         bool(transform_id.problem) or transform_id.value != 0

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
+from d2rpick.deck.ls_dyna_columns import TERMINATION
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import Deck, Restart, read_deck
 
@@ -80,5 +81,5 @@ def _find_end(deck: Deck) -> Value[float] | None:
     rows = [
         (card, card.rows[0]) for card in deck.named("CONTROL_TERMINATION") if card.rows
     ]
-    end = rows[-1][0].real(rows[-1][1], 0) if rows else None
+    end = rows[-1][0].real(rows[-1][1], TERMINATION["ENDTIM"]) if rows else None
     return end if end and not end.problem and end.value > 0 else None

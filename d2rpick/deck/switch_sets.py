@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.deck.ls_dyna_columns import (
+    SWITCH_COUNTS,
+    SWITCH_TIMES,
+    TO_DEFORMABLE,
+    TO_RIGID,
+)
 from d2rpick.deck.part_sets import NO_SETS, PartSets, name_parts
 from d2rpick.deck.printed_card import write_number
 
@@ -12,20 +18,15 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Printing
 
-_SET_HEAD = (
-    "$#   swset      code     time1     time2     time3     entno     relsw    paired"
-)
-_COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
-
 
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
     """Yield the D2R lines of some parts or their sets, lead parts first."""
-    yield "$#     pid       lrb     ptype"
+    yield TO_RIGID.write_names()
     for lead, members in group_by_lead(ids, printing).items():
         yield from (
-            f"{name:10d}{lead:10d}{kind:>10}"
+            TO_RIGID.write(PID=name, LRB=lead, PTYPE=kind)
             for name, kind in name_parts(members, part_sets)
         )
 
@@ -34,8 +35,11 @@ def write_deformable_lines(
     ids: Sequence[int], part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
     """Yield the R2D lines of some parts or their set."""
-    yield "$#     pid     ptype"
-    yield from (f"{name:10d}{kind:>10}" for name, kind in name_parts(ids, part_sets))
+    yield TO_DEFORMABLE.write_names()
+    yield from (
+        TO_DEFORMABLE.write(PID=name, PTYPE=kind)
+        for name, kind in name_parts(ids, part_sets)
+    )
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
@@ -86,11 +90,25 @@ def write_header(
     """
     waiting = waits or Waiting()
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
-    yield _SET_HEAD
-    yield (
-        f"{swset:10d}{waiting.code:10d}{time:>10s}{write_number(waiting.latest):>10s}{write_number(waiting.delay):>10s}"
-        f"{waiting.contact:10d}{waiting.other:10d}{waiting.paired:10d}"
+    yield SWITCH_TIMES.write_names()
+    yield SWITCH_TIMES.write(
+        SWSET=swset,
+        CODE=waiting.code,
+        TIME1=time,
+        TIME2=write_number(waiting.latest),
+        TIME3=write_number(waiting.delay),
+        ENTNO=waiting.contact,
+        RELSW=waiting.other,
+        PAIRED=waiting.paired,
     )
-    yield _COUNT_HEAD
+    yield SWITCH_COUNTS.write_names()
     nrbf, ncsf = constraints
-    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{write_number(waiting.offset):>10s}"
+    yield SWITCH_COUNTS.write(
+        NRBF=nrbf,
+        NCSF=ncsf,
+        RWF=0,
+        DTMAX=step_cap,
+        D2R=counts[0],
+        R2D=counts[1],
+        OFFSET=write_number(waiting.offset),
+    )

@@ -16,6 +16,16 @@ from typing import TYPE_CHECKING, Final, Literal
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField, Row, Value
+from d2rpick.deck.ls_dyna_columns import (
+    INERTIA_CENTRE,
+    INERTIA_PART,
+    INERTIA_TENSOR,
+    RESTART_CONTROL,
+    SWITCH_COUNTS,
+    SWITCH_TIMES,
+    TO_DEFORMABLE,
+    TO_RIGID,
+)
 from d2rpick.deck.reader import SWITCHING, Deck, Restart
 
 if TYPE_CHECKING:
@@ -36,31 +46,12 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
-# Types of the fields in the two header lines.
-_FIRST_LINE = (
-    int,
-    int,
-    float,
-    float,
-    float,
-    int,
-    int,
-    int,
-)
-_SECOND_LINE = (int, int, float, float, int, int, float)
-_COUNTS_FIELD = 4  # position of D2R in the second line
 _PTYPES: Final = {"PART", "PSET"}
 _INERTIA_ROWS: Final = (
     "the first line (PID)",
     "the second line (XC to TM)",
     "the third line (IXX to IZZ)",
 )
-_REALS: Final = {
-    "automatic": (4, 0),
-    "inertia": (4, 6),
-    "restart": (0, 0),
-    "plain": (0, 0),
-}
 
 
 class Switched(NamedTuple):
@@ -178,12 +169,19 @@ def _read_simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
     rows = card.lines
     if kind == "inertia":
         part = (
-            [_add_offset(card.integer(rows[0], 0), card.transform.part)] if rows else []
+            [
+                _add_offset(
+                    card.integer(rows[0], INERTIA_PART["PID"]), card.transform.part
+                )
+            ]
+            if rows
+            else []
         )
+        lines_of_reals = (INERTIA_CENTRE, INERTIA_TENSOR)
         reals = [
-            card.real(row, at)
-            for row, count in zip(rows[1:], _REALS[kind], strict=False)
-            for at in range(count)
+            value
+            for row, line in zip(rows[1:], lines_of_reals, strict=False)
+            for value in card.numbers(row, line)
         ]
         missing = _INERTIA_ROWS[len(rows) :]
         if missing:
@@ -196,7 +194,7 @@ def _read_simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
             card, kind, None, (), (*part, *reals), problem, next(iter(part), None)
         )
     if card.name.endswith("_CONTROL"):
-        values = [card.real(row, at) for row in rows[:1] for at in range(4)]
+        values = card.numbers(rows[0], RESTART_CONTROL) if rows else []
         return SwitchSet(card, kind, None, (), tuple(values), restart=restart)
     to_rigid = not card.name.endswith("_R2D")
     lines = [
@@ -230,10 +228,8 @@ def _read_automatic(card: Card) -> SwitchSet:
         )
         problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
-        short = (
-            sum(bool(rows[1].cell(at)) for at in range(_COUNTS_FIELD + 1))
-            <= _COUNTS_FIELD
-        )
+        up_to_d2r = range(SWITCH_COUNTS["D2R"].position + 1)
+        short = not all(rows[1].cell(position) for position in up_to_d2r)
         lost = "; is the second line (NRBF to OFFSET) missing?" if short else ""
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
@@ -272,7 +268,10 @@ def _describe_missing(rows: Sequence[Row]) -> str:
 
 def _is_part_line(row: Row) -> bool:
     """Return True if a line has PTYPE in one of its columns."""
-    return row.cell(1).upper() in _PTYPES or row.cell(2).upper() in _PTYPES
+    return any(
+        row.cell(line["PTYPE"].position).upper() in _PTYPES
+        for line in (TO_DEFORMABLE, TO_RIGID)
+    )
 
 
 def _count_lines(count: int) -> str:
@@ -282,7 +281,7 @@ def _count_lines(count: int) -> str:
 
 def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
     """Read the two header lines."""
-    values = card.numbers(first, _FIRST_LINE) + card.numbers(second, _SECOND_LINE)
+    values = card.numbers(first, SWITCH_TIMES) + card.numbers(second, SWITCH_COUNTS)
     swset, code, time1, time2, time3, entno, relsw, *further_values = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
         code = replace(
@@ -297,7 +296,8 @@ def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
             parameters=(),
         )
     if code.value == BY_TIME and not time1.problem and _is_overlong(first):
-        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
+        next_text = first.cell(SWITCH_TIMES["TIME2"].position)
+        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {next_text})"
         time1 = replace(time1, problem=problem, parameters=())
     swset, relsw = (
         _add_offset(set_id, card.transform.rest) for set_id in (swset, relsw)
@@ -307,7 +307,7 @@ def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
 
 def _is_overlong(row: Row) -> bool:
     """Return True if the digits of TIME1 continue in the columns of TIME2, which is then not a number of its own."""
-    border = 3 * row.width
+    border = SWITCH_TIMES["TIME2"].position * row.width
     next_field = row.text[border : border + row.width].strip()
     touching = (
         row.text[border - 1 : border].isdigit()
@@ -325,9 +325,10 @@ _Line = tuple[Switched, Value[str]]
 
 
 def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
-    """Read a part line: part, LRB on a D2R line, and PTYPE (column 21 of a D2R line, column 11 of an R2D line)."""
+    """Read a part line: the part, LRB if it is a D2R line, and PTYPE if the keyword has it."""
+    line = TO_RIGID if to_rigid else TO_DEFORMABLE
     if ptype:
-        kind = card.word(row, 2 if to_rigid else 1, "PART")
+        kind = card.word(row, line["PTYPE"], "PART")
     else:
         kind = Value("PART", card.here)
     if kind.value not in _PTYPES:
@@ -338,7 +339,8 @@ def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Li
         )
     by_set = kind.value == "PSET"
     part = _add_offset(
-        card.integer(row, 0), card.transform.set_ if by_set else card.transform.part
+        card.integer(row, line["PID"]),
+        card.transform.set_ if by_set else card.transform.part,
     )
     if not part.problem and part.value <= 0:
         part = Value(
@@ -346,7 +348,10 @@ def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Li
             part.field,
             f"{part.field.text!r} is not a part id; a positive number was expected",
         )
-    lead = _add_offset(card.integer(row, 1), card.transform.part) if to_rigid else None
+    if to_rigid:
+        lead = _add_offset(card.integer(row, line["LRB"]), card.transform.part)
+    else:
+        lead = None
     return Switched(part, by_set, to_rigid, lead), kind
 
 

@@ -14,7 +14,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.deck.ls_dyna_columns import MATERIAL
 from d2rpick.deck.ls_dyna_parts import DeckParts, name_material, read_sections
+from d2rpick.deck.radioss_columns import SOLID_FLAGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -68,7 +70,7 @@ def find_unswitchable_in_ls_dyna(
     """Return the parts of an LS-DYNA deck that must not be switched, by part id, from their sections and materials."""
     sections = read_sections(deck)
     laws = {
-        name_material(card, card.data[0], 0): card.name
+        name_material(card, card.data[0], MATERIAL["MID"]): card.name
         for card in deck.named("MAT")
         if card.data
     }
@@ -125,7 +127,7 @@ def _read_strain_flags(starter: Starter) -> Mapping[int, int]:
         if card.words[2:] and card.words[1] in SOLIDS
     ]
     return {
-        get_number(card, 2): card.integer(row, _ISMSTR).value
+        get_number(card, 2): card.integer(row, SOLID_FLAGS["Ismstr"]).value
         for card in solids
         for row in get_lines_below_title(card)[:1]
     }

@@ -19,6 +19,7 @@ from d2rpick.deck.engine_files import (
 )
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_bodies import find_replaced_bodies
+from d2rpick.deck.radioss_columns import BEGIN, RIGID_BODY, UNITS
 from d2rpick.deck.radioss_deck import (
     RadiossLeg,
     Starter,
@@ -321,16 +322,20 @@ def _edit_lines(
     for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
         at = block.start + sum(len(line) + 1 for line in lines[: row.distance])
-        text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
-        first, second = (card.integer(row, column).value for column in (0, 1))
+        text = lines[row.distance].rstrip(b"\r").decode("latin-1")
+        node, sensor = (
+            card.integer(row, RIGID_BODY[name]).value for name in ("node_ID", "sens_ID")
+        )
         if card.words[0] == "BEGIN":
-            new = f"{max(first, STOPS_SINCE):10d}{text[10:]}"
-        elif first in sensors:
-            if second:
+            version = card.integer(row, BEGIN["Invers"]).value
+            new = BEGIN["Invers"].put(text, max(version, STOPS_SINCE))
+        elif node in sensors:
+            if sensor:
+                problem = f"sensor {sensor} switches this /RBODY already"
                 raise DeckError(
-                    f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove the sensor first"
+                    f"{row.field(0).at}: {problem}; remove the sensor first"
                 )
-            new = f"{text[:10]}{sensors[first]:10d}{text[20:]}"
+            new = RIGID_BODY["sens_ID"].put(text, sensors[node])
         else:
             return
         yield at, (at + len(lines[row.distance].rstrip(b"\r")), new.encode("latin-1"))
@@ -542,5 +547,5 @@ def _find_second(run: RadiossRun) -> float | None:
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())
     if len(rows) > 3:
-        return _IN_A_SECOND.get(rows[3].text[40:60].strip().lower())
+        return _IN_A_SECOND.get(UNITS["Time"].cut(rows[3].text).strip().lower())
     return None

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.decision import list_verdict_lines
 from d2rpick.report.situation import list_health_measures, list_situation_heading
 from d2rpick.report.tables import Cell, format_short, quote_shell_line
@@ -22,13 +23,13 @@ if TYPE_CHECKING:
 
     from d2rpick.base.errors import Caution
     from d2rpick.choice.health import Health
-    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.choice.td.trade_off import TradeOff
+    from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
@@ -311,14 +312,17 @@ class PageContext(NamedTuple):
     """What a page shows besides the answer.
 
     ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
-    options of ``card`` that select the same history.  ``card`` is the solver input of a recommended or verified pair;
-    ``explorer`` makes the page interactive.
+    options of ``card`` that select the same history.  ``printing`` is how the card of a recommended
+    or verified pair is printed; ``card`` is None without parts to switch, or if ``refusal`` says why it cannot be
+    printed.  ``explorer`` makes the page interactive.
     """
 
     run: OpenedRun
     command: Sequence[str]
     judging: Sequence[str]
-    card: SolverInput | None = None
+    printing: Printing | None = None
+    card: PrintedCard | None = None
+    refusal: str = ""
     switched: OpenedRun | None = None
     explorer: Explorer | None = None
 
@@ -506,18 +510,21 @@ def _list_solver_input(
     times: tuple[float, float], record: PageContext
 ) -> tuple[Markup, ...]:
     """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
-    card = record.card
-    assert card is not None
-    if card.refusal:
-        text = f"No card can be printed for these times: {card.refusal}"
-        return (make_element("p", text),)
-    if card.text:
-        return (make_element("pre", card.text, tabindex="0"),)
+    printing = record.printing
+    assert printing is not None
+    if record.refusal:
+        reason = f"No card can be printed for these times: {record.refusal}"
+        return (make_element("p", reason),)
+    if record.card:
+        return (make_element("pre", record.card.text, tabindex="0"),)
+    solver = printing.solver or DEFAULT
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
-    command += ["--solver", card.solver] if card.solver else []
+    command += [] if solver == DEFAULT else ["--solver", solver]
     line = make_element(
         "pre",
-        quote_shell_line([*command, f"--{card.switches}", "IDS", *record.judging]),
+        quote_shell_line(
+            [*command, f"--{SOLVERS[solver].switches}", "IDS", *record.judging]
+        ),
         class_="wrap",
     )
     return (make_element("p", "Printed, and judged again as printed, by"), line)

@@ -214,7 +214,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
             answer.switched, record.switched.files if record.switched else ()
         )
     yield from page.build_evidence(situation, answer.health, record)
-    if record.card:
+    if record.printing:
         yield page.build_solver_input(answer.decision, times, record)
 
 

@@ -11,6 +11,7 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, format_in_one_line
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField
+from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.ls_dyna_parts import (
     Constraint,
     DeckParts,
@@ -294,7 +295,8 @@ class Case:
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
         ]
-        return tuple((card, card.real(card.rows[0], 0)) for card in cards)
+        # ENDTIM and DT have the same place.
+        return tuple((card, card.real(card.rows[0], DATABASE["DT"])) for card in cards)
 
 
 @dataclass(eq=False, repr=False, kw_only=True)

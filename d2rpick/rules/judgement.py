@@ -30,7 +30,7 @@ from d2rpick.flight.contact_times import (
 from d2rpick.histories.contact_forces import find_force
 from d2rpick.histories.digits import (
     convert_to_unit_of_record,
-    format_above_limit,
+    format_beyond_limit,
     round_to_first_as_read,
 )
 from d2rpick.histories.surroundings import UNKNOWN
@@ -279,12 +279,10 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
-    faults = [*_judge_flight(verdict), *_judge_error(verdict)]
     situation, decision = verdict.situation, verdict.decision
-    exceeded = list_exceeded_limits(situation, verdict.candidate)
-    if exceeded:
-        faults.append(Fault("D2R209", False, "; ".join((*exceeded, decision.cure))))
-    elif not verdict.admissible and not faults:
+    limit_faults = [*_judge_limits(verdict)]
+    faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
+    if not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
     if verdict.admissible and not decision.reaches(situation.settings.min_quality):
@@ -293,6 +291,8 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     elif (
         situation.kinetic_share is not None
         and situation.kinetic_share > POOR_KINETIC_SHARE
+        # one finding for one mistake
+        and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
         cure = "no better td was found"
@@ -372,8 +372,16 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
         else:
             of_parts = ""
         levels = f"the energy{of_parts} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = f"{quantity} {format_above_limit(error, tolerance)}, expected at most {tolerance:g}"
+        expected = f"{quantity} {format_beyond_limit(error, tolerance)}, expected at most {tolerance:g}"
         yield Fault("D2R201", False, f"{levels}: {expected}; {_suggest_cure(verdict)}")
+
+
+def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
+    """Yield an objection for each limit of a recommendation that the pair exceeds."""
+    exceeded = list_exceeded_limits(verdict.situation, verdict.candidate)
+    cure = _suggest_cure(verdict) if exceeded else ""
+    for excess in exceeded:
+        yield Fault("D2R210", excess.is_td_wrong, f"{excess.message}; {cure}")
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:

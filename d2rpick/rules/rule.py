@@ -6,6 +6,12 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.deck.ls_dyna_columns import (
+    SWITCH_COUNTS,
+    SWITCH_TIMES,
+    TO_DEFORMABLE,
+    TO_RIGID,
+)
 from d2rpick.rules.base import LS_DYNA
 
 if TYPE_CHECKING:
@@ -99,14 +105,16 @@ def write_automatic_card(
     lines = [
         "*DEFORMABLE_TO_RIGID_AUTOMATIC",
         "$    swset      code     time1     time2     time3     entno     relsw    paired",
-        f"{swset:10d}{code:10d}{time1:>10s}       0.0       0.0         0{relsw:10d}{paired:10d}",
+        SWITCH_TIMES.write(
+            SWSET=swset, CODE=code, TIME1=time1, RELSW=relsw, PAIRED=paired
+        ),
         "$     nrbf      ncsf       rwf     dtmax       d2r       r2d    offset",
-        f"         0         0         0       0.0{d2r:10d}{r2d:10d}       0.0",
+        SWITCH_COUNTS.write(RWF=0, D2R=d2r, R2D=r2d),
         *(
-            f"{line:>10s}         0      PART" if len(line) <= 10 else line
+            TO_RIGID.write(PID=line, PTYPE="PART") if len(line) <= 10 else line
             for line in rigid
         ),
-        *(f"{line:>10s}      PART" for line in deformable),
+        *(TO_DEFORMABLE.write(PID=line, PTYPE="PART") for line in deformable),
     ]
     return "\n".join(lines) + "\n"
 

@@ -9,6 +9,7 @@ number of them goes on as the record does.
 
 from __future__ import annotations
 
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # A higher order must reduce the prediction error by this factor, and below the second value none is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
+_BETTER, _OF_A_LINE = 0.97, 16.0
 # Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], else half of the record: the cost grows with its square.
@@ -36,9 +38,12 @@ _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
 # Times are even if they deviate by less than this share of a step, as single precision and printed digits do.
 _EVEN: Final = 1e-3
 # The power of white noise hardly exceeds this many times its median.
-_ABOVE_NOISE: Final = 10.0
+_ABOVE_NOISE: Final = 20.0
 # Shares of the power of an energy about its trend: rates up to the first share are relevant, up to the second strong.
-_ALL_POWER, _STRONG_POWER = 0.999, 0.95
+# A line of 1 % of the strongest one's height has 1e-4 of its power, and beyond the grid it would pass for a slower one.
+_ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
+# A line that has decayed within a part of the record is sought in the first part of this length [share of the record].
+_EARLY: Final = 0.25
 # A line swings at least once in the record, and decays by less than this share of its rate and by fewer powers of e
 # within the record than the third value.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
@@ -75,6 +80,20 @@ class Grid(NamedTuple):
         """Return a grid of the first ``count`` blocks."""
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
+    def waves(self, poles: Complex) -> Complex:
+        """Return exp(p (t - t_0)) at the m times of the grid, t_0 the first, shape (m, poles) [-].
+
+        On an even grid each is a product of two of about sqrt(m) exponentials, which are dearer than products.
+        """
+        count = self.time.size
+        width = ceil(sqrt(count))
+        inner = np.arange(width) * self.step
+        outer = np.arange(0, count, width) * self.step
+        coarse: Complex = np.exp(np.multiply.outer(outer, poles))
+        fine: Complex = np.exp(np.multiply.outer(inner, poles))
+        products: Complex = coarse[:, np.newaxis] * fine
+        return products.reshape(-1, poles.size)[:count]
+
     def gain(self, poles: Complex) -> Complex:
         """Return the mean of ``exp(p t)`` over a block relative to its middle value, of the shape of ``poles``."""
         half = poles * self.spacing / 2
@@ -99,15 +118,11 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
         )  # not at the top: scipy costs start-up
 
         values = CubicSpline(time, energy)(even)
-    reach = even - even[0]
-    trend = np.polyval(np.polyfit(reach, values, 2), reach)
-    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # white noise has as much power at the highest rates as anywhere
-    noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
-    running = np.cumsum(np.maximum(power - noise, 0.0))
-    fastest, strongest = np.searchsorted(
-        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
-    ).tolist()
+    fastest, strongest = _count_turns(even, values)
+    early = int(_EARLY * time.size)
+    if early >= _FEWEST_STATES:
+        fastest_early, _ = _count_turns(even[:early], values[:early])
+        fastest = max(fastest, fastest_early / _EARLY)
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
@@ -122,6 +137,20 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
         size=size,
         strong=count / max(strongest, 1),
     )
+
+
+def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
+    """Return the turns of the fastest relevant line and of the fastest strong line within equidistant times (n,)."""
+    reach = time - time[0]
+    trend = np.polyval(np.polyfit(reach, values, 2), reach)
+    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
+    # white noise has as much power at the highest rates as anywhere
+    noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
+    running = np.cumsum(np.maximum(power - noise, 0.0))
+    fastest, strongest = np.searchsorted(
+        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
+    ).tolist()
+    return fastest, strongest
 
 
 class Exponentials(NamedTuple):
@@ -225,7 +254,7 @@ def predict(grid: Grid) -> Prediction | None:
                 np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
             )
             missed = float(np.hypot(error, spectrum.error)) / swing
-            if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
+            if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
         if tried[-1][0] < _PERFECT:
             break
@@ -235,6 +264,13 @@ def predict(grid: Grid) -> Prediction | None:
     poles = _SignalSpace.of(grid).poles(order)
     whole = fit_spectrum(grid, poles, grid.span, every_decay=every_decay)
     return Prediction(whole, of_first, missed, swing)
+
+
+def _get_needed(spectrum: Spectrum) -> float:
+    """Return the factor by which a higher order must reduce the prediction error of a spectrum [-]."""
+    powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
+    typical = float(np.mean(powers))
+    return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:
@@ -274,9 +310,7 @@ def fit_spectrum(
     """
     lines, mean = _split(poles, span, every_decay=every_decay)
     all_poles = np.concatenate([lines, mean])
-    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], all_poles)) * grid.gain(
-        all_poles
-    )
+    waves = grid.waves(all_poles) * grid.gain(all_poles)
     swinging = all_poles.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
     solution = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]

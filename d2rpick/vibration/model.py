@@ -403,6 +403,12 @@ class Evidence(NamedTuple):
         return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
+    def has_sure_modes(self) -> bool:
+        """Return True if modes tell the sign, and not only for want of anything better."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal is not None and modal.doubts.refusal is None
+
+    @property
     def states_per_period(self) -> float | None:
         """States per period of the fastest line of the energy [-]; None if no lines were looked for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
@@ -507,9 +513,11 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
+        # lines need fewer states than a level, and refuse a record that has fewer
+        aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
-            doubts=(*prescribed, *_find_aliasing(history, fit)),
+            doubts=(*prescribed, *aliasing),
         )
     if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
         return samples(

@@ -1,9 +1,8 @@
 """Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
 
 Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
-that run through code with this constant are asked again: the frozen questions of the tests, and random records of each
-class of `promise`.  The table shows how many answers changed.  A constant that changes no answer is not needed, or
-needs a question of its own.
+of `deciding_questions` that run through code with this constant are asked again.  The table shows how many answers
+changed.  A constant that changes no answer is not needed, or needs a question of its own.
 """
 
 from __future__ import annotations
@@ -23,20 +22,16 @@ from tempfile import TemporaryDirectory
 from types import FrameType, FunctionType, ModuleType
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
 import d2rpick
 from d2rpick.base.errors import D2RPickError
-from tests.benchmarks.promise import CLASSES, write_record
-from tests.choice import test_same_answers
+from tests.benchmarks.deciding_questions import Question, make_questions
 
 PACKAGES: Final = ("vibration", "flight", "choice")
 FACTORS: Final = (0.5, 2.0)
-# Decimals of a residual whose change is a change of the answer; times are compared to so many digits.
-_DECIMALS, _DIGITS = 3, 5
+# This number of changed answers shows that a constant decides; no further questions are asked.
+ENOUGH: Final = 3
 
 Number = float | int | tuple[float, ...]
-Question = Callable[[], str]
 # A function of a file, by the name of the file and the line of its definition.
 Place = tuple[str, int]
 
@@ -129,51 +124,6 @@ def _find_comment(lines: Sequence[str], statement: ast.stmt) -> str:
     assert statement.end_lineno is not None
     comment_on_line = lines[statement.end_lineno - 1].partition("  # ")[2]
     return " ".join(above) or comment_on_line
-
-
-def make_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
-    """Make the frozen questions, and so many records of each class of `promise` in files of the folder."""
-    questions: dict[str, Question] = {}
-    for name, td, settings, _ in test_same_answers.FROZEN:
-        questions[f"{name}, td {td}, {settings}"] = _make_frozen_question(
-            name, td, settings
-        )
-    for name, make in CLASSES.items():
-        for number in range(records):
-            record = make(np.random.default_rng([seed, number]))
-            question_folder = folder / f"{len(questions)}"
-            question_folder.mkdir()
-            path = write_record(record, question_folder)
-            questions[f"{name}, record {number}"] = _make_record_question(
-                str(path), record.read, record.suggest
-            )
-    return questions
-
-
-def _make_frozen_question(
-    name: str, td: float | tuple[float, float], settings: Mapping[str, float | bool]
-) -> Question:
-    def ask() -> str:
-        suggestion = test_same_answers.suggest_for(name, td, **settings)
-        return str(test_same_answers.summarize(suggestion))
-
-    return ask
-
-
-def _make_record_question(
-    path: str, reading: Mapping[str, Any], options: Mapping[str, Any]
-) -> Question:
-    def ask() -> str:
-        answer = d2rpick.suggest(d2rpick.read(path, **reading), **options).to_dict()
-        pair = answer["recommended"]
-        times = [f"{pair[time]:.{_DIGITS}g}" for time in ("tr", "td")] if pair else []
-        rows = [row for row in answer["candidates"] if row["recommended"]]
-        best: Mapping[str, Any] = rows[0] if rows else {}
-        sizes = [best.get(key) for key in ("residual", "residual_low", "residual_high")]
-        rounded = [None if size is None else round(size, _DECIMALS) for size in sizes]
-        return f"{answer['quality']} {answer['basis']} {times} {rounded}"
-
-    return ask
 
 
 def ask_safely(question: Question) -> str:
@@ -323,7 +273,8 @@ def try_factor(
     asked_count = changed = 0
     start = time.process_time()
     for name in touched:
-        if asked_count and time.process_time() - start > seconds:
+        is_late = time.process_time() - start > seconds
+        if asked_count and (is_late or changed >= ENOUGH):
             break
         asked_count += 1
         changed += ask_safely(questions[name]) != baselines[name].answer
@@ -361,7 +312,7 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=2, help="records of each class")
     parser.add_argument("--seed", type=int, default=1, help="seed of the records")
     parser.add_argument(
-        "--seconds", type=float, default=3.0, help="time for each trial of a constant"
+        "--seconds", type=float, default=6.0, help="time for each trial of a constant"
     )
     parser.add_argument("names", nargs="*", help="parts of the names of constants")
     options = parser.parse_args()

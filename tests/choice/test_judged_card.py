@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from d2rpick.choice.answers import verify_in_history
-from d2rpick.choice.judged_card import CardRequest, print_judged_card
+from d2rpick.choice.judged_card import complete_printing, print_judged_card
 from d2rpick.choice.question import Settings
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
@@ -29,21 +29,20 @@ JUDGE = partial(verify_in_history, HISTORY, settings=Settings())
 def test_the_solver_is_that_of_the_history_unless_asked_for(
     written: str, solver: str | None, expected: str
 ) -> None:
-    request = CardRequest(solver, Printing(part=(1,)))
-    assert request.of(replace(HISTORY, format=written))[0] == expected
+    printing = Printing(solver=solver, part=(1,))
+    history = replace(HISTORY, format=written)
+    assert complete_printing(printing, history).solver == expected
 
 
 def test_the_run_ends_with_the_history_unless_told() -> None:
-    assert CardRequest().of(HISTORY)[1].end == HISTORY.time[-1]
-    assert CardRequest(printing=Printing(end=7.0)).of(HISTORY)[1].end == 7.0
+    assert complete_printing(Printing(), HISTORY).end == HISTORY.time[-1]
+    assert complete_printing(Printing(end=7.0), HISTORY).end == 7.0
 
 
 def test_without_anybody_to_switch_there_is_no_card() -> None:
-    assert print_judged_card([PAIR], HISTORY, JUDGE, CardRequest()) is None
+    assert print_judged_card([PAIR], HISTORY, JUDGE, Printing()) is None
     assert (
-        print_judged_card(
-            [PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,)))
-        )
+        print_judged_card([PAIR], HISTORY, JUDGE, Printing(solver="radioss", part=(1,)))
         is None
     )
 
@@ -53,9 +52,7 @@ def test_each_window_has_its_verdict_in_the_comments() -> None:
     history = read_history([GLSTAT])
     judge = partial(verify_in_history, history, settings=Settings())
     printed_card = require(
-        print_judged_card(
-            windows, history, judge, CardRequest(printing=Printing(part=(1,)))
-        )
+        print_judged_card(windows, history, judge, Printing(part=(1,)))
     )
     card, verdicts = printed_card
     assert card.windows == tuple(windows)

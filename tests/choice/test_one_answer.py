@@ -195,7 +195,7 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
     (reason,) = (
         reason_text
         for reason_text in verify_in_history(history, best.tr, td, barely).reasons
-        if "is allowed" in reason_text
+        if "above the limit" in reason_text
     )
     value, limit = map(float, re.findall(r"[\d.]+", reason))
     assert value > limit

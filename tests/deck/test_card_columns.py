@@ -179,7 +179,7 @@ def test_pairs_by_force_name_each_other(
         speed=speed,
     )
     try:
-        card = print_cards(windows, asked, "ls-dyna-contact")
+        card = print_cards(windows, asked._replace(solver="ls-dyna-contact"))
     except DeckError as refused:
         assert "no force-free time lets a pair" in str(refused)  # noqa: PT017  most have one
         return

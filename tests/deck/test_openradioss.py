@@ -118,7 +118,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     card = print_cards(
-        windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss"
+        windows, Printing(node=(MAIN,), end=END, name="strip", solver="radioss")
     )
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
@@ -158,8 +158,9 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
         # the limit of the only run also applies while it is deformable, with a time step of 1.7e-5
         card = print_cards(
             windows,
-            Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5),
-            solver,
+            Printing(
+                node=(MAIN,), end=END, name="strip", step_cap=2.5e-5, solver=solver
+            ),
         )
         main = write_deck(
             str(reference / "strip_0000.rad"), card, str(tmp_path / solver)

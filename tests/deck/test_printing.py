@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,13 @@ from hypothesis import given, strategies as st
 
 from d2rpick.api.arguments import read_windows
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, write_number
+from d2rpick.deck.printed_card import (
+    LONGEST,
+    PrintedCard,
+    Printing,
+    check_windows,
+    write_number,
+)
 from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 from d2rpick.histories.formats import READERS
 from d2rpick.rules import check_deck
@@ -95,19 +100,24 @@ def test_windows_that_do_not_follow_each_other_are_refused(
     windows: list[tuple[float, float]], message: str, solver: str
 ) -> None:
     with pytest.raises(DeckError, match=message):
-        print_cards(windows, ALL, solver)
+        print_cards(windows, ALL._replace(solver=solver))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     windows = [(0.0, 0.09), (0.2, 0.3), (0.5, 0.75)]
-    card = print_cards(windows, ALL, solver, ["a\nremark"])
+    card = print_cards(windows, ALL._replace(solver=solver), ["a\nremark"])
     assert card.windows == tuple(windows)
     assert " a\\nremark\n" in card.text
     assert all("cycles at least" in note for note in card.notes)
     assert len(card.notes) == (
         solver in ("radioss-sensors", "radioss-contact")
     )  # one step for the whole run
+    of_one_step = [
+        " ".join(content.split("\n# ")).count("cycles at least")
+        for content in card.files.values()
+    ]
+    assert sum(of_one_step) == len(card.notes)
     assert all(content in card.text for content in card.files.values())
     assert hasattr(ALL, SOLVERS[solver].switches)
     assert all(hasattr(ALL, name) for name in SOLVERS[solver].takes)
@@ -237,11 +247,14 @@ def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
     assert not count_findings(tmp_path, text)
 
 
-radioss_cards = partial(print_cards, solver="radioss")
+def print_radioss_cards(
+    windows: list[tuple[float, float]], printing: Printing
+) -> PrintedCard:
+    return print_cards(windows, printing._replace(solver="radioss"))
 
 
 def test_three_engine_files() -> None:
-    card = radioss_cards([(0.0128853793630525, 0.064)], BOX)
+    card = print_radioss_cards([(0.0128853793630525, 0.064)], BOX)
     parts = [leg.split("\n") for leg in card.files.values()]
     assert list(card.files) == ["run_0001.rad", "run_0002.rad", "run_0003.rad"]
     assert [leg[:3] for leg in parts] == [
@@ -256,12 +269,14 @@ def test_three_engine_files() -> None:
         False,
     ]
     assert re.findall(r"# ---- (\S+)", card.text) == list(card.files)
-    capped = radioss_cards([(0.01, 0.02)], Printing(node=(1,), end=0.03, step_cap=1e-6))
+    capped = print_radioss_cards(
+        [(0.01, 0.02)], Printing(node=(1,), end=0.03, step_cap=1e-6)
+    )
     assert "/DTIX\n1e-06 1e-06" in capped.text
 
 
 def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
-    card = radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
+    card = print_radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
     printed_windows = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
     assert printed_windows == [
         ("1", "0.02", "ON"),
@@ -303,4 +318,4 @@ def test_what_a_solver_cannot_be_told_is_refused(
     solver: str, windows: list[tuple[float, float]], printing: Printing, message: str
 ) -> None:
     with pytest.raises(DeckError, match=message):
-        print_cards(windows, printing, solver)
+        print_cards(windows, printing._replace(solver=solver))

@@ -9,6 +9,7 @@ from d2rpick.deck.mesh import read_nodes
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import print_cards
 from d2rpick.deck.radioss_bodies import SwitchedBodies, find_bodies
+from d2rpick.deck.radioss_columns import GRAVITY
 from d2rpick.deck.radioss_run import RadiossRun, find_rigid_parts, read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
@@ -107,7 +108,9 @@ def write_bodies(
     bodies = find_bodies(main, parts)
     printing = Printing(node=bodies.nodes, end=0.4, name="box", starter=bodies.cards)
     name = write_deck(
-        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main,
+        print_cards([(0.1, 0.2)], printing._replace(solver="radioss")),
+        str(tmp_path / "next"),
     )[0]
     return bodies.nodes, read_run(name), name
 
@@ -173,7 +176,7 @@ def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -
     pulled = {
         number
         for card in run.starter.named("GRAV")
-        for number in [card.integer(card.rows[1], 4).value]
+        for number in [card.integer(card.rows[1], GRAVITY["grnod_ID"]).value]
     }
     members = [run.starter.group_members(number) for number in sorted(pulled)]
     assert [group_members and group_members[0] for group_members in members[1:]] == [
@@ -222,7 +225,9 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
         replaced=bodies.replaced,
     )
     name = write_deck(
-        main, print_cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+        main,
+        print_cards([(0.1, 0.2)], printing._replace(solver="radioss")),
+        str(tmp_path / "next"),
     )[0]
     starter_of_copy = read_run(name).starter
     assert starter_of_copy

@@ -246,8 +246,9 @@ def test_printed_sensors_hold_their_windows(
     windows = list(zip(times[::2], times[1::2], strict=True))
     card = print_cards(
         windows,
-        Printing(node=(1808,), end=windows[-1][1] + 1, sensor=5),
-        "radioss-sensors",
+        Printing(
+            node=(1808,), end=windows[-1][1] + 1, sensor=5, solver="radioss-sensors"
+        ),
     )
     path = read_sensed_spans(
         tmp_path_factory.mktemp("run"),

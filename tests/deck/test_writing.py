@@ -160,7 +160,9 @@ def write_radioss_run(folder: Path, engine: str = ENGINE) -> str:
 
 
 def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
-    card = print_cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
+    card = print_cards(
+        WINDOWS, Printing(node=(1808,), end=0.4, name="box", solver="radioss")
+    )
     starter, *legs = write_deck(
         write_radioss_run(tmp_path / "ref"), card, str(tmp_path / "next")
     )
@@ -182,7 +184,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
     main = main.replace("box_0000", "heavy_box_0000")
     for name in ("box", "heavy_box"):  # the name in /RUN, or that of the files
         card = print_cards(
-            WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss"
+            WINDOWS, Printing(node=(1808,), end=0.4, name=name, solver="radioss")
         )
         names = [
             Path(written_file).name
@@ -190,7 +192,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
         ]
         assert names == [f"heavy_box_{number:04d}.rad" for number in range(6)]
     card = print_cards(
-        WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss"
+        WINDOWS, Printing(node=(1808,), end=0.4, name="other", solver="radioss")
     )
     check_refused(main, card, "the cards are for run 'other', but this is run 'box'")
 
@@ -199,7 +201,9 @@ def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
     tmp_path: Path,
 ) -> None:
     """A later leg may lack keywords of the first one, such as initial velocities, but has none of its own."""
-    card = print_cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
+    card = print_cards(
+        WINDOWS, Printing(node=(1808,), end=0.8, name="box", solver="radioss")
+    )
     ref = write_radioss_run(tmp_path / "ref")
     (tmp_path / "ref" / "box_0002.rad").write_text(
         "/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n"
@@ -229,8 +233,9 @@ def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> 
     ):  # a card that knows them, and one that does not
         card = print_cards(
             WINDOWS,
-            Printing(node=(1808,), off=starter_deck, end=0.4, name="box"),
-            "radioss",
+            Printing(
+                node=(1808,), off=starter_deck, end=0.4, name="box", solver="radioss"
+            ),
         )
         starter, *legs = write_deck(
             write_radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name)
@@ -255,7 +260,8 @@ def list_states(leg: RadiossLeg) -> Iterator[tuple[int, bool]]:
 def test_a_card_names_all_that_is_off_in_one_block() -> None:
     """The starter of OpenRadioss ignores the second of two consecutive blocks."""
     card = print_cards(
-        WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss"
+        WINDOWS,
+        Printing(node=(1808,), off=(1809,), end=0.4, name="box", solver="radioss"),
     )
     texts = list(card.files.values())
     assert [text.count("/RBODY/OFF") for text in texts] == [1] * 5
@@ -265,7 +271,7 @@ def test_a_card_names_all_that_is_off_in_one_block() -> None:
 
 def print_sensor_card(**more: object) -> PrintedCard:
     printing = Printing(node=(1808,), end=0.4, name="box", **more)  # type: ignore[arg-type]
-    return print_cards(WINDOWS, printing, "radioss-sensors")
+    return print_cards(WINDOWS, printing._replace(solver="radioss-sensors"))
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
@@ -322,13 +328,15 @@ def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
         (
             RUN.deck,
             ENGINE.replace("OFF", "ON"),
-            print_cards(WINDOWS, LEGS, "radioss"),
+            print_cards(WINDOWS, LEGS._replace(solver="radioss")),
             "switches main node 1808 already",
         ),
         (
             RUN.deck,
             ENGINE,
-            print_cards(WINDOWS, LEGS._replace(name="other"), "radioss"),
+            print_cards(
+                WINDOWS, LEGS._replace(name="other")._replace(solver="radioss")
+            ),
             "but this is run 'box'",
         ),
         (
@@ -366,5 +374,7 @@ def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(
 ) -> None:
     message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
     check_refused(
-        write(tmp_path, HEAD + PARTS), print_cards(WINDOWS, LEGS, solver), message
+        write(tmp_path, HEAD + PARTS),
+        print_cards(WINDOWS, LEGS._replace(solver=solver)),
+        message,
     )

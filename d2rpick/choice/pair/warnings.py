@@ -13,10 +13,11 @@ import numpy as np
 from d2rpick.base.errors import Caution, list_names, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.few_states import warn_about_few_states
+from d2rpick.choice.parts.margins import compute_turning_speed
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
 from d2rpick.histories.digits import (
-    format_above_limit,
+    format_beyond_limit,
     format_window,
     round_down_as_read,
     round_to_first_as_read,
@@ -242,8 +243,9 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     )
     if worst.assumed and situation.settings.bodies is None:
         assumption += ", which the deck of the run shows (`deck`)"
+    turning = compute_turning_speed(situation.history, situation.flight, bodies)
     contact = compute_margin(
-        situation.history, situation.flight, place=worst.error
+        situation.history, situation.flight, place=worst.error, turning=turning
     ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
     yield Caution(
@@ -565,7 +567,7 @@ def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
     """Return the objection that the error of a candidate exceeds the tolerance."""
     limit = limits[candidate]
     return [
-        f"error {format_above_limit(error[candidate], limit)}, more than the tolerance {limit:g}"
+        f"error {format_beyond_limit(error[candidate], limit)} above the tolerance {limit:g}"
     ]
 
 
@@ -612,7 +614,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
-        times = format_above_limit(means.ratio(energy), MOST_KEPT)
+        times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"
         yield f"{text}, at most {MOST_KEPT:g} was expected"
 

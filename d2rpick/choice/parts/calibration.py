@@ -29,6 +29,7 @@ from d2rpick.choice.parts.cost import (
     Weights,
 )
 from d2rpick.deck import find_main_decks, ls_dyna_inventory, radioss_inventory
+from d2rpick.deck.ls_dyna_columns import TERMINATION
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_files import list_run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
@@ -337,7 +338,7 @@ def _read_termination_time(deck: Deck) -> float:
     """Return the termination time of an LS-DYNA run [time]; 0 if it is unknown."""
     cards = deck.named("CONTROL_TERMINATION")
     rows = [row for row in cards[0].rows if not row.blank] if cards else []
-    return float(cards[0].real(rows[0], 0).value) if rows else 0.0
+    return float(cards[0].real(rows[0], TERMINATION["ENDTIM"]).value) if rows else 0.0
 
 
 def _make_observation(

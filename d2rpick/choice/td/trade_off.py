@@ -14,7 +14,12 @@ from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.pair.candidates import judge_candidates
 from d2rpick.choice.pair.grades import GOOD
-from d2rpick.choice.pair.quality import EQUALLY_GOOD, rank_candidates, rank_judged
+from d2rpick.choice.pair.quality import (
+    EQUALLY_GOOD,
+    list_exceeded_limits,
+    rank_candidates,
+    rank_judged,
+)
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.td.flights import find_longest_flight
@@ -26,7 +31,6 @@ from d2rpick.choice.td.suggest_td import (
     round_error,
 )
 from d2rpick.histories.digits import round_as_read
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
@@ -211,21 +215,18 @@ def explore_run(
         If td or the window lies outside the record, or there is no flight and neither of them is given.
     """
     history = reference.history
-    fits = Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or find_longest_flight(
-        history, settings, fits, otherwise=None if td is None else record
+        history, settings, otherwise=None if td is None else record
     )
-    look = make_look(history, settings, fits, since)
+    look = make_look(history, settings, since)
     known_best, inside = find_best_known(look, history, window)
     offered, peaks = list_offered_times(known_best, inside, steps)
     times = offered.tolist() if td is None else [*offered.tolist(), td]
-    suggestion = suggest_in_run(
-        reference, window, settings, fits=fits, since=since, times=times
-    )
+    suggestion = suggest_in_run(reference, window, settings, since=since, times=times)
     chosen = suggestion.recommended.td if suggestion.recommended else None
-    fully = make_look(history, settings, fits, since, quick=False)
+    fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     # the full search gives the reason why no oscillator is seen
     situations = [
@@ -252,7 +253,7 @@ def explore_run(
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_warn_about_window(warned, window, inside, offers)),
+        cautions=tuple(_warn_about_window(warned, window, inside, offers, suggestion)),
         asked=requested,
         recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
@@ -325,6 +326,7 @@ def _warn_about_window(
     window: tuple[float, float],
     inside: tuple[float, float],
     offers: Sequence[Offer],
+    suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
     """Yield the warnings that concern the whole window; each offer has those of its own td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
@@ -338,10 +340,20 @@ def _warn_about_window(
             f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
         )
     if not any(map(_is_comparable, offers)):
-        yield Caution(
-            "no-candidate",
-            "no td in the range has an admissible tr",
-        )
+        nothing = "no td in the range has an admissible tr"
+        yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
+
+
+def _explain_by_limits(suggestion: PairSuggestion) -> str:
+    """Return which limits the nearest candidate exceeds at the td that ``suggest`` chooses; empty for none."""
+    if suggestion.recommended or not suggestion.candidates:
+        return ""
+    nearest = suggestion.candidates[0]
+    exceeded = list_exceeded_limits(suggestion.situation, nearest)
+    if not exceeded:
+        return ""
+    reasons = "; ".join(excess.message for excess in exceeded)
+    return f"; tr = {nearest.tr:.6g} for td = {suggestion.td:.6g}: {reasons}"
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:
