@@ -458,7 +458,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected"
+                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected"
             ) from None
         windows.append((tr, td))
     if not windows:

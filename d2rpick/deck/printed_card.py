@@ -180,7 +180,9 @@ def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
         if not 0 <= tr < td < math.inf:
-            raise DeckError(f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected")
+            raise DeckError(
+                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+            )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:
             relation = "lies before" if end <= tr else "overlaps or touches"

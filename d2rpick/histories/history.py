@@ -376,6 +376,7 @@ class History:
         hint = self.left_beside if is_late else ""
         if not hint and argument:
             hint = ask_for_smaller_unit(self.time, times, argument)
+        hint = hint or "; give a time within it"
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))

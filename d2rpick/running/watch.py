@@ -109,7 +109,7 @@ class Watch:
     def state(self) -> Event:
         """Return whether the parts fly now, and since when."""
         if not self._events and self._last_time == float("-inf"):
-            message = "has not begun"
+            message = "no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)

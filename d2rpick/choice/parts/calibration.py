@@ -258,6 +258,10 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
     FormatError
         If no file contains CPU times of the run.
     """
+    if Path(folder).is_file():
+        raise DeckError(
+            f"{folder}: a file, the folder of one run was expected; give the folder that contains it"
+        )
     decks = find_main_decks(folder)
     if len(decks) != 1:
         if decks:
